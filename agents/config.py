@@ -1,0 +1,81 @@
+"""What one agent is told at its start: its own nameplate and the run's rule, nothing about others."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+
+class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Gains and limits of the secondary law (12)-(15), per unit of own rating, w in pu."""
+
+    k_p: float = 0.0007
+    """P_set gain (s; pu frequency per (pu power / s)). kappa = m_p / k_p is the rate, 1/s. > 0."""
+    k_q: float = 1.0
+    """V_set gain (s; pu reactive droop per (pu voltage / s)). > 0."""
+    alpha: float = 5.0
+    """Weight of the voltage error in (15), GFM only. >= 0."""
+    beta_GFM: float = 2.0
+    """Weight of the var-sharing sum in (15). >= 0."""
+    beta_GFL: float = 1.0
+    """Weight of the var-sharing sum of a GFL, (14). The paper has 1. >= 0."""
+    P_set_min: float = 0.0
+    """Lower limit of P_set (pu), anti-windup."""
+    P_set_max: float = 1.0
+    """Upper limit of P_set (pu), anti-windup."""
+    V_set_min: float = 0.9
+    """Lower limit of V_set (pu), anti-windup."""
+    V_set_max: float = 1.1
+    """Upper limit of V_set (pu), anti-windup."""
+
+
+GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
+"""How nameplates become neighbours; "links" takes the listed pairs."""
+
+
+class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The run's rule of control: who takes part and who listens to whom.
+
+    Case I: secondary "none". II: "GFM", graph "none". III: "GFM", graph "GFM-only".
+    IV: "all", graph "full".
+    """
+
+    secondary: Literal["none", "GFM", "all"]
+    """Which inverters run the secondary law; the others keep their first set-points."""
+    graph: GraphRule
+    """Rule of the communication graph."""
+    links: tuple[tuple[str, str], ...] = ()
+    """Undirected links for the rule "links"."""
+    gains: Gains = Gains()
+    """Gains of the law."""
+
+
+class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Everything one agent process is started with (JSON on its standard input)."""
+
+    run: str
+    """Name of the run, part of every key."""
+    name: str
+    """Name of the inverter, e.g. "inv1"."""
+    kind: Literal["GFM", "GFL"]
+    microgrid: str
+    P_rated: float
+    """W."""
+    V_nom: float
+    """V, line-to-neutral."""
+    f_nom: float
+    """Hz."""
+    m_p: float
+    """pu per pu."""
+    m_q: float
+    """pu per pu."""
+    T_c: float
+    """Control period (s)."""
+    control: Control
+    deadline: float
+    """Longest wait for any message (s)."""
+    connect: tuple[str, ...]
+    """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
+    incarnation: int = 1
+    """Which life of this agent."""

@@ -1,0 +1,1 @@
+"""The plant: feeder, network, inverter dynamics, and the process that runs them."""

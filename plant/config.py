@@ -1,0 +1,154 @@
+"""What the plant process is told at its start (JSON on its standard input)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+
+class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
+
+    R_f: float = 0.015
+    """Filter resistance (pu)."""
+    X_f: float = 0.15
+    """Filter reactance (pu)."""
+    T_p: float = 0.01
+    """Filter of measured P (s)."""
+    T_q: float = 0.01
+    """Filter of measured Q (s)."""
+    T_v: float = 0.01
+    """Filter of measured V (s)."""
+    P_max: float = 1.0
+    """Overload limit (pu)."""
+    P_min: float = 0.0
+    """Under-load limit (pu)."""
+    k_pp: float = 3.0
+    """Proportional gain of the P limiters (rad/s per pu)."""
+    k_ip: float = 60.0
+    """Integral gain of the P limiters (rad/s^2 per pu)."""
+    w_lim: float = 200.0
+    """Bound of the P limiters' output (rad/s)."""
+    Q_max: float = 10.0
+    """Upper reactive limit (pu)."""
+    Q_min: float = -10.0
+    """Lower reactive limit (pu)."""
+    k_pq: float = 3.0
+    """Proportional gain of the Q limiters (pu V per pu)."""
+    k_iq: float = 20.0
+    """Integral gain of the Q limiters (pu V per pu s)."""
+    V_lim: float = 10.0
+    """Bound of the Q limiters' output (pu V)."""
+    k_pv: float = 0.0
+    """Proportional gain of the voltage controller."""
+    k_iv: float = 5.86
+    """Integral gain of the voltage controller (1/s)."""
+    E_min: float = 0.0
+    """Lower bound of the internal voltage (pu)."""
+    E_max: float = 1.25
+    """Upper bound of the internal voltage (pu)."""
+
+
+class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Grid-following inverter, `inverter-models.md` section 4. Per unit of own rating."""
+
+    model: Literal["voltage_source", "current_source"] = "voltage_source"
+    """Representation towards the network (sections 4.6, 4.7)."""
+    R_f: float = 0.01
+    """Filter resistance (pu)."""
+    X_f: float = 0.15
+    """Filter reactance (pu)."""
+    k_pPLL: float = 50.0
+    """PLL proportional gain (rad/s per pu)."""
+    k_iPLL: float = 900.0
+    """PLL integral gain (rad/s^2 per pu)."""
+    k_pc: float = 0.05
+    """Current controller, proportional (pu)."""
+    k_ic: float = 5.0
+    """Current controller, integral (1/s)."""
+    F_current: float = 0.6
+    """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
+    T_if: float = 0.005
+    """Current lag of the current-source form (s)."""
+    frequency_watt: bool = True
+    """Frequency-watt droop on."""
+    volt_var: bool = True
+    """Volt-var droop on."""
+    T_ff: float = 0.02
+    """Filter of the PLL frequency (s)."""
+    T_pf: float = 0.05
+    """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
+    T_vf: float = 0.02
+    """Filter of measured V (s)."""
+    T_qf: float = 0.05
+    """Lag of the Q reference (s)."""
+    db_UF: float = 0.0
+    """Dead band below nominal frequency (Hz)."""
+    db_OF: float = 0.0
+    """Dead band above nominal frequency (Hz)."""
+    db_UV: float = 0.0
+    """Dead band below V_set (pu)."""
+    db_OV: float = 0.0
+    """Dead band above V_set (pu)."""
+    P_max: float = 1.0
+    """Upper bound of the P reference (pu)."""
+    P_min: float = -1.0
+    """Lower bound of the P reference (pu)."""
+    S_max: float = 1.2
+    """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
+    i_max: float = 1.2
+    """Bound of each axis of the current reference (pu)."""
+
+
+class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A switch operated at a time of the scenario."""
+
+    t: float
+    """Time (s), a multiple of h."""
+    switch: str
+    """Name, e.g. "13-152" or "sw1_2"."""
+    action: Literal["open", "close"]
+
+
+class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Everything that decides the plant's numbers."""
+
+    feeder: str = "microgrid123"
+    """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
+    load_set: str = "main"
+    """Which load table of the feeder: "main" or "event2"."""
+    h: float = 0.002
+    """Integration step (s)."""
+    P_set0: float = 0.647
+    """First P_set of every inverter (pu of its rating)."""
+    V_set0: float = 1.0
+    """First V_set of every inverter (pu of its nominal voltage)."""
+    gfm: GfmParameters = GfmParameters()
+    gfl: GflParameters = GflParameters()
+    events: tuple[SwitchEvent, ...] = ()
+    """Switches operated on schedule."""
+
+
+class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Everything the plant process is started with (JSON on its standard input)."""
+
+    run: str
+    """Name of the run, part of every key."""
+    settings: PlantSettings
+    agents: tuple[str, ...]
+    """Agents the plant waits for before tick 0."""
+    T_c: float
+    """Control period (s), a multiple of h."""
+    end: float
+    """Duration of the run (s), a multiple of T_c."""
+    record_step: float
+    """Distance of the recorded rows (s): a multiple of h that divides T_c."""
+    deadline: float
+    """Longest wait for any agent (s)."""
+    listen: tuple[str, ...]
+    """Endpoints the plant listens on; the rendezvous of the run."""
+    connect: tuple[str, ...] = ()
+    """Endpoints the plant connects to, beside listening."""
+    incarnation: int = 1
+    """Which life of this plant."""
