@@ -1,0 +1,183 @@
+"""What a feeder consists of: the frozen rows that `plant.tables` reads and `plant.network` computes with."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+Phase = Literal["A", "B", "C"]
+PHASES: tuple[Phase, ...] = ("A", "B", "C")
+"""Order of the phases in every table and vector."""
+
+
+class Bus(msgspec.Struct, frozen=True, kw_only=True):
+    """A place where things are connected; one node per phase."""
+
+    name: str
+    """Name, as in the feeder's drawings: "13", "150r"."""
+    phases: str
+    """The phases that exist here, in order: "ABC", "AC", "B"."""
+    V_nom: float
+    """Nominal voltage (V, line-to-neutral)."""
+    zone: str = ""
+    """Part of the feeder it belongs to, for drawings only."""
+    x: float = 0.0
+    """Place in the drawing (drawing units)."""
+    y: float = 0.0
+    """Place in the drawing (drawing units)."""
+
+
+class LineConfig(msgspec.Struct, frozen=True, kw_only=True):
+    """A kind of line: conductors and spacing, per length, at nominal frequency, earth return reduced."""
+
+    name: str
+    """Name by which lines refer to it."""
+    phases: str
+    """Phases of the rows and columns."""
+    Z: tuple[tuple[complex, ...], ...]
+    """Series impedance matrix (ohm/km)."""
+    B: tuple[tuple[float, ...], ...]
+    """Shunt susceptance matrix (S/km)."""
+
+
+class Line(msgspec.Struct, frozen=True, kw_only=True):
+    """A line section between two buses of equal nominal voltage."""
+
+    name: str
+    """Name, unique."""
+    from_bus: str
+    """One end."""
+    to_bus: str
+    """Other end."""
+    phases: str
+    """Phases it carries."""
+    config: str
+    """Name of its `LineConfig`."""
+    length: float
+    """Length (km)."""
+
+
+class Switch(msgspec.Struct, frozen=True, kw_only=True):
+    """An ideal switch: closed, it makes one node of two on each of its phases; open, it is not there."""
+
+    name: str
+    """Its buses: "13-152"."""
+    alias: str
+    """A second name ("sw1_2"), or empty."""
+    from_bus: str
+    """One end."""
+    to_bus: str
+    """Other end."""
+    phases: str
+    """Phases it switches, all together."""
+    closed: bool
+    """Its state before anything is operated."""
+
+
+class Load(msgspec.Struct, frozen=True, kw_only=True):
+    """A spot load of one kind: constant impedance (Z), current (I) or power (P)."""
+
+    bus: str
+    """Where it is connected."""
+    connection: Literal["Y", "D"]
+    """Y: phases to ground. D: between phases A-B, B-C, C-A."""
+    model: Literal["Z", "I", "P"]
+    """Z: power goes with V^2, I: with V, P: constant."""
+    S: tuple[complex, complex, complex]
+    """Power at nominal voltage (VA) on phases A, B, C (Y) or A-B, B-C, C-A (D)."""
+
+
+class Capacitor(msgspec.Struct, frozen=True, kw_only=True):
+    """A shunt capacitor bank, each phase to ground."""
+
+    bus: str
+    """Where it is connected."""
+    Q: tuple[float, float, float]
+    """Reactive power given at rated voltage (var) on phases A, B, C."""
+    V_rated: float
+    """Rated voltage (V, line-to-neutral)."""
+
+
+class Regulator(msgspec.Struct, frozen=True, kw_only=True):
+    """A step voltage regulator at a fixed tap: an ideal autotransformer, V_to = ratio V_from."""
+
+    name: str
+    """Name; phases with taps of their own are rows of their own under the same name."""
+    from_bus: str
+    """Side without taps."""
+    to_bus: str
+    """Regulated side."""
+    phases: str
+    """Phases that stand on this tap."""
+    ratio: float
+    """V_to / V_from, 1 + tap * tap_step."""
+
+
+class Transformer(msgspec.Struct, frozen=True, kw_only=True):
+    """A three-phase two-winding transformer whose rated voltages are the nominal voltages of its buses."""
+
+    name: str
+    """Name, unique."""
+    from_bus: str
+    """One side."""
+    to_bus: str
+    """Other side."""
+    connection: Literal["D-D", "Yg-Yg"]
+    """Windings; none of the two shifts the phase."""
+    S_rated: float
+    """Rated power (VA, three phases)."""
+    z: complex
+    """Series impedance (pu of the rating)."""
+
+
+class Source(msgspec.Struct, frozen=True, kw_only=True):
+    """The substation: a stiff three-phase voltage."""
+
+    bus: str
+    """Where it stands."""
+    V_pu: float
+    """Voltage (pu of the bus's nominal voltage)."""
+    angle: float
+    """Angle of phase A (rad)."""
+
+
+class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
+    """The nameplate of an inverter and where it stands."""
+
+    name: str
+    """Name, unique: "inv1"."""
+    kind: Literal["GFM", "GFL"]
+    """Grid-forming or grid-following."""
+    bus: str
+    """Bus of its terminals (all three phases, only one inverter on a bus)."""
+    microgrid: str
+    """Microgrid it belongs to."""
+    P_rated: float
+    """Rated power (W, three phases), base of its per-unit values."""
+    V_nom: float
+    """Nominal terminal voltage (V, line-to-neutral)."""
+    m_p: float
+    """P-f droop (pu frequency per pu power)."""
+    m_q: float
+    """Q-V droop (pu voltage per pu reactive power)."""
+
+
+class Feeder(msgspec.Struct, frozen=True, kw_only=True):
+    """All tables of a feeder with one load set. `plant.tables.read_feeder` has checked that they fit together."""
+
+    name: str
+    """Name of the folder."""
+    load_set: str
+    """Which loads these are: "main" was read from loads_main.csv."""
+    buses: tuple[Bus, ...]
+    lines: tuple[Line, ...]
+    line_configs: tuple[LineConfig, ...]
+    switches: tuple[Switch, ...]
+    loads: tuple[Load, ...]
+    capacitors: tuple[Capacitor, ...]
+    regulators: tuple[Regulator, ...]
+    transformers: tuple[Transformer, ...]
+    inverters: tuple[InverterRow, ...]
+    source: Source | None
+    """The substation, or None in a feeder that only inverters feed."""

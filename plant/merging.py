@@ -1,0 +1,98 @@
+"""Nodes that ideal devices tie together: closed switches (equal voltages) and regulators (a fixed ratio)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+
+class Merge:
+    r"""Which nodes an ideal device makes one of, and at what ratio.
+
+    A closed switch or a regulator has no impedance, so it has no admittance either. Instead, each group of nodes
+    tied by such devices keeps one unknown, the voltage of its representative r:
+
+    .. math:: V_i = a_i V_{r(i)}, \qquad I_r = \sum_{i \in r} a_i I_i
+
+    with :math:`a_i = 1` through switches and the tap ratio through regulators. The second equation follows from the
+    first, because ideal devices take no power.
+
+    Attributes
+    ----------
+    representative : int64[n]
+        Node -> its representative. A representative represents itself.
+    ratio : float64[n]
+        :math:`a_i`; exactly 1 for representatives.
+    """
+
+    def __init__(self, representative: NDArray[np.int64], ratio: NDArray[np.float64]) -> None:
+        self.representative = representative
+        self.ratio = ratio
+
+    @property
+    def representatives(self) -> NDArray[np.int64]:
+        """The nodes that represent their groups, ascending."""
+        return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
+
+    def expand(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Give every node its voltage (V) from the voltages at the representatives (the other entries are unused)."""
+        return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
+
+    def gather(self, current: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Bring currents at all nodes (A) to the representatives; the other entries become zero."""
+        gathered = np.zeros(len(current), dtype=np.complex128)
+        np.add.at(gathered, self.representative, self.ratio * current)
+        return gathered
+
+    def matrix(self) -> sp.csc_array:
+        """T with V = T V_rep and I_rep = T' I (n x n, columns of nodes that represent nothing are empty)."""
+        n = len(self.representative)
+        return sp.csc_array((self.ratio, (np.arange(n), self.representative)), shape=(n, n))
+
+
+def merge_nodes(names: Sequence[str], ties: Iterable[tuple[int, int, float]], preferred: Sequence[int]) -> Merge:
+    """Group nodes that are tied together.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the nodes, for errors.
+    ties : iterable of (from, to, ratio)
+        Ideal devices: V_to = ratio * V_from.
+    preferred : sequence of int
+        Nodes that shall represent their group if they can, the most wanted first; else it is the first node.
+
+    Raises
+    ------
+    ValueError
+        If two ways between the same nodes have different ratios: an ideal short circuit.
+    """
+    n = len(names)
+    neighbours: list[list[tuple[int, float]]] = [[] for _ in range(n)]
+    for node_from, node_to, ratio in ties:
+        neighbours[node_from].append((node_to, ratio))
+        neighbours[node_to].append((node_from, 1.0 / ratio))
+    representative = np.full(n, -1, dtype=np.int64)
+    ratios = np.ones(n)
+    for start in (*preferred, *range(n)):
+        if representative[start] >= 0:
+            continue
+        representative[start] = start
+        waiting = [start]
+        while waiting:
+            node = waiting.pop()
+            for other, step in neighbours[node]:
+                ratio = ratios[node] * step
+                if representative[other] < 0:
+                    representative[other], ratios[other] = start, ratio
+                    waiting.append(other)
+                elif abs(ratios[other] - ratio) > 1e-12 * ratio:
+                    raise ValueError(
+                        f"{names[node]} and {names[other]} are tied twice, at {ratios[other] / ratios[node]:.5f} "
+                        f"and at {step:.5f} of the voltage: a short circuit through a regulator; "
+                        f"open the switch across it, or set its tap to 0"
+                    )
+    return Merge(representative, ratios)

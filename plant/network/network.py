@@ -1,0 +1,248 @@
+"""The network of a feeder as matrices over its nodes."""
+
+from __future__ import annotations
+
+import cmath
+import difflib
+from collections.abc import Iterable
+from math import pi, sqrt
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
+from plant.loads import LoadBranches
+from plant.merging import Merge, merge_nodes
+from plant.network.primitives import line_admittance, transformer_admittance
+
+ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
+"""Nominal angles of the phases (rad)."""
+
+DELTA_PAIRS = (("A", "B"), ("B", "C"), ("C", "A"))
+"""Ends of the three branches of a delta load; its nominal angles are +30, -90, +150 degrees."""
+
+
+class Network:
+    """A feeder's nodes, switches and admittances. Pure: every method is a function of the tables and of `closed`.
+
+    Nodes are (bus, phase), buses in the order of the feeder's table, phases A, B, C. All voltages are line-to-ground
+    phasors (V RMS) in one frame at nominal frequency; all reactances are those at nominal frequency.
+
+    Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); what they tie keeps
+    one unknown. In `admittance` only representatives have entries.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        Tables, as `plant.tables.read_feeder` gives them.
+    line_charging : bool, optional
+        Whether the lines' shunt capacitance is taken in. The published solution of the standard feeder has it.
+
+    Attributes
+    ----------
+    nodes : tuple of (bus, phase)
+        Order of all vectors.
+    V_nom : float64[n]
+        Nominal voltages (V, line-to-neutral).
+    nominal : complex128[n]
+        Nominal phasors (V). No transformer of a feeder shifts phases, so they hold behind transformers too.
+    switches : dict of str to Switch
+        By name ("13-152"); `switch_name` finds the name.
+    closed0 : frozenset of str
+        Names of the switches that are closed at first.
+    source_nodes : int64[3] or int64[0]
+        Nodes of the substation, if there is one. They always represent themselves.
+    source_voltage : complex128[3] or complex128[0]
+        Its voltages (V).
+    inverters : tuple of InverterRow
+        In the table's order.
+    Y_branches, Y_capacitors, Y_loads : csc_array, complex, n x n
+        Parts of the admittance matrix (S) before merging: lines and transformers; capacitor banks;
+        constant-impedance loads.
+    """
+
+    def __init__(self, feeder: Feeder, *, line_charging: bool = True) -> None:
+        self.feeder = feeder
+        self.line_charging = line_charging
+        self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
+        self._index = {node: i for i, node in enumerate(self.nodes)}
+        self.V_nom = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
+        self.nominal = self.V_nom * np.exp(1j * np.array([ANGLE[phase] for _, phase in self.nodes]))
+        self.switches = {switch.name: switch for switch in feeder.switches}
+        self.closed0 = frozenset(switch.name for switch in feeder.switches if switch.closed)
+        self.inverters: tuple[InverterRow, ...] = feeder.inverters
+        source = feeder.source
+        self.source_nodes = np.array(
+            [self.index(source.bus, phase) for phase in PHASES] if source else [], dtype=np.int64
+        )
+        self.source_voltage = self.nominal[self.source_nodes]
+        if source:
+            self.source_voltage = self.source_voltage * cmath.rect(source.V_pu, source.angle)
+        self.Y_branches = self._branches()
+        self.Y_capacitors = self._capacitors()
+        self.Y_loads = self._impedance_loads()
+        self._Y = self.Y_branches + self.Y_capacitors + self.Y_loads
+        self._wanted = [int(node) for node in self.source_nodes] + [
+            self.index(inverter.bus, phase) for inverter in self.inverters for phase in PHASES
+        ]
+
+    def index(self, bus: str, phase: str) -> int:
+        """Position of a node in all vectors; KeyError if there is none."""
+        return self._index[bus, phase]
+
+    def switch_name(self, text: str) -> str:
+        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`.
+
+        Raises
+        ------
+        ValueError
+            If no switch is called so.
+        """
+        known: dict[str, str] = {}
+        for name, switch in self.switches.items():
+            known |= {name: name, f"{switch.to_bus}-{switch.from_bus}": name}
+            if switch.alias:
+                known[switch.alias] = name
+        if text not in known:
+            near = difflib.get_close_matches(text, known, n=1)
+            hint = f'did you mean "{near[0]}"?' if near else f"there are {', '.join(self.switches) or 'none'}"
+            raise ValueError(f'switch "{text}": no such switch in feeder "{self.feeder.name}"; {hint}')
+        return known[text]
+
+    def merge(self, closed: frozenset[str]) -> Merge:
+        """Tell which nodes are one when these switches are closed, and at what ratio (regulators).
+
+        The substation's nodes represent their groups, then the inverters' nodes, else the first node of a group.
+        """
+        return merge_nodes(self._node_names(), self._ties(closed), self._wanted)
+
+    def admittance(self, closed: frozenset[str]) -> sp.csc_array:
+        """Admittance matrix (S) with these switches closed, between representatives.
+
+        Lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
+        their representative are empty, as is the matrix outside of the islands' blocks.
+
+        Returns
+        -------
+        csc_array, complex, n x n
+            T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
+        """
+        T = self.merge(closed).matrix()
+        Y = sp.csc_array(T.T @ self._Y @ T)
+        Y.sum_duplicates()
+        return Y
+
+    def loads(self) -> LoadBranches:
+        """Give the loads of constant power and current, at their own nodes (`LoadBranches.on` moves them)."""
+        return self._load_branches([load for load in self.feeder.loads if load.model != "Z"])
+
+    def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
+        """Buses that are connected through branches and closed switches, in the order of each set's first bus."""
+        feeder = self.feeder
+        ends = [(line.from_bus, line.to_bus) for line in feeder.lines]
+        ends += [(transformer.from_bus, transformer.to_bus) for transformer in feeder.transformers]
+        ends += [(regulator.from_bus, regulator.to_bus) for regulator in feeder.regulators]
+        ends += [(switch.from_bus, switch.to_bus) for switch in self._closed_switches(closed)]
+        number = {bus.name: i for i, bus in enumerate(feeder.buses)}
+        rows, columns = ([number[end[side]] for end in ends] for side in (0, 1))
+        graph = sp.coo_array((np.ones(len(ends)), (rows, columns)), shape=(len(number), len(number)))
+        _, label = sp.csgraph.connected_components(graph, directed=False)
+        members: dict[int, list[str]] = {}
+        for bus, of in zip(number, label, strict=True):
+            members.setdefault(int(of), []).append(bus)
+        return tuple(frozenset(buses) for buses in members.values())
+
+    def _node_names(self) -> list[str]:
+        return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]
+
+    def _closed_switches(self, closed: frozenset[str]) -> Iterable[Switch]:
+        for name in closed:
+            if name not in self.switches:
+                raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
+        return [switch for name, switch in self.switches.items() if name in closed]
+
+    def _ties(self, closed: frozenset[str]) -> list[tuple[int, int, float]]:
+        devices = [(switch, 1.0) for switch in self._closed_switches(closed)]
+        ties = [
+            (self.index(switch.from_bus, phase), self.index(switch.to_bus, phase), ratio)
+            for switch, ratio in devices
+            for phase in switch.phases
+        ]
+        ties += [
+            (self.index(regulator.from_bus, phase), self.index(regulator.to_bus, phase), regulator.ratio)
+            for regulator in self.feeder.regulators
+            for phase in regulator.phases
+        ]
+        return ties
+
+    def _assemble(self, parts: list[tuple[list[int], NDArray[np.complex128]]]) -> sp.csc_array:
+        """Add up element matrices, each given with the nodes of its rows."""
+        n = len(self.nodes)
+        rows = [np.repeat(nodes, len(nodes)) for nodes, _ in parts]
+        columns = [np.tile(nodes, len(nodes)) for nodes, _ in parts]
+        values = [matrix.ravel() for _, matrix in parts]
+        if not parts:
+            return sp.csc_array((n, n), dtype=np.complex128)
+        return sp.csc_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(n, n))
+
+    def _branches(self) -> sp.csc_array:
+        configs = {config.name: config for config in self.feeder.line_configs}
+        voltage = {bus.name: bus.V_nom for bus in self.feeder.buses}
+        parts = []
+        for line in self.feeder.lines:
+            nodes = [self.index(bus, phase) for bus in (line.from_bus, line.to_bus) for phase in line.phases]
+            parts.append((nodes, line_admittance(line, configs[line.config], charging=self.line_charging)))
+        for transformer in self.feeder.transformers:
+            ends = (transformer.from_bus, transformer.to_bus)
+            nodes = [self.index(bus, phase) for bus in ends for phase in PHASES]
+            parts.append((nodes, transformer_admittance(transformer, voltage[ends[0]], voltage[ends[1]])))
+        return self._assemble(parts)
+
+    def _capacitors(self) -> sp.csc_array:
+        parts = [
+            ([self.index(bank.bus, phase)], np.array([[1j * Q / bank.V_rated**2]]))
+            for bank in self.feeder.capacitors
+            for phase, Q in zip(PHASES, bank.Q, strict=True)
+            if Q
+        ]
+        return self._assemble(parts)
+
+    def _impedance_loads(self) -> sp.csc_array:
+        branches = self._load_branches([load for load in self.feeder.loads if load.model == "Z"])
+        parts = []
+        # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
+        for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.S, branches.V_nom, strict=True):
+            y = S.conjugate() / V**2
+            if n_to < 0:
+                parts.append(([int(n_from)], np.array([[y]])))
+            else:
+                parts.append(([int(n_from), int(n_to)], np.array([[y, -y], [-y, y]])))
+        return self._assemble(parts)
+
+    def _load_branches(self, loads: list[Load]) -> LoadBranches:
+        n_from, n_to, power, current, V_nom, phi0 = [], [], [], [], [], []
+        for load in loads:
+            pairs = DELTA_PAIRS if load.connection == "D" else tuple((phase, "") for phase in PHASES)
+            for (first, second), S in zip(pairs, load.S, strict=True):
+                if S == 0:
+                    continue
+                i = self.index(load.bus, first)
+                n_from.append(i)
+                n_to.append(self.index(load.bus, second) if second else -1)
+                across = self.V_nom[i] * (sqrt(3.0) if second else 1.0)
+                V_nom.append(across)
+                phi0.append(ANGLE[first] + (pi / 6.0 if second else 0.0))
+                power.append(0j if load.model == "I" else S)
+                current.append(S.conjugate() / across if load.model == "I" else 0j)
+        to = np.array(n_to, dtype=np.int64)
+        return LoadBranches(
+            n_from=np.array(n_from, dtype=np.int64),
+            n_to=to,
+            S=np.array(power, dtype=np.complex128),
+            I0=np.array(current, dtype=np.complex128),
+            V_nom=np.array(V_nom, dtype=np.float64),
+            phi0=np.array(phi0, dtype=np.float64),
+            a_from=np.ones(len(n_from)),
+            a_to=np.where(to < 0, 0.0, 1.0),
+        )

@@ -1,0 +1,143 @@
+"""A plain power flow of what the substation feeds: for tests, documentation and starting values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from plant.loads import LoadBranches
+from plant.network.network import Network
+
+Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+"""From the voltages of all nodes (V) to the currents fed into them (A)."""
+
+MOST_ITERATIONS = 200
+"""A feeder that can carry its loads takes about 10; one that cannot diverges long before."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerFlow:
+    """A solved state of a network."""
+
+    V: NDArray[np.complex128]
+    """Voltages of all nodes (V, line-to-ground); zero where the substation does not reach."""
+    S_source: complex
+    """Power out of the substation (VA)."""
+    S_loads: complex
+    """Power taken by all loads of any kind (VA)."""
+    S_losses: complex
+    """Power taken by lines and transformers (VA); the imaginary part includes line charging."""
+    S_capacitors: complex
+    """Power taken by capacitor banks (VA); their imaginary part is negative."""
+    iterations: int
+    """How often the network was solved."""
+
+
+def solve_power_flow(
+    network: Network,
+    closed: frozenset[str],
+    loads: LoadBranches | None = None,
+    *,
+    shunt: NDArray[np.complex128] | None = None,
+    injection: Injection | None = None,
+    tolerance: float = 1e-10,
+) -> PowerFlow:
+    r"""Solve what the substation reaches, by a fixed point.
+
+    .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
+
+    Parameters
+    ----------
+    network : Network
+        The network; it must have a source.
+    closed : frozenset of str
+        Names of the closed switches.
+    loads : LoadBranches, optional
+        Loads of constant power and current; those of the network if left out.
+    shunt : complex128[n], optional
+        Admittances to ground added at the nodes (S): filters of inverters.
+    injection : callable, optional
+        Currents fed into the nodes (A) from their voltages (V), in addition.
+    tolerance : float, optional
+        Largest change of any voltage in the last iteration (pu).
+
+    Returns
+    -------
+    PowerFlow
+        Voltages and power balance.
+
+    Raises
+    ------
+    ValueError
+        If the feeder has no source.
+    ArithmeticError
+        If it does not converge: mostly a load that the feeder cannot carry.
+    """
+    if not len(network.source_nodes):
+        raise ValueError(f'feeder "{network.feeder.name}" has no source; a power flow needs one, give source.csv')
+    merge = network.merge(closed)
+    Y = network.admittance(closed)
+    if shunt is not None:
+        Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
+    own = loads if loads is not None else network.loads()
+    unknown = _reached(Y, network.source_nodes)
+    solve = sp.linalg.factorized(sp.csc_matrix(Y[unknown][:, unknown]))
+    from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
+
+    V_rep = np.zeros(len(network.nodes), dtype=np.complex128)
+    V_rep[unknown] = network.nominal[unknown]
+    V_rep[network.source_nodes] = network.source_voltage
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        V = merge.expand(V_rep)
+        net = -own.currents(V)
+        if injection is not None:
+            net = net + injection(V)
+        V_new = solve(merge.gather(net)[unknown] - from_source)
+        change = np.abs(V_new - V_rep[unknown]) / network.V_nom[unknown]
+        V_rep[unknown] = V_new
+        worst = int(np.argmax(change)) if len(change) else 0
+        if not len(change) or change[worst] < tolerance:
+            return _balance(network, merge.expand(V_rep), own, injection, shunt, iteration)
+        if not np.isfinite(change[worst]):
+            break
+    bus, phase = network.nodes[unknown[worst]]
+    raise ArithmeticError(
+        f"power flow did not converge: after {iteration} iterations bus {bus} phase {phase} still changes by "
+        f"{change[worst]:.3g} pu; the load may be more than the feeder can carry"
+    )
+
+
+def _reached(Y: sp.csc_array, source: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Nodes connected to the source through the matrix, without the source's own."""
+    _, label = sp.csgraph.connected_components(sp.csr_array(abs(Y)), directed=False)
+    reached = np.isin(label, label[source])
+    reached[source] = False
+    return np.flatnonzero(reached).astype(np.int64)
+
+
+def _balance(
+    network: Network,
+    V: NDArray[np.complex128],
+    loads: LoadBranches,
+    injection: Injection | None,
+    shunt: NDArray[np.complex128] | None,
+    iterations: int,
+) -> PowerFlow:
+    S_loads = complex(loads.powers(V).sum() + V @ np.conj(network.Y_loads @ V))
+    S_losses = complex(V @ np.conj(network.Y_branches @ V))
+    S_capacitors = complex(V @ np.conj(network.Y_capacitors @ V))
+    fed = complex(V @ np.conj(injection(V))) if injection is not None else 0j
+    if shunt is not None:
+        fed -= complex(V @ np.conj(shunt * V))
+    return PowerFlow(
+        V=V,
+        S_source=S_loads + S_losses + S_capacitors - fed,
+        S_loads=S_loads,
+        S_losses=S_losses,
+        S_capacitors=S_capacitors,
+        iterations=iterations,
+    )

@@ -1,0 +1,139 @@
+"""Tables of what lies between two buses: lines and their configurations, switches, regulators, transformers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, cast
+
+from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
+from plant.tables.buses import BusTable
+from plant.tables.table import Row, Table, did_you_mean
+
+
+def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig]:
+    """Read line_configs.csv: the upper triangles of the matrices, one element per row."""
+    columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
+    elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
+    last_row: dict[str, Row] = {}
+    for row in Table(folder, "line_configs.csv", columns, mistakes, required=True):
+        name = row.text("config")
+        first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
+        diagonal = first == second
+        R = row.number("R_ohm_per_km", **({"above": 0.0} if diagonal else {}))
+        X = row.number("X_ohm_per_km", **({"above": 0.0} if diagonal else {}))
+        B = row.number("B_uS_per_km", **({"at_least": 0.0} if diagonal else {})) * 1e-6
+        matrix = elements.setdefault(name, {})
+        if (first, second) in matrix:
+            row.mistake(f'config "{name}" element {first}-{second}: given already; give each element once')
+        matrix[first, second] = matrix[second, first] = (complex(R, X), B)
+        last_row[name] = row
+    configs: dict[str, LineConfig] = {}
+    for name, matrix in elements.items():
+        phases = "".join(phase for phase in PHASES if any(phase in pair for pair in matrix))
+        missing = [f"{a}-{b}" for a in phases for b in phases if a <= b and (a, b) not in matrix]
+        if missing:
+            last_row[name].mistake(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
+        blank = (0j, 0.0)
+        configs[name] = LineConfig(
+            name=name,
+            phases=phases,
+            Z=tuple(tuple(matrix.get((a, b), blank)[0] for b in phases) for a in phases),
+            B=tuple(tuple(matrix.get((a, b), blank)[1] for b in phases) for a in phases),
+        )
+    return configs
+
+
+def read_lines(folder: Path, buses: BusTable, configs: dict[str, LineConfig], mistakes: list[str]) -> tuple[Line, ...]:
+    """Read lines.csv; lengths in m."""
+    columns = ("line", "from_bus", "to_bus", "phases", "config", "length_m")
+    lines: dict[str, Line] = {}
+    for row in Table(folder, "lines.csv", columns, mistakes, required=True):
+        name, config, phases = row.text("line"), row.text("config"), row.phases()
+        length = row.number("length_m", above=0.0)
+        ends = buses.find_ends(row, phases)
+        if config and config not in configs:
+            row.mistake(f'config "{config}": no such line configuration; {did_you_mean(config, configs)}')
+        elif config and not set(phases) <= set(configs[config].phases):
+            row.mistake(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
+        if name in lines:
+            row.mistake(f'line "{name}": there is one of this name already; names must differ')
+        elif ends:
+            buses.require_equal_voltage(row, ends, "line")
+            lines[name] = Line(
+                name=name,
+                from_bus=ends[0].name,
+                to_bus=ends[1].name,
+                phases=phases,
+                config=config,
+                length=length / 1000.0,
+            )
+    return tuple(lines.values())
+
+
+def read_switches(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Switch, ...]:
+    """Read switches.csv; a switch is named by its buses ("13-152"), column alias may give a second name."""
+    columns = ("from_bus", "to_bus", "phases", "state")
+    switches: list[Switch] = []
+    names: set[str] = set()
+    for row in Table(folder, "switches.csv", columns, mistakes):
+        phases = row.phases()
+        ends = buses.find_ends(row, phases)
+        closed = row.choice("state", "state of a switch", ("closed", "open")) == "closed"
+        if not ends:
+            continue
+        buses.require_equal_voltage(row, ends, "switch")
+        name, reverse = f"{ends[0].name}-{ends[1].name}", f"{ends[1].name}-{ends[0].name}"
+        alias = row.text("alias", default="")
+        for taken in [text for text in (name, alias) if text in names]:
+            row.mistake(f'switch "{taken}": there is one of this name already; names must differ')
+        names |= {name, reverse} | ({alias} if alias else set())
+        switches.append(
+            Switch(name=name, alias=alias, from_bus=ends[0].name, to_bus=ends[1].name, phases=phases, closed=closed)
+        )
+    return tuple(switches)
+
+
+def read_regulators(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Regulator, ...]:
+    """Read regulators.csv; one row for all phases that stand on the same tap."""
+    columns = ("regulator", "from_bus", "to_bus", "phases", "tap", "tap_step_pu")
+    regulators: list[Regulator] = []
+    seen: set[tuple[str, str]] = set()
+    for row in Table(folder, "regulators.csv", columns, mistakes):
+        name, phases = row.text("regulator"), row.phases()
+        ends = buses.find_ends(row, phases)
+        ratio = 1.0 + row.number("tap") * row.number("tap_step_pu", above=0.0)
+        if ratio <= 0.0:
+            row.mistake(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
+        for phase in [phase for phase in phases if (name, phase) in seen]:
+            row.mistake(f'regulator "{name}" phase {phase}: given already; give each phase once')
+        seen |= {(name, phase) for phase in phases}
+        if ends:
+            buses.require_equal_voltage(row, ends, "regulator")
+            regulators.append(
+                Regulator(name=name, from_bus=ends[0].name, to_bus=ends[1].name, phases=phases, ratio=ratio)
+            )
+    return tuple(regulators)
+
+
+def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Transformer, ...]:
+    """Read transformers.csv; impedances in percent of the rating."""
+    columns = ("transformer", "from_bus", "to_bus", "connection", "S_rated_kVA", "R_percent", "X_percent")
+    transformers: dict[str, Transformer] = {}
+    for row in Table(folder, "transformers.csv", columns, mistakes):
+        name = row.text("transformer")
+        ends = buses.find_ends(row, "ABC")
+        connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))
+        S_rated = row.number("S_rated_kVA", above=0.0) * 1000.0
+        z = complex(row.number("R_percent", at_least=0.0), row.number("X_percent", above=0.0)) / 100.0
+        if name in transformers:
+            row.mistake(f'transformer "{name}": there is one of this name already; names must differ')
+        elif ends:
+            transformers[name] = Transformer(
+                name=name,
+                from_bus=ends[0].name,
+                to_bus=ends[1].name,
+                connection=cast(Literal["D-D", "Yg-Yg"], connection),
+                S_rated=S_rated,
+                z=z,
+            )
+    return tuple(transformers.values())

@@ -1,0 +1,146 @@
+"""From a feeder's folder to a checked `Feeder`; everything that is wrong with it is told at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from plant.equipment import Feeder
+from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
+from plant.tables.buses import BusTable, report_unconnected
+from plant.tables.shunts import LOAD_COLUMNS, read_capacitors, read_inverters, read_loads, read_source
+from plant.tables.table import did_you_mean
+
+DATA = Path(__file__).parents[1] / "data"
+"""Folder of the feeders that come with the package."""
+
+FILES = (
+    "buses.csv",
+    "lines.csv",
+    "line_configs.csv",
+    "switches.csv",
+    "regulators.csv",
+    "transformers.csv",
+    "capacitors.csv",
+    "inverters.csv",
+    "source.csv",
+)
+"""Tables of a feeder, beside its load sets."""
+
+
+class FeederError(ValueError):
+    """A feeder that cannot be used, with everything that is wrong with it.
+
+    Attributes
+    ----------
+    mistakes : tuple of str
+        One sentence each: file, row (the header is row 1), value, what would be right.
+    """
+
+    def __init__(self, feeder: str, mistakes: tuple[str, ...]) -> None:
+        self.mistakes = mistakes
+        count = "a mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
+        super().__init__(f'feeder "{feeder}" has {count}:\n' + "\n".join(f"  {mistake}" for mistake in mistakes))
+
+
+def feeders() -> tuple[str, ...]:
+    """Names of the feeders that come with the package.
+
+    Examples
+    --------
+    >>> feeders()
+    ('microgrid123', 'standard123')
+    """
+    return tuple(sorted(path.name for path in DATA.iterdir() if path.is_dir() and path.name != "__pycache__"))
+
+
+def load_sets(folder: Path) -> tuple[str, ...]:
+    """Names of the load sets in a feeder's folder: "main" for loads_main.csv."""
+    return tuple(sorted(path.stem.removeprefix("loads_") for path in folder.glob("loads_*.csv")))
+
+
+def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
+    """Read all tables of a feeder and check them.
+
+    Parameters
+    ----------
+    feeder : str
+        Name of a feeder in `plant/data`, or the path of a folder of the same layout.
+    load_set : str, optional
+        Which loads: "main" reads loads_main.csv.
+
+    Returns
+    -------
+    Feeder
+        Frozen tables in SI units that fit together.
+
+    Raises
+    ------
+    FeederError
+        If anything is wrong; it lists all of it.
+
+    Examples
+    --------
+    >>> feeder = read_feeder("microgrid123", "main")
+    >>> len(feeder.buses), [inverter.name for inverter in feeder.inverters if inverter.kind == "GFM"]
+    (134, ['inv1', 'inv4', 'inv7'])
+    """
+    folder = _folder(feeder)
+    mistakes: list[str] = []
+    _report_strange_files(folder, mistakes)
+    buses = BusTable(folder, mistakes)
+    configs = read_line_configs(folder, mistakes)
+    lines = read_lines(folder, buses, configs, mistakes)
+    switches = read_switches(folder, buses, mistakes)
+    regulators = read_regulators(folder, buses, mistakes)
+    transformers = read_transformers(folder, buses, mistakes)
+    sets = load_sets(folder)
+    if load_set in sets:
+        loads = read_loads(folder, f"loads_{load_set}.csv", buses, mistakes)
+    else:
+        loads = ()
+        mistakes.append(
+            f'load set "{load_set}": no such set; there are {", ".join(sets)}'
+            if sets
+            else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {', '.join(LOAD_COLUMNS)}"
+        )
+    capacitors = read_capacitors(folder, buses, mistakes)
+    inverters = read_inverters(folder, buses, mistakes)
+    source = read_source(folder, buses, mistakes)
+    found = Feeder(
+        name=folder.name,
+        load_set=load_set,
+        buses=buses.rows,
+        lines=lines,
+        line_configs=tuple(configs.values()),
+        switches=switches,
+        loads=loads,
+        capacitors=capacitors,
+        regulators=regulators,
+        transformers=transformers,
+        inverters=inverters,
+        source=source,
+    )
+    if not mistakes:
+        # After other mistakes this would only repeat them: a misnamed end leaves the right bus unconnected.
+        report_unconnected(found, buses, mistakes)
+    if mistakes:
+        raise FeederError(feeder, tuple(mistakes))
+    return found
+
+
+def _folder(feeder: str) -> Path:
+    if feeder in feeders():
+        return DATA / feeder
+    folder = Path(feeder)
+    if folder.is_dir():
+        return folder
+    raise FeederError(
+        feeder,
+        (f'feeder "{feeder}": no such feeder and no such folder; there are {", ".join(feeders())}',),
+    )
+
+
+def _report_strange_files(folder: Path, mistakes: list[str]) -> None:
+    for path in sorted(folder.glob("*.csv")):
+        if path.name not in FILES and not path.name.startswith("loads_"):
+            mistakes.append(f"{path.name}: not a table of a feeder; {did_you_mean(path.name, FILES)}")
