@@ -1,0 +1,151 @@
+"""What the keys of a scenario ask of each other and of the feeder."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+
+from plant.equipment import Feeder
+from scenarios.spec.mistakes import Mistakes, suggestion
+from scenarios.spec.model import Case, Scenario
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+"""Names become folders and parts of keys."""
+
+
+def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
+    """Every time of the scenario falls on the grid it belongs to."""
+    time = scenario.time
+    _multiple("time.T_c_s", time.T_c_s, "time.h_s", time.h_s, "h_s must divide T_c_s", mistakes)
+    _multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "it must be a multiple of h_s", mistakes)
+    _multiple("time.T_c_s", time.T_c_s, "time.record_s", time.record_s, "record_s must divide T_c_s", mistakes)
+    _multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "it must be a multiple of T_c_s", mistakes)
+    for i, event in enumerate(scenario.events):
+        path = f"event[{i}].t_s"
+        _multiple(path, event.t_s, "time.h_s", time.h_s, "an event must fall on a multiple of h_s", mistakes)
+        if not mistakes.touch(path, "time.end_s") and event.t_s >= time.end_s:
+            mistakes.add(
+                path,
+                f'event "{event.label}" at {event.t_s:g} s does not come before the end at {time.end_s:g} s; '
+                "move it, or raise end_s",
+            )
+    for i, (first, second) in enumerate(pairwise(scenario.events)):
+        if not mistakes.touch(f"event[{i}].t_s", f"event[{i + 1}].t_s") and second.t_s <= first.t_s:
+            mistakes.add(
+                f"event[{i + 1}].t_s",
+                f'event "{second.label}" at {second.t_s:g} s is written after "{first.label}" at {first.t_s:g} s; '
+                "write events in the order of time, and what happens at once as one event",
+            )
+
+
+def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
+    """Names can become folders, labels are unique, limits are in order."""
+    for path, name in [
+        ("name", scenario.name),
+        *((f"case.{case}", case) for case in scenario.cases),
+        *((f"event[{i}].label", event.label) for i, event in enumerate(scenario.events)),
+    ]:
+        if not mistakes.touch(path) and not _NAME.fullmatch(name):
+            mistakes.add(path, f'name "{name}" must be of letters, digits, "_", "-" and ".", as it names files')
+    labels = [event.label for event in scenario.events]
+    for i, label in enumerate(labels):
+        if label in labels[:i]:
+            mistakes.add(
+                f"event[{i}].label", f'there is an event "{label}" already; labels name windows of measurement'
+            )
+        elif label == "history_sha256":
+            mistakes.add(f"event[{i}].label", "this name is taken by a key of metrics.json; choose another")
+    if not scenario.cases and not mistakes.touch("case"):
+        mistakes.add("case", "there is no case; write at least one table [case.NAME]")
+    own = {f"case.{name}.gains": case.gains for name, case in scenario.cases.items() if case.gains != scenario.gains}
+    for path, limits in ({"gains": scenario.gains} | own).items():
+        _ordered(path, "P_set_min_pu", limits.P_set_min, "P_set_max_pu", limits.P_set_max, mistakes)
+        _ordered(path, "V_set_min_pu", limits.V_set_min, "V_set_max_pu", limits.V_set_max, mistakes)
+    gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
+    _ordered("plant.gfm", "P_min_pu", gfm.P_min, "P_max_pu", gfm.P_max, mistakes)
+    _ordered("plant.gfm", "Q_min_pu", gfm.Q_min, "Q_max_pu", gfm.Q_max, mistakes)
+    _ordered("plant.gfm", "E_min_pu", gfm.E_min, "E_max_pu", gfm.E_max, mistakes)
+    _ordered("plant.gfl", "P_min_pu", gfl.P_min, "P_max_pu", gfl.P_max, mistakes)
+
+
+def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistakes) -> None:
+    """Listed links join two known inverters, and are listed where the graph is "links"."""
+    for name, case in scenario.cases.items():
+        path = f"case.{name}.links"
+        if mistakes.touch(path, f"case.{name}.graph"):
+            continue
+        if case.graph == "links" and not case.links:
+            mistakes.add(f"case.{name}.graph", 'graph "links" needs the key links, e.g. links = [["inv1", "inv4"]]')
+        if case.graph != "links" and case.links:
+            mistakes.add(path, f'links are listed, but the graph is "{case.graph}"; write graph = "links"')
+        if inverters:
+            _check_links(path, case, inverters, mistakes)
+
+
+def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
+    """Switches exist and are in the other position when an event operates them."""
+    position = {switch.name: switch.closed for switch in feeder.switches}
+    canonical = {name: switch.name for switch in feeder.switches for name in (switch.name, switch.alias) if name}
+    canonical |= {f"{switch.to_bus}-{switch.from_bus}": switch.name for switch in feeder.switches}
+    buses = {bus.name for bus in feeder.buses}
+    for i, event in enumerate(scenario.events):
+        if not event.open and not event.close and not mistakes.touch(f"event[{i}].open", f"event[{i}].close"):
+            mistakes.add(
+                f"event[{i}]", f'event "{event.label}" operates nothing; give it open = [...] or close = [...]'
+            )
+        named: set[str] = set()
+        for action, closed, names in (("open", False, event.open), ("close", True, event.close)):
+            for name in names:
+                path = f"event[{i}].{action}"
+                if name not in canonical:
+                    mistakes.add(path, _unknown_switch(name, [s.alias or s.name for s in feeder.switches], buses))
+                    continue
+                switch = canonical[name]
+                if switch in named:
+                    mistakes.add(path, f'switch "{name}" is named twice in event "{event.label}"; name it once')
+                elif position[switch] == closed:
+                    mistakes.add(
+                        path,
+                        f'switch "{name}" is {"closed" if closed else "open"} already at {event.t_s:g} s; '
+                        f"leave it out, or {'open' if closed else 'close'} it before",
+                    )
+                named.add(switch)
+                position[switch] = closed
+
+
+def _multiple(path: str, value: float, of: str, step: float, rule: str, mistakes: Mistakes) -> None:
+    """Note a value that is no whole multiple of a step; the tolerance is that of decimal fractions in binary."""
+    if mistakes.touch(path, of) or value <= 0 or step <= 0:
+        return
+    ratio = value / step
+    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6:
+        return
+    near = f"{max(round(ratio), 1) * step:.9g}"
+    key = of.rpartition(".")[2]
+    mistakes.add(path, f"{value:g} s is not a multiple of {key} = {step:g} s: {rule}; the nearest is {near}")
+
+
+def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mistakes: Mistakes) -> None:
+    if not mistakes.touch(f"{path}.{low_key}", f"{path}.{high_key}") and low >= high:
+        mistakes.add(f"{path}.{low_key}", f"{low:g} must be below {high_key} = {high:g}; swap them or set both")
+
+
+def _check_links(path: str, case: Case, inverters: tuple[str, ...], mistakes: Mistakes) -> None:
+    seen: set[frozenset[str]] = set()
+    for i, pair in enumerate(case.links):
+        for name in pair:
+            if name not in inverters:
+                mistakes.add(f"{path}[{i}]", f'no inverter "{name}"; {suggestion(name, inverters, "inverters")}')
+        if pair[0] == pair[1]:
+            mistakes.add(f"{path}[{i}]", f'a link joins two inverters, got "{pair[0]}" twice')
+        elif frozenset(pair) in seen:
+            mistakes.add(f"{path}[{i}]", f"{pair[0]} - {pair[1]} is listed already; links have no direction")
+        seen.add(frozenset(pair))
+
+
+def _unknown_switch(name: str, known: list[str], buses: set[str]) -> str:
+    """Say whether it is the switch or a bus that does not exist."""
+    ends = name.split("-")
+    strange = [end for end in ends if end[:1].isdigit() and end not in buses]
+    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
+    return f'no switch "{name}"{why}; {suggestion(name, known, "switches")}'

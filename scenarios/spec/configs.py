@@ -1,0 +1,93 @@
+"""What the plant and the agents of one case are started with."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from agents.config import AgentConfig, Control
+from plant.config import PlantConfig, PlantSettings, SwitchEvent
+from plant.equipment import Feeder
+from scenarios.spec.model import Event, Scenario
+
+F_NOM = 60.0
+"""Nominal frequency (Hz) of every feeder that gridpeers knows."""
+
+
+def configs(
+    scenario: Scenario, feeder: Feeder, case: str, endpoint: str = ""
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Configurations of the plant and of every inverter's agent for one case.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A checked scenario.
+    feeder : Feeder
+        Its feeder; it gives the agents their nameplates.
+    case : str
+        Name of the case.
+    endpoint : str, optional
+        Where the plant listens and agents connect, e.g. "tcp/127.0.0.1:7447"; the in-process driver needs none.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> plant, agents = configs(*load_scenario("islanding"), "IV")
+    >>> plant.end, agents[0].name, agents[0].control.graph
+    (7.0, 'inv1', 'full')
+    """
+    run = f"{scenario.name}-{case}"
+    endpoints = (endpoint,) if endpoint else ()
+    time, rule = scenario.time, scenario.cases[case]
+    control = Control(secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains)
+    plant = PlantConfig(
+        run=run,
+        settings=PlantSettings(
+            feeder=scenario.plant.feeder,
+            load_set=scenario.plant.load_set,
+            h=time.h_s,
+            P_set0=scenario.plant.P_set0_pu,
+            V_set0=scenario.plant.V_set0_pu,
+            gfm=scenario.plant.gfm,
+            gfl=scenario.plant.gfl,
+            events=_switch_events(scenario),
+        ),
+        agents=tuple(row.name for row in feeder.inverters),
+        T_c=time.T_c_s,
+        end=time.end_s,
+        record_step=time.record_s,
+        deadline=scenario.processes.deadline_s,
+        listen=endpoints,
+    )
+    agents = tuple(
+        AgentConfig(
+            run=run,
+            name=row.name,
+            kind=row.kind,
+            microgrid=row.microgrid,
+            P_rated=row.P_rated,
+            V_nom=row.V_nom,
+            f_nom=F_NOM,
+            m_p=row.m_p,
+            m_q=row.m_q,
+            T_c=time.T_c_s,
+            control=control,
+            deadline=scenario.processes.deadline_s,
+            connect=endpoints,
+        )
+        for row in feeder.inverters
+    )
+    return plant, agents
+
+
+def _switch_events(scenario: Scenario) -> tuple[SwitchEvent, ...]:
+    return tuple(
+        SwitchEvent(t=event.t_s, switch=switch, action=action)
+        for event in scenario.events
+        for action, switches in _actions(event)
+        for switch in switches
+    )
+
+
+def _actions(event: Event) -> tuple[tuple[Literal["open", "close"], tuple[str, ...]], ...]:
+    return ("open", event.open), ("close", event.close)

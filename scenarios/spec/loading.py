@@ -1,0 +1,151 @@
+"""From a name or a path to a scenario that can be run, or to all that is wrong with it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import msgspec
+
+from plant.equipment import Feeder
+from plant.tables import FeederError, feeders, read_feeder
+from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
+from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
+from scenarios.spec.model import Scenario
+from scenarios.spec.reading import read_tables
+
+CATALOGUE = Path(__file__).parents[1] / "catalogue"
+"""Folder of the scenarios that come with gridpeers."""
+
+
+def catalogue() -> tuple[str, ...]:
+    """Names of the scenarios that come with gridpeers."""
+    return tuple(sorted(path.stem for path in CATALOGUE.glob("*.toml")))
+
+
+def find_scenario(name: str) -> Path:
+    """Path of a scenario named as in the catalogue or given as a path.
+
+    Raises
+    ------
+    ScenarioError
+        If there is neither.
+    """
+    if name in catalogue():
+        return CATALOGUE / f"{name}.toml"
+    path = Path(name)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise ScenarioError([f"{name}: this is a folder; give a scenario file (.toml) or a name: {_names()}"])
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise ScenarioError([f"{name}: there is no such file; give the path of a scenario file, or a name: {_names()}"])
+    raise ScenarioError([f'no scenario "{name}"; {suggestion(name, catalogue(), "scenarios of the catalogue")}'])
+
+
+def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
+    """Read and check a scenario and its feeder before anything is started.
+
+    Parameters
+    ----------
+    name : str or Path
+        A scenario of the catalogue, or the path of a file.
+
+    Raises
+    ------
+    ScenarioError
+        With every mistake of the file and of its feeder.
+
+    Examples
+    --------
+    >>> scenario, feeder = load_scenario("islanding")
+    >>> list(scenario.cases), len(feeder.inverters)
+    (['I', 'II', 'III', 'IV'], 9)
+    """
+    path = find_scenario(str(name))
+    text = _text_of(path)
+    mistakes = Mistakes(path.name, text)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError([_malformed(path.name, text, str(error))]) from None
+    scenario = read_tables(data, mistakes)
+    if not scenario.name:
+        scenario = msgspec.structs.replace(scenario, name=path.stem)
+    check_times(scenario, mistakes)
+    check_names(scenario, mistakes)
+    scenario = _with_feeder_path(scenario, path.parent)
+    feeder = _feeder_of(scenario, mistakes)
+    check_cases(scenario, tuple(row.name for row in feeder.inverters) if feeder else (), mistakes)
+    if feeder:
+        check_switches(scenario, feeder, mistakes)
+    mistakes.raise_if_any()
+    assert feeder is not None
+    return scenario, feeder
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ScenarioError([f"{path.name}: byte {error.start} is not UTF-8; save the file as UTF-8 text"]) from None
+    except OSError as error:
+        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
+
+
+def _malformed(file: str, text: str, reason: str) -> str:
+    """Mistake of a text that is no TOML, with its line, which `tomllib` tells in a parenthesis."""
+    match = re.search(r"\(at line (\d+), column (\d+)\)", reason)
+    last = max(len(text.rstrip().splitlines()), 1)
+    line = int(match[1]) if match else last
+    lines = text.splitlines()
+    quoted = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+    return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {quoted}"
+
+
+def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
+    """Resolve a feeder's path that is relative to the file: processes may start elsewhere."""
+    feeder = scenario.plant.feeder
+    if feeder not in feeders() and (folder / feeder).is_dir():
+        plant = msgspec.structs.replace(scenario.plant, feeder=str((folder / feeder).resolve()))
+        return msgspec.structs.replace(scenario, plant=plant)
+    return scenario
+
+
+def _feeder_of(scenario: Scenario, mistakes: Mistakes) -> Feeder | None:
+    """The feeder's tables, or None after noting what is wrong with them."""
+    if mistakes.touch("plant.feeder"):
+        return None
+    name, load_set = scenario.plant.feeder, scenario.plant.load_set
+    try:
+        feeder = read_feeder(name, load_set)
+    except FeederError as error:
+        keys = [_note(mistake, Path(name).name, mistakes) for mistake in error.mistakes]
+        return _any_load_set(name) if keys == ["plant.load_set"] else None
+    if not feeder.inverters:
+        mistakes.add("plant.feeder", f'feeder "{feeder.name}" has no inverters, so there is nothing to control')
+        return None
+    return feeder
+
+
+def _note(mistake: str, feeder: str, mistakes: Mistakes) -> str:
+    """Note a mistake of a feeder; return the scenario's key that caused it, or "" when the feeder itself did."""
+    key = {"load set": "plant.load_set", "feeder": "plant.feeder"}.get(mistake.partition(' "')[0], "")
+    if key:
+        mistakes.add(key, mistake)
+    else:
+        mistakes.add_plain(f'feeder "{feeder}": {mistake}')
+    return key
+
+
+def _any_load_set(feeder: str) -> Feeder | None:
+    """The feeder with another load set than the one that does not exist, to check the rest of the scenario on."""
+    try:
+        return read_feeder(feeder)
+    except FeederError:
+        return None
+
+
+def _names() -> str:
+    return ", ".join(catalogue())

@@ -1,0 +1,119 @@
+"""The mistakes of a scenario file: all of them at once, each with its line."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
+_TABLE = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
+_ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
+_KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."' ]+?)\s*=""")
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be run, with everything that is wrong with it.
+
+    Attributes
+    ----------
+    mistakes : tuple[str, ...]
+        One sentence each, with file, line, key, value and what would be right.
+    """
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = tuple(mistakes)
+        super().__init__("\n".join(self.mistakes))
+
+
+class Mistakes:
+    """Collects what is wrong with one file while it is read.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file as the user gave it.
+    text : str
+        Its text, to find the lines of the keys.
+    """
+
+    def __init__(self, file: str, text: str = "") -> None:
+        self.file = file
+        self._lines = lines_of_keys(text)
+        self._found: list[tuple[int, str]] = []
+        self._paths: set[str] = set()
+
+    def add(self, path: str, text: str) -> None:
+        """Note a mistake at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
+        self._paths.add(path)
+        line = self._line_of(path)
+        where = f"{self.file}:{line}" if line else self.file
+        self._found.append((line, f"{where}: {path}: {text}" if path else f"{where}: {text}"))
+
+    def add_plain(self, text: str) -> None:
+        """Note a mistake that says itself where it is, as a feeder's do."""
+        self._found.append((0, text))
+
+    def touch(self, *paths: str) -> bool:
+        """Whether a mistake was noted at one of these keys, which makes a check that relates them idle."""
+        return any(path in self._paths for path in paths)
+
+    def raise_if_any(self) -> None:
+        """Raise `ScenarioError` with all mistakes in the order of their lines."""
+        if self._found:
+            raise ScenarioError(text for _, text in sorted(self._found, key=lambda item: item[0]))
+
+    def _line_of(self, path: str) -> int:
+        """Line of a key, or of the nearest table around it; 0 when neither is written in the file."""
+        while path:
+            if path in self._lines:
+                return self._lines[path]
+            path = re.sub(r"(\.[^.\[]+|\[\d+\]|^[^.\[]+)$", "", path)
+        return 0
+
+
+def lines_of_keys(text: str) -> dict[str, int]:
+    r"""Line number of each key and table of a TOML text, by path; `event[1].t_s` is in the second `[[event]]`.
+
+    It reads the usual layout, one key a line. A key inside an inline table gets no line of its own, which costs the
+    reader of a mistake a moment and nothing else: `tomllib` alone decides what the text means.
+
+    Examples
+    --------
+    >>> lines_of_keys("seed = 1\n[time]\nT_c_s = 0.02\n[[event]]\nt_s = 1\n[[event]]\nt_s = 4")
+    {'seed': 1, 'time': 2, 'time.T_c_s': 3, 'event[0]': 4, 'event[0].t_s': 5, 'event[1]': 6, 'event[1].t_s': 7}
+    """
+    found: dict[str, int] = {}
+    entries: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _ENTRY.match(line):
+            name = _plain(match[1])
+            entries[name] = entries.get(name, -1) + 1
+            table = f"{name}[{entries[name]}]"
+            found.setdefault(table, number)
+        elif match := _TABLE.match(line):
+            table = _plain(match[1])
+            found.setdefault(table, number)
+        elif match := _KEY.match(line):
+            key = _plain(match[1])
+            found.setdefault(f"{table}.{key}" if table else key, number)
+    return found
+
+
+def suggestion(wrong: str, known: Iterable[str], what: str) -> str:
+    """Sentence that names what was probably meant and what there is.
+
+    Examples
+    --------
+    >>> suggestion("Inv1", ["inv1", "inv2"], "inverters")
+    'did you mean "inv1"? The inverters are inv1, inv2'
+    """
+    names = list(known)
+    by_lower = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(wrong.lower(), by_lower, n=1)
+    listed = f"he {what} are {', '.join(names)}" if names else f"here are no {what}"
+    return f'did you mean "{by_lower[near[0]]}"? T{listed}' if near else f"t{listed}"
+
+
+def _plain(name: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in name.split("."))

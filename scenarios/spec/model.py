@@ -1,0 +1,130 @@
+"""A scenario file as types: what may be written, in which unit, and what holds when nothing is written.
+
+A key that is a time, a voltage, a power or a frequency ends in its unit (`_s`, `_pu`, `_Hz`); `gridpeers doc scenario`
+prints this file's sentences.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from agents.config import Gains, GraphRule
+from plant.config import GflParameters, GfmParameters
+
+
+class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[time]`: how long, and in which steps."""
+
+    end_s: float
+    """Duration of the run (s), a multiple of T_c_s."""
+    T_c_s: float = 0.02
+    """Control period (s): each agent decides once in it."""
+    h_s: float = 0.002
+    """Integration step of the plant (s); divides T_c_s."""
+    record_s: float = 0.01
+    """Distance of the rows in history.csv (s): a multiple of h_s that divides T_c_s."""
+
+
+class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[plant]`: the feeder, its loads, and where the inverters start."""
+
+    feeder: str = "microgrid123"
+    """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
+    load_set: str = "main"
+    """Which load table of the feeder: "main" or "event2"."""
+    P_set0_pu: float = 0.647
+    """First P_set of every inverter (pu of its rating)."""
+    V_set0_pu: float = 1.0
+    """First V_set of every inverter (pu of its nominal voltage)."""
+    gfm: GfmParameters = GfmParameters()
+    """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
+    gfl: GflParameters = GflParameters()
+    """Table `[plant.gfl]`: parameters of the grid-following inverters."""
+
+
+class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An entry of `[[event]]`: switches operated at once. It opens a measuring window that lasts to the next one."""
+
+    label: str
+    """Name of the window in metrics.json, e.g. "event1"."""
+    t_s: float
+    """When (s), a multiple of h_s, after 0 and before end_s."""
+    open: tuple[str, ...] = ()
+    """Switches to open, e.g. ["13-152"]."""
+    close: tuple[str, ...] = ()
+    """Switches to close."""
+
+
+class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table `[case.NAME]`: one run of the experiment, under one rule of control."""
+
+    title: str = ""
+    """A few words for tables and plots."""
+    secondary: Literal["none", "GFM", "all"]
+    """Which inverters run the secondary law (12)-(15); the others keep their first set-points."""
+    graph: GraphRule
+    """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", or "links" as listed."""
+    links: tuple[tuple[str, str], ...] = ()
+    """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
+    gains: Gains = Gains()
+    """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
+
+
+class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[processes]`: how the processes of the run find and await each other. It decides no number."""
+
+    deadline_s: float = 20.0
+    """Longest wait for any message (s of real time); then the run ends and names who was missing."""
+    port: int = 0
+    """TCP port of the plant on the loopback, the rendezvous of the run; 0 takes a free one."""
+
+
+class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The keys outside any table come first in the file."""
+
+    name: str = ""
+    """Name of the run folder; without it, that of the file."""
+    title: str = ""
+    """One line for `gridpeers list`."""
+    paper: Literal["", "islanding"] = ""
+    """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
+    seed: int = 1
+    """Seed of everything drawn at random. Links without faults draw nothing, so here it is only recorded."""
+    time: Time
+    """Table `[time]`."""
+    plant: PlantTable = PlantTable()
+    """Table `[plant]`."""
+    gains: Gains = Gains()
+    """Table `[gains]`: of the secondary law, for every case."""
+    processes: Processes = Processes()
+    """Table `[processes]`."""
+    events: tuple[Event, ...] = msgspec.field(default=(), name="event")
+    """Entries `[[event]]`, in the order of time."""
+    cases: dict[str, Case] = msgspec.field(name="case")
+    """Tables `[case.NAME]`, at least one."""
+
+
+UNIT_OF_KEY: dict[type, dict[str, str]] = {
+    Gains: dict.fromkeys(("P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
+    GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
+    | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu"),
+    GflParameters: dict.fromkeys(("T_if", "T_ff", "T_pf", "T_vf", "T_qf"), "s")
+    | dict.fromkeys(("R_f", "X_f", "db_UV", "db_OV", "P_max", "P_min", "S_max", "i_max"), "pu")
+    | dict.fromkeys(("db_UF", "db_OF"), "Hz"),
+}
+"""Unit that a key of the file carries where the field, named as in the models' equations, does not."""
+
+
+def key_of(cls: type, field: msgspec.structs.FieldInfo) -> str:
+    """Key in the file for a field.
+
+    Examples
+    --------
+    >>> by_name = {field.name: field for field in msgspec.structs.fields(GfmParameters)}
+    >>> key_of(GfmParameters, by_name["T_p"]), key_of(GfmParameters, by_name["k_iv"])
+    ('T_p_s', 'k_iv')
+    """
+    unit = UNIT_OF_KEY.get(cls, {}).get(field.name)
+    return f"{field.encode_name}_{unit}" if unit else field.encode_name

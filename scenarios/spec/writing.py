@@ -1,0 +1,67 @@
+"""A scenario as TOML with every key spelled out: what a run leaves in its folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import msgspec
+
+from agents.config import Gains
+from scenarios.spec.model import Case, Scenario, key_of
+from scenarios.spec.reading import AS_RUN
+
+
+def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
+    """Every key of a scenario, defaults included, and a table about the run.
+
+    Defaults are written out because they may differ in a later version; the text can be run again as it is, and the
+    table `[as_run]` is read over then.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As run, so with the seed and the cases of the command line.
+    as_run : Mapping[str, Any]
+        Driver, versions and the like.
+    """
+    lines = [
+        "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
+        *_table(scenario, "", scenario.gains),
+        "",
+        f"[{AS_RUN}]",
+        *(f"{key} = {_value(value)}" for key, value in as_run.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _table(struct: msgspec.Struct, path: str, gains: Gains) -> Iterator[str]:
+    """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats the common gains."""
+    below: list[str] = []
+    for field in msgspec.structs.fields(struct):
+        value, key = getattr(struct, field.name), key_of(type(struct), field)
+        where = f"{path}.{_key(key)}" if path else _key(key)
+        if isinstance(struct, Case) and value == gains:
+            continue
+        if isinstance(value, msgspec.Struct):
+            below += ["", f"[{where}]", *_table(value, where, gains)]
+        elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
+            for item in value:
+                below += ["", f"[[{where}]]", *_table(item, where, gains)]
+        elif isinstance(value, dict):
+            for name, item in value.items():
+                below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", gains)]
+        elif value or not isinstance(value, tuple | dict):
+            yield f"{key} = {_value(value)}"
+    yield from below
+
+
+def _key(name: str) -> str:
+    bare = name.replace("_", "").replace("-", "")
+    return name if bare.isascii() and bare.isalnum() else _value(name)
+
+
+def _value(value: Any) -> str:
+    """Write one value; JSON's strings, numbers, lists and booleans are TOML's too."""
+    return json.dumps(value, ensure_ascii=False)
