@@ -150,5 +150,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Endpoints the plant listens on; the rendezvous of the run."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
+    recorders: tuple[str, ...] = ()
+    """Recorders of the telemetry that the plant waits for before tick 0."""
     incarnation: int = 1
     """Which life of this plant."""

@@ -7,24 +7,33 @@ the tick loop `seq` is the tick k and `t` is k T_c.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 PLANT = "plant"
 """Name under which the plant process sends."""
 
+Name = Annotated[str, msgspec.Meta(max_length=64)]
+"""A name on the wire: never longer than 64 characters."""
+
+Number = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
+"""A finite number: NaN and the infinities fail these bounds, and the message with them."""
+
+Count = Annotated[int, msgspec.Meta(ge=0)]
+"""A tick, a sequence number, an incarnation: never negative."""
+
 
 class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What every message has."""
 
-    sender: str
+    sender: Name
     """Name of the inverter whose agent sent it, or `PLANT`."""
-    incarnation: int
+    incarnation: Count
     """Which life of the sender: greater after every restart."""
-    seq: int
+    seq: Count
     """Tick number k in the tick loop, roster number while a roster is prepared."""
-    t: float
+    t: Number
     """Run time (s)."""
 
 
@@ -33,61 +42,63 @@ class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
     kind: Literal["GFM", "GFL"]
     """Grid-forming (a leader of the consensus) or grid-following (a follower)."""
-    microgrid: str
+    microgrid: Name
     """Name of the microgrid the inverter stands in."""
-    P_rated: float
+    P_rated: Number
     """Rated real power s_i (W), base of every per-unit power of this inverter."""
-    V_nom: float
+    V_nom: Number
     """Nominal terminal voltage (V, line-to-neutral RMS)."""
-    f_nom: float
+    f_nom: Number
     """Nominal frequency (Hz)."""
-    m_p: float
+    m_p: Number
     """P-f droop (pu frequency per pu power; 0.01 = 1 %)."""
-    m_q: float
+    m_q: Number
     """Q-V droop (pu voltage per pu reactive power; 0.05 = 5 %)."""
 
 
 class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What an inverter's sensors read at tick k, and the grant to compute tick k (plant -> agent)."""
 
-    to: str
+    to: Name
     """Inverter this measurement belongs to."""
-    P: float
+    P: Number
     """Real power out of the inverter (W, three phases)."""
-    Q: float
+    Q: Number
     """Reactive power out of the inverter (var, three phases)."""
-    V: float
+    V: Number
     """Terminal voltage (V, mean of the line-to-neutral RMS values)."""
-    f: float
+    f: Number
     """Frequency (Hz): of the internal voltage of a GFM, of the PLL of a GFL."""
-    P_set: float
+    P_set: Number
     """Real-power set-point the plant holds now (W)."""
-    V_set: float
+    V_set: Number
     """Voltage set-point the plant holds now (V)."""
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
-    island: str
+    island: Name
     """Name of the island: "grid", or the first inverter in it."""
-    roster: tuple[str, ...]
+    roster: tuple[Name, ...]
     """Agents of this tick, in the order of the inverters. Empty in wall-clock time."""
 
 
 class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What an agent decided at tick k: its set-points, heard by its neighbours and by the plant."""
 
-    P_set: float
+    P_set: Number
     """Real-power set-point (W)."""
-    V_set: float
+    V_set: Number
     """Voltage set-point (V)."""
-    Q: float
+    Q: Number
     """Reactive power measured at tick k (var)."""
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """The plant asks every agent of a roster to be ready to hear its neighbours (plant -> agents)."""
 
-    roster: tuple[str, ...]
-    """Agents that will take part from the next tick on."""
+    roster: tuple[Name, ...]
+    """Agents that will take part from the next tick on, in the order of the inverters."""
+    instances: tuple[Name, ...]
+    """Of each agent on the roster the instance that is meant: two processes may claim one name."""
 
 
 class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -95,10 +106,10 @@ class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
 
 
 class Stop(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """The run is over; agents close (plant -> agents)."""
+    """The run is over and agents close; or, sent to one agent, it cannot take part (plant -> agents)."""
 
     reason: str
-    """Why, for the log: "end of scenario", or what went wrong."""
+    """Why, for the log: "end of the scenario", or what went wrong."""
 
 
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -136,3 +147,6 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
 AnyMessage = Nameplate | Measurement | State | Prepare | Ready | Stop | Telemetry
 """Everything that can arrive."""
+
+MESSAGES = (Nameplate, Measurement, State, Prepare, Ready, Stop, Telemetry)
+"""The types of `AnyMessage`, for documentation that is made from the code."""

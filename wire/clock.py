@@ -1,0 +1,32 @@
+"""Ticks and the run's time: tick k is at t_k = k T_c."""
+
+from __future__ import annotations
+
+
+def time_of(tick: int, T_c: float) -> float:
+    """Run time (s) of a tick.
+
+    A product and never a running sum, so that every process finds the same bits for the same tick.
+
+    Examples
+    --------
+    >>> time_of(3, 0.02)
+    0.06
+    """
+    return tick * T_c
+
+
+def ticks_until(end: float, T_c: float) -> int:
+    """Number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c.
+
+    Examples
+    --------
+    >>> ticks_until(7.0, 0.02)
+    350
+    """
+    if T_c <= 0.0:
+        raise ValueError(f"T_c: the control period must be positive, got {T_c:g} s")
+    ticks = round(end / T_c)
+    if ticks < 1 or abs(ticks * T_c - end) > 1e-9 * max(1.0, end):
+        raise ValueError(f"end: must be a positive multiple of the control period {T_c:g} s, got {end:g} s")
+    return ticks

@@ -1,0 +1,159 @@
+"""Every key expression of gridpeers, and who uses it.
+
+All keys of a run are below ``gridpeers/<run>/``. An *instance* is one process that claims a name: the id of its Zenoh
+session. It stands in the keys by which agents find each other, so that two processes of one name can be told apart.
+"""
+
+from __future__ import annotations
+
+import re
+
+import msgspec
+
+_CHUNK = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
+
+
+class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
+    """One kind of key, for the protocol's documentation."""
+
+    expression: str
+    """The key, with its parts in angle brackets."""
+    kind: str
+    """publication, queryable or token (of liveliness)."""
+    message: str
+    """Type of the message, or "-" for a token."""
+    sender: str
+    """Who publishes, answers or holds it."""
+    listener: str
+    """Who subscribes, asks or watches."""
+    when: str
+    """When it is sent or held."""
+
+
+def check_name(what: str, name: str) -> None:
+    """Raise ValueError if a name cannot be a part of a key.
+
+    Examples
+    --------
+    >>> check_name("run", "a/b")
+    Traceback (most recent call last):
+        ...
+    ValueError: run: "a/b" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."
+    """
+    if not _CHUNK.fullmatch(name):
+        raise ValueError(
+            f'{what}: "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."'
+        )
+
+
+class Keys:
+    """The keys of one run.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+
+    Examples
+    --------
+    >>> Keys("demo").state("inv3")
+    'gridpeers/demo/state/inv3'
+    """
+
+    def __init__(self, run: str) -> None:
+        check_name("run", run)
+        self._root = f"gridpeers/{run}"
+        self.control = f"{self._root}/control"
+        self.telemetry = f"{self._root}/telemetry"
+        self.alive_plant = f"{self._root}/alive/plant"
+        self.any_alive = f"{self._root}/alive/**"
+        self.any_state = f"{self._root}/state/*"
+        self.any_ready = f"{self._root}/ready/*"
+
+    def measurement(self, inverter: str) -> str:
+        """Sensor readings of an inverter, and the grant of a tick."""
+        return f"{self._root}/measurement/{inverter}"
+
+    def state(self, inverter: str) -> str:
+        """What the agent of an inverter decided."""
+        return f"{self._root}/state/{inverter}"
+
+    def ready(self, inverter: str) -> str:
+        """An agent hears its neighbours on a roster."""
+        return f"{self._root}/ready/{inverter}"
+
+    def dismissal(self, inverter: str, instance: str) -> str:
+        """Word to one instance that it cannot take part."""
+        return f"{self._root}/dismissal/{inverter}/{instance}"
+
+    def nameplate(self, inverter: str, instance: str) -> str:
+        """Who one instance is; answered on request."""
+        return f"{self._root}/nameplate/{inverter}/{instance}"
+
+    def alive_agent(self, inverter: str, instance: str) -> str:
+        """Token of an agent."""
+        return f"{self._root}/alive/agent/{inverter}/{instance}"
+
+    def alive_recorder(self, recorder: str) -> str:
+        """Token of a recorder."""
+        return f"{self._root}/alive/recorder/{recorder}"
+
+    def parts(self, key: str) -> tuple[str, ...]:
+        """Split a key of this run into what stands behind ``gridpeers/<run>/``; empty for any other key.
+
+        Examples
+        --------
+        >>> Keys("demo").parts("gridpeers/demo/alive/agent/inv3/a1")
+        ('alive', 'agent', 'inv3', 'a1')
+        """
+        root = self._root + "/"
+        return tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
+
+
+def describe() -> tuple[KeySpec, ...]:
+    """Every kind of key with its message, its two ends and its time; `gridpeers doc keys` prints it."""
+    keys = Keys("RUN")
+
+    def row(key: str, kind: str, message: str, sender: str, listener: str, when: str) -> KeySpec:
+        expression = key.replace("RUN", "<run>").replace("INV", "<inverter>").replace("INSTANCE", "<instance>")
+        expression = expression.replace("NAME", "<recorder>")
+        return KeySpec(expression=expression, kind=kind, message=message, sender=sender, listener=listener, when=when)
+
+    agent, instance = "INV", "INSTANCE"
+    return (
+        row(
+            keys.alive_plant, "token", "-", "plant", "agents, recorders",
+            "as long as the plant's session lives; declared after its subscribers",
+        ),
+        row(
+            keys.alive_agent(agent, instance), "token", "-", "agent", "plant, other agents",
+            "as long as the agent's session lives; declared after its subscribers and its queryable",
+        ),
+        row(
+            keys.alive_recorder("NAME"), "token", "-", "recorder", "plant",
+            "until the final telemetry is in; declared after its subscriber",
+        ),
+        row(
+            keys.nameplate(agent, instance), "queryable", "Nameplate", "agent", "plant, other agents",
+            "asked when a token appears; by a neighbour once more, as proof that its subscription has arrived",
+        ),
+        row(keys.control, "publication", "Prepare, Stop", "plant", "agents", "before the first tick; at the end"),
+        row(
+            keys.dismissal(agent, instance), "publication", "Stop", "plant", "the one instance",
+            "when its name is taken or is no inverter of the feeder",
+        ),
+        row(
+            keys.ready(agent), "publication", "Ready", "agent", "plant",
+            "when it has proof to hear every in-neighbour on the roster",
+        ),
+        row(keys.measurement(agent), "publication", "Measurement", "plant", "agent", "at every tick: it is the grant"),
+        row(
+            keys.state(agent), "publication", "State", "agent", "plant, neighbours",
+            "at every tick, once its measurement and the neighbours' states of the tick before are in",
+        ),
+        row(
+            keys.telemetry, "publication", "Telemetry", "plant", "recorders",
+            "at tick 0, every tenth tick, and at the end",
+        ),
+    )  # fmt: skip
