@@ -1,0 +1,153 @@
+"""One agent: what it knows, and what it decides at a tick. Pure; time and messages are arguments.
+
+An agent knows its own configuration and measurement, the nameplates it was shown, and the last state it heard of each
+neighbour. SI on the wire, per unit inside: the neighbours' ratings come from their nameplates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from agents.config import AgentConfig
+from agents.law import P_set_step, V_set_step
+from agents.topology import in_neighbours
+from wire.messages import Measurement, Nameplate, State
+
+
+class Agent:
+    """State of one agent.
+
+    Parameters
+    ----------
+    config : AgentConfig
+        Who it is and the run's rule.
+
+    Examples
+    --------
+    Where secondary control is not for this inverter, it keeps what the plant holds:
+
+    >>> from agents.config import Control
+    >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
+    ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="none", graph="none"), deadline=10.0,
+    ...     connect=()))
+    >>> agent.tick(Measurement(sender="plant", incarnation=1, seq=0, t=0.0, to="inv1", P=3e5, Q=0.0, V=277.0, f=59.9,
+    ...     P_set=3e5, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))).P_set
+    300000.0
+    """
+
+    def __init__(self, config: AgentConfig) -> None:
+        self.config = config
+        self.nameplate = Nameplate(
+            sender=config.name,
+            incarnation=config.incarnation,
+            seq=0,
+            t=0.0,
+            kind=config.kind,
+            microgrid=config.microgrid,
+            P_rated=config.P_rated,
+            V_nom=config.V_nom,
+            f_nom=config.f_nom,
+            m_p=config.m_p,
+            m_q=config.m_q,
+        )
+        self._known: dict[str, Nameplate] = {config.name: self.nameplate}
+        self._heard: dict[str, State] = {}
+        self._leader = config.kind == "GFM"
+        self._takes_part = config.control.secondary == "all" or (config.control.secondary == "GFM" and self._leader)
+        self._P_set: float | None = None
+        self._V_set: float | None = None
+
+    def knows(self, name: str) -> bool:
+        """Whether the nameplate of an agent has been seen."""
+        return name in self._known
+
+    def meet(self, nameplate: Nameplate) -> bool:
+        """Note who somebody is; False if a later life of it is known already.
+
+        What was heard of an earlier life is forgotten.
+        """
+        known = self._known.get(nameplate.sender)
+        if known is not None and known.incarnation > nameplate.incarnation:
+            return False
+        if known is not None and known.incarnation < nameplate.incarnation:
+            self._heard.pop(nameplate.sender, None)
+        self._known[nameplate.sender] = nameplate
+        return True
+
+    def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
+        """Whom this agent listens to among the known agents of a roster, by the run's rule."""
+        members = {name: self._known[name] for name in roster if name in self._known}
+        name = self.config.name
+        return in_neighbours(self.config.control, name, members) if name in members else ()
+
+    def judge(self, state: State) -> str:
+        """Why a neighbour's state cannot be used: "ghost", "stale", "foreign"; empty if it can."""
+        known = self._known.get(state.sender)
+        if known is None or state.sender == self.config.name:
+            return "foreign"
+        if state.incarnation != known.incarnation:
+            return "ghost" if state.incarnation < known.incarnation else "foreign"
+        last = self._heard.get(state.sender)
+        return "stale" if last is not None and state.seq <= last.seq else ""
+
+    def hear(self, state: State) -> str:
+        """Note a neighbour's state if it can be used; else return why not, as `judge` does."""
+        reason = self.judge(state)
+        if not reason:
+            self._heard[state.sender] = state
+        return reason
+
+    def tick(self, measurement: Measurement, neighbours: Sequence[str] = ()) -> State:
+        """Decide the set-points of this tick, (12)-(15).
+
+        Parameters
+        ----------
+        measurement : Measurement
+            What the own sensors read now; the own values are always fresh.
+        neighbours : Sequence[str], optional
+            Whom to listen to. Of each the last state heard counts; one that was never heard is left out of the sums.
+
+        Returns
+        -------
+        State
+            The set-points (W, V) and the own var (var).
+        """
+        config = self.config
+        if not self._takes_part or measurement.grid_connected or self._P_set is None or self._V_set is None:
+            # On hold the set-points follow the plant's, so that the law starts without a bump when the island forms.
+            self._P_set, self._V_set = measurement.P_set, measurement.V_set
+        if self._takes_part and not measurement.grid_connected:
+            y_bar, z_bar, d = self._means(neighbours)
+            gains, T = config.control.gains, config.T_c
+            P_set = self._P_set / config.P_rated
+            V_set = self._V_set / config.V_nom
+            e = (measurement.f - config.f_nom) / config.f_nom
+            z = config.m_q * measurement.Q / config.P_rated
+            v = measurement.V / config.V_nom
+            P_set = P_set_step(P_set, y_bar, d, e, leader=self._leader, m_p=config.m_p, gains=gains, T=T)
+            V_set = V_set_step(V_set, z, z_bar, d, v, leader=self._leader, gains=gains, T=T)
+            self._P_set = P_set * config.P_rated
+            self._V_set = V_set * config.V_nom
+        return State(
+            sender=config.name,
+            incarnation=config.incarnation,
+            seq=measurement.seq,
+            t=measurement.t,
+            P_set=self._P_set,
+            V_set=self._V_set,
+            Q=measurement.Q,
+        )
+
+    def _means(self, neighbours: Sequence[str]) -> tuple[float, float, float]:
+        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of the weights, which all are 1."""
+        y = z = 0.0
+        d = 0
+        for name in neighbours:
+            state = self._heard.get(name)
+            if state is None:
+                continue
+            plate = self._known[name]
+            y += plate.m_p * (state.P_set / plate.P_rated)
+            z += plate.m_q * (state.Q / plate.P_rated)
+            d += 1
+        return (y / d, z / d, float(d)) if d else (0.0, 0.0, 0.0)
