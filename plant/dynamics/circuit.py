@@ -1,0 +1,60 @@
+"""The electrical circuit the dynamics see: one admittance matrix, loads, sources, terminals.
+
+Made by `plant.network` for every set of closed switches; tests make their own small ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circuit:
+    """A linear network with non-linear load branches, ideal sources and inverter terminals.
+
+    All phasors in the frame that rotates at nominal speed; volts are line-to-neutral RMS.
+    """
+
+    Y: sp.csc_array
+    """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that stand
+    for no bus (merged into another) are empty."""
+    sources: NDArray[np.int64]
+    """Nodes held by an ideal source; may be empty."""
+    source_voltage: NDArray[np.complex128]
+    """Their phasors (V)."""
+    terminals: NDArray[np.int64]
+    """Inverter terminals: n_inv x 3 nodes, phases A, B, C."""
+    C: sp.csc_array
+    """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
+    I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
+    S: NDArray[np.complex128]
+    """Constant power of each branch (VA)."""
+    I0: NDArray[np.complex128]
+    """Constant current of each branch (A), at branch voltage angle 0: I = I0 V / abs(V)."""
+    V_branch: NDArray[np.complex128]
+    """Nominal phasor of each branch (V): where the first solution starts."""
+    names: tuple[str, ...] = field(default=())
+    """Name of each node for messages, e.g. "47.A"."""
+
+    def components(self) -> tuple[int, NDArray[np.int64]]:
+        """Electrical islands: number and label of each node.
+
+        The three terminals of an inverter belong together even where the phases of the network are
+        not coupled, for one controller moves all three.
+        """
+        incidence = abs(self.C)
+        link = abs(self.Y) + incidence @ incidence.T
+        n = self.Y.shape[0]
+        first = np.repeat(self.terminals[:, :1], 2, axis=1).ravel()
+        rest = self.terminals[:, 1:].ravel()
+        tie = sp.csc_array((np.ones(first.size), (first, rest)), shape=(n, n))
+        if self.sources.size > 1:  # the phases of one ideal source, too
+            s = self.sources
+            tie = tie + sp.csc_array((np.ones(s.size - 1), (np.repeat(s[:1], s.size - 1), s[1:])), shape=(n, n))
+        count, label = connected_components(link + tie, directed=False)
+        return int(count), np.asarray(label, dtype=np.int64)

@@ -1,0 +1,235 @@
+"""Grid-following inverter: PLL, freq-watt, volt-var, current control (`inverter-models.md` section 4).
+
+Positive-sequence form: one PLL on the positive-sequence voltage, one current reference, three phase
+currents driven to it. Per unit of the inverter's own rating; dq in the PLL's frame.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.config import GflParameters
+from plant.dynamics.arithmetic import A120, OMEGA_0, heun, sat
+from plant.dynamics.compiled import compiled
+
+F_NOM = 60.0
+"""Nominal frequency (Hz)."""
+
+PARAMETERS = np.dtype(
+    [
+        ("S_b", "f8"),  # VA, three phases
+        ("V_b", "f8"),  # V, line-to-neutral
+        ("I_b", "f8"),  # A
+        ("y_f", "c16"),  # S, of one phase; 0 in the current-source form
+        ("y_e", "c16"),  # S, filter admittance also in the current-source form (unused there)
+        ("current_source", "b1"),
+        ("frequency_watt", "b1"),
+        ("volt_var", "b1"),
+        ("R_p", "f8"),  # pu frequency per pu
+        ("R_q", "f8"),  # pu voltage per pu
+        ("X_f", "f8"),
+        ("k_pPLL", "f8"),
+        ("k_iPLL", "f8"),
+        ("k_pc", "f8"),
+        ("k_ic", "f8"),
+        ("F_current", "f8"),
+        ("T_if", "f8"),
+        ("T_ff", "f8"),
+        ("T_pf", "f8"),
+        ("T_vf", "f8"),
+        ("T_qf", "f8"),
+        ("db_UF", "f8"),
+        ("db_OF", "f8"),
+        ("db_UV", "f8"),
+        ("db_OV", "f8"),
+        ("P_max", "f8"),
+        ("P_min", "f8"),
+        ("S_max", "f8"),
+        ("i_max", "f8"),
+    ],
+    align=True,
+)
+"""What a GFL is: `GflParameters` with the bases and droops of one unit."""
+
+STATE = np.dtype(
+    [
+        ("w_i", "f8"),  # PLL integrator, rad/s
+        ("theta", "f8"),  # PLL angle, rad
+        ("f_m", "f8"),  # filtered PLL frequency, Hz
+        ("P_f", "f8"),  # lagged P reference, pu
+        ("V_m", "f8"),  # filtered mean voltage, pu
+        ("Q_f", "f8"),  # lagged Q reference, pu
+        ("cd_A", "f8"),  # current controller's integrators (voltage source), or lagged currents
+        ("cq_A", "f8"),  # (current source), d and q of each phase, pu
+        ("cd_B", "f8"),
+        ("cq_B", "f8"),
+        ("cd_C", "f8"),
+        ("cq_C", "f8"),
+        ("f", "f8"),  # PLL frequency, Hz (output)
+    ],
+    align=True,
+)
+"""States of a GFL and its PLL frequency."""
+
+
+def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> NDArray[np.void]:
+    """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.gfm.pack`.
+
+    Raises
+    ------
+    ValueError
+        If the current controller's one-pass feedback cannot be stable (checklist row 23).
+    """
+    z_f = complex(par.R_f, par.X_f)
+    if par.model == "voltage_source" and abs(1j * par.X_f * par.F_current - par.k_pc) >= abs(z_f):
+        ratio = abs(1j * par.X_f * par.F_current - par.k_pc) / abs(z_f)
+        raise ValueError(
+            f"gfl: abs(j X_f F_current - k_pc) / abs(R_f + j X_f) must be below 1, got {ratio:.2f} from "
+            f"F_current {par.F_current:g}, k_pc {par.k_pc:g} pu: the current controller would diverge on a "
+            'stiff bus; lower F_current or k_pc, or use model "current_source"'
+        )
+    y = 1.0 / (z_f * V_b**2 / (S_b / 3.0))
+    record = np.zeros((), PARAMETERS)
+    record["S_b"], record["V_b"], record["I_b"] = S_b, V_b, S_b / (3.0 * V_b)
+    record["current_source"] = par.model == "current_source"
+    record["y_e"] = y
+    record["y_f"] = 0.0 if par.model == "current_source" else y
+    record["R_p"], record["R_q"] = m_p, m_q
+    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[10:]):  # type: ignore[index]  # as in gfm
+        record[name] = getattr(par, name)
+    return record
+
+
+@compiled
+def power_reference(g: Any, P_set: float, f_m: float) -> float:
+    """Freq-watt characteristic (7) with dead band, section 4.3 (pu).
+
+    Outside the dead band the *full* deviation acts: the characteristic jumps at its edges.
+    """
+    P_d = P_set
+    if g.frequency_watt and not (F_NOM - g.db_UF < f_m < F_NOM + g.db_OF):
+        P_d += (F_NOM - f_m) / (F_NOM * g.R_p)
+    return sat(P_d, g.P_min, g.P_max)
+
+
+@compiled
+def var_reference(g: Any, V_set: float, Q_set: float, V_m: float, P_d: float) -> float:
+    """Volt-var characteristic (8) with dead band and the limit that P leaves, section 4.4 (pu)."""
+    Q_d = Q_set
+    if g.volt_var and not (V_set - g.db_UV < V_m < V_set + g.db_OV):
+        Q_d += (V_set - V_m) / g.R_q
+    Q_lim = np.sqrt(max(g.S_max**2 - P_d**2, 0.0))
+    return sat(Q_d, -Q_lim, Q_lim)
+
+
+@compiled
+def current_pass(
+    g: Any, c0: complex, c: complex, d1: complex, i_ref: complex, i: complex, u: complex, h: float, second: bool
+) -> tuple[complex, complex, complex]:
+    """One phase's current controller: new integrator, output, slope (sections 4.6, 4.7; dq, pu).
+
+    The output is the internal voltage e in the voltage-source form, the current in the other.
+    """
+    slope = (i_ref - c) / g.T_if if g.current_source else g.k_ic * (i_ref - i)
+    c_new = c0 + 0.5 * h * (d1 + slope) if second else c0 + h * slope
+    if g.current_source:
+        return c_new, c_new, slope
+    return c_new, c_new + g.k_pc * (i_ref - i) + u + 1j * g.X_f * g.F_current * i, slope
+
+
+@compiled
+def advance_gfl(
+    g: Any,
+    P_set: float,
+    V_set: float,
+    Q_set: float,
+    x0: Any,
+    x: Any,
+    d: Any,
+    V_A: complex,
+    V_B: complex,
+    V_C: complex,
+    J_A: complex,
+    J_B: complex,
+    J_C: complex,
+    h: float,
+    second: bool,
+) -> tuple[complex, complex, complex]:
+    """One pass of a step; returns the injections J_A, J_B, J_C (A) of the next network solution.
+
+    The order of the blocks is that of section 5 and matters in the first 20 ms.
+
+    Parameters
+    ----------
+    g
+        Record of `PARAMETERS`.
+    P_set, V_set, Q_set
+        Set-points (pu), equations (7) and (8).
+    x0, x, d
+        Records of `STATE`: start of the step; trial state, advanced here; first pass' slopes.
+    V_A, V_B, V_C
+        Terminal voltages (V) of this pass' network solution.
+    J_A, J_B, J_C
+        Injections (A) that went into that solution.
+    h
+        Step (s).
+    second
+        Whether this is the corrector.
+    """
+    # 1: measure in the frame the pass starts with
+    to_dq = np.exp(-1j * x.theta)
+    to_dq_B, to_dq_C = to_dq * A120, to_dq * A120.conjugate()
+    u_A, u_B, u_C = V_A * to_dq / g.V_b, V_B * to_dq_B / g.V_b, V_C * to_dq_C / g.V_b
+    u = (u_A + u_B + u_C) / 3.0  # the positive sequence in the frame of phase A
+    i_A = (J_A - g.y_f * V_A) * to_dq / g.I_b
+    i_B = (J_B - g.y_f * V_B) * to_dq_B / g.I_b
+    i_C = (J_C - g.y_f * V_C) * to_dq_C / g.I_b
+    v = (abs(V_A) + abs(V_B) + abs(V_C)) / (3.0 * g.V_b)
+
+    # 2: PLL
+    dw = g.k_iPLL * u.imag
+    x.w_i = heun(x0.w_i, d.w_i, dw, h, second)
+    w = x.w_i + g.k_pPLL * u.imag
+    x.theta = heun(x0.theta, d.theta, w, h, second)
+    x.f = (OMEGA_0 + w) / (2.0 * np.pi)
+
+    # 3 to 6: frequency filter, freq-watt, voltage filter, volt-var, each lag fed by this pass' value
+    df = (x.f - x.f_m) / g.T_ff
+    x.f_m = heun(x0.f_m, d.f_m, df, h, second)
+    P_d = power_reference(g, P_set, x.f_m)
+    dP = (P_d - x.P_f) / g.T_pf
+    x.P_f = heun(x0.P_f, d.P_f, dP, h, second)
+    P_c = x.P_f if g.frequency_watt else P_d
+    dV = (v - x.V_m) / g.T_vf
+    x.V_m = heun(x0.V_m, d.V_m, dV, h, second)
+    Q_d = var_reference(g, V_set, Q_set, x.V_m, P_d)
+    dQ = (Q_d - x.Q_f) / g.T_qf
+    x.Q_f = heun(x0.Q_f, d.Q_f, dQ, h, second)
+    Q_c = x.Q_f if g.volt_var else Q_d
+
+    # 7: current references, equations (5)(6); below 1e-3 pu there is no voltage to follow
+    u_d = max(u.real, 1e-3)
+    i_ref = complex(sat(P_c / u_d, -g.i_max, g.i_max), sat(-Q_c / u_d, -g.i_max, g.i_max))
+
+    # 8: current controllers
+    c_A, out_A, s_A = current_pass(
+        g, complex(x0.cd_A, x0.cq_A), complex(x.cd_A, x.cq_A), complex(d.cd_A, d.cq_A), i_ref, i_A, u_A, h, second
+    )
+    c_B, out_B, s_B = current_pass(
+        g, complex(x0.cd_B, x0.cq_B), complex(x.cd_B, x.cq_B), complex(d.cd_B, d.cq_B), i_ref, i_B, u_B, h, second
+    )
+    c_C, out_C, s_C = current_pass(
+        g, complex(x0.cd_C, x0.cq_C), complex(x.cd_C, x.cq_C), complex(d.cd_C, d.cq_C), i_ref, i_C, u_C, h, second
+    )
+    x.cd_A, x.cq_A, x.cd_B, x.cq_B, x.cd_C, x.cq_C = c_A.real, c_A.imag, c_B.real, c_B.imag, c_C.real, c_C.imag
+
+    if not second:
+        d.w_i, d.theta, d.f_m, d.P_f, d.V_m, d.Q_f = dw, w, df, dP, dV, dQ
+        d.cd_A, d.cq_A, d.cd_B, d.cq_B, d.cd_C, d.cq_C = s_A.real, s_A.imag, s_B.real, s_B.imag, s_C.real, s_C.imag
+
+    # 9: back with the new angle
+    turn = np.exp(1j * x.theta) * (g.I_b if g.current_source else g.V_b * g.y_e)
+    return out_A * turn, out_B * turn * A120.conjugate(), out_C * turn * A120

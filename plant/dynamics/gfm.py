@@ -1,0 +1,148 @@
+"""Grid-forming inverter: droop, limiters and voltage controller (`inverter-models.md` section 3).
+
+One controller for three phases; its output is one internal voltage E and one angle theta. All
+control quantities are per unit of the inverter's own rating, speeds in rad/s relative to nominal.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.config import GfmParameters
+from plant.dynamics.arithmetic import OMEGA_0, heun, sat
+from plant.dynamics.compiled import compiled
+
+PARAMETERS = np.dtype(
+    [
+        ("S_b", "f8"),  # VA, three phases
+        ("V_b", "f8"),  # V, line-to-neutral
+        ("y_f", "c16"),  # S, of one phase
+        ("m_p", "f8"),  # rad/s per pu
+        ("m_q", "f8"),  # pu per pu
+        ("T_p", "f8"),
+        ("T_q", "f8"),
+        ("T_v", "f8"),
+        ("P_max", "f8"),
+        ("P_min", "f8"),
+        ("k_pp", "f8"),
+        ("k_ip", "f8"),
+        ("w_lim", "f8"),
+        ("Q_max", "f8"),
+        ("Q_min", "f8"),
+        ("k_pq", "f8"),
+        ("k_iq", "f8"),
+        ("V_lim", "f8"),
+        ("k_pv", "f8"),
+        ("k_iv", "f8"),
+        ("E_min", "f8"),
+        ("E_max", "f8"),
+    ],
+    align=True,
+)
+"""What a GFM is: `GfmParameters` with the bases and droops of one unit."""
+
+STATE = np.dtype(
+    [
+        ("p", "f8"),  # filtered real power, pu
+        ("q", "f8"),  # filtered reactive power, pu
+        ("v", "f8"),  # filtered mean terminal voltage, pu
+        ("x_over", "f8"),  # integrator of the Pmax limiter, rad/s, <= 0
+        ("x_under", "f8"),  # integrator of the Pmin limiter, rad/s, >= 0
+        ("y_over", "f8"),  # integrator of the Qmax limiter, pu V, <= 0
+        ("y_under", "f8"),  # integrator of the Qmin limiter, pu V, >= 0
+        ("e", "f8"),  # integrator of the voltage controller, pu
+        ("theta", "f8"),  # angle of phase A's internal voltage, rad
+        ("E", "f8"),  # internal voltage, pu (output)
+        ("w", "f8"),  # speed relative to nominal, rad/s (output)
+    ],
+    align=True,
+)
+"""States of a GFM and its two outputs."""
+
+
+def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> NDArray[np.void]:
+    """Parameters of one unit as the compiled pass wants them.
+
+    Parameters
+    ----------
+    par
+        Per-unit parameters of the type.
+    S_b
+        Rating (VA, three phases).
+    V_b
+        Nominal voltage (V, line-to-neutral).
+    m_p
+        P-f droop (pu frequency per pu power).
+    m_q
+        Q-V droop (pu voltage per pu reactive power).
+    """
+    Z_b = V_b**2 / (S_b / 3.0)
+    record = np.zeros((), PARAMETERS)
+    record["S_b"], record["V_b"] = S_b, V_b
+    record["y_f"] = 1.0 / (complex(par.R_f, par.X_f) * Z_b)
+    record["m_p"], record["m_q"] = m_p * OMEGA_0, m_q
+    for name in PARAMETERS.names[5:]:  # type: ignore[index]  # a structured dtype has names
+        record[name] = getattr(par, name)
+    return record
+
+
+@compiled
+def advance_gfm(
+    g: Any, P_set: float, V_set: float, x0: Any, x: Any, d: Any, P: float, Q: float, v: float, h: float, second: bool
+) -> None:
+    """One pass of a step: from what the network solution shows to the next internal voltage.
+
+    Integrator slopes are taken from the filters' values at the end of the pass, in both passes
+    (section 5): that is what the reference implementation does, and the first 20 ms depend on it.
+
+    Parameters
+    ----------
+    g
+        Record of `PARAMETERS`.
+    P_set, V_set
+        Set-points (pu), equations (3) and (4).
+    x0, x, d
+        Records of `STATE`: at the start of the step; the trial state, advanced here; slopes of
+        the first pass, written in the first and read in the second.
+    P, Q, v
+        Terminal power and mean voltage (pu) of this pass' network solution.
+    h
+        Step (s).
+    second
+        Whether this is the corrector.
+    """
+    # measurement filters, 3.2
+    dp = (P - x.p) / g.T_p
+    dq = (Q - x.q) / g.T_q
+    dv = (v - x.v) / g.T_v
+    x.p = heun(x0.p, d.p, dp, h, second)
+    x.q = heun(x0.q, d.q, dq, h, second)
+    x.v = heun(x0.v, d.v, dv, h, second)
+
+    # overload and under-load limiters, 3.3: they only ever slow down or speed up
+    over, under = g.P_max - x.p, g.P_min - x.p
+    x.x_over = sat(heun(x0.x_over, d.x_over, g.k_ip * over, h, second), -g.w_lim, 0.0)
+    x.x_under = sat(heun(x0.x_under, d.x_under, g.k_ip * under, h, second), 0.0, g.w_lim)
+    limit = sat(x.x_over + g.k_pp * over, -g.w_lim, 0.0) + sat(x.x_under + g.k_pp * under, 0.0, g.w_lim)
+
+    # reactive limiters and voltage controller, 3.4
+    q_over, q_under = g.Q_max - x.q, g.Q_min - x.q
+    x.y_over = sat(heun(x0.y_over, d.y_over, g.k_iq * q_over, h, second), -g.V_lim, 0.0)
+    x.y_under = sat(heun(x0.y_under, d.y_under, g.k_iq * q_under, h, second), 0.0, g.V_lim)
+    q_limit = sat(x.y_over + g.k_pq * q_over, -g.V_lim, 0.0) + sat(x.y_under + g.k_pq * q_under, 0.0, g.V_lim)
+    error = V_set - g.m_q * x.q + q_limit - x.v
+    x.e = sat(heun(x0.e, d.e, g.k_iv * error, h, second), g.E_min, g.E_max)
+    x.E = sat(x.e + g.k_pv * error, g.E_min, g.E_max)
+
+    # droop, 3.3 and equation (3)
+    x.w = g.m_p * (P_set - x.p) + limit
+    x.theta = heun(x0.theta, d.theta, x.w, h, second)
+
+    if not second:
+        d.p, d.q, d.v = dp, dq, dv
+        d.x_over, d.x_under = g.k_ip * over, g.k_ip * under
+        d.y_over, d.y_under = g.k_iq * q_over, g.k_iq * q_under
+        d.e, d.theta = g.k_iv * error, x.w

@@ -1,0 +1,213 @@
+"""The operating point a run starts from: an exact equilibrium of network and inverters (section 7).
+
+Inverters stand on their real power; reactive power is either given or follows from a given V_set through the
+droop (4), (8). An island without a source has one GFM (its swing) hold its terminal first, and is then released.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from plant.dynamics.arithmetic import A120
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
+from plant.dynamics.solve import solve_network
+
+PHASES = np.array([1.0, A120.conjugate(), A120])
+"""Balanced set of phasors, phase A at 0."""
+
+
+class PlantError(RuntimeError):
+    """The plant has no solution: the message says where, and what to try."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Units:
+    """The inverters as the initialisation sees them, one entry each."""
+
+    S_b: Real
+    """Rating (VA)."""
+    V_b: Real
+    """Nominal voltage (V)."""
+    y_f: Complex
+    """Filter admittance (S); 0 for the current-source form."""
+    m_q: Real
+    """Q-V droop (pu per pu)."""
+    forming: NDArray[np.bool_]
+    """Which are GFM."""
+    S_max: Real
+    """Apparent-power limit (pu); infinite for a GFM."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """Injections and voltages of an equilibrium, n_inv x 3 each."""
+
+    J: Complex
+    """Norton injections (A)."""
+    V: Complex
+    """Terminal voltages (V)."""
+    I: Complex  # noqa: E741  # the paper's symbol for current
+    """Currents out of the inverters (A)."""
+    V_branch: Complex
+    """Voltages of the live load branches (V)."""
+
+
+class _PowerFlow:
+    """Fixed point between the network and inverters that keep their power."""
+
+    def __init__(self, circuit: Circuit, units: Units, held: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+        # the filters of GFM stay in the network, for their EMF is balanced, not their current; a GFL is a pure current
+        y = np.where(units.forming & ~held, units.y_f, 0.0)
+        self.reduction = Reduction(circuit, y, units.forming, online)
+        self.circuit, self.units, self.y = circuit, units, y
+        self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
+        self.net = self._linearise()
+
+    def _linearise(self) -> Reduced:
+        theta = np.zeros(self.units.S_b.size)
+        return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
+
+    def voltages(self, J: Complex) -> Complex:
+        """Terminal voltages (V) for injections J (A)."""
+        m = self.V_b.size
+        x = np.concatenate([self.V_b.real, self.V_b.imag])
+        I_b, V = np.empty(m, complex), np.empty(J.shape, complex)
+        work = np.empty(12 * J.shape[0] + 6 * m)
+        still = np.ones(self.reduction.count, complex)
+        tolerance = 1e-12 * float(self.units.V_b.max())
+        if solve_network(self.net, J, still, x, I_b, V, tolerance, work) < 0:
+            raise PlantError(
+                "no initial operating point: the power flow did not converge; the load may be more than the "
+                "network can carry; try smaller loads or another P_set0"
+            )
+        self.V_b, self.I_b = x[:m] + 1j * x[m:], I_b
+        return V
+
+    def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+        """Injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
+        units, y = self.units, self.y[:, None]
+        S = ((P + 1j * Q) * units.S_b)[:, None]
+        keep = (frozen | ~self.reduction.online)[:, None]
+        scale = units.S_b / units.V_b
+        for iteration in range(500):
+            V = self.voltages(J)
+            V_1 = (V @ np.array([1.0, A120, A120**2]))[:, None] / 3.0
+            V_1 = np.where(V_1 == 0.0, 1.0, V_1)
+            own = np.sum(V * np.conj(y * V), axis=1, keepdims=True)
+            wanted = np.where(keep, J, np.conj((S + own) / (3.0 * V_1)) * PHASES)
+            change = float(np.max(np.abs(wanted - J) / scale[:, None], initial=0.0))
+            J = wanted
+            if iteration == 3:
+                self.net = self._linearise()
+            if change < 1e-13 or (iteration > 100 and change < 1e-11):
+                return J, self.voltages(J)
+        raise PlantError(
+            f"no initial operating point: injections still change by {change:.1e} pu after 500 iterations; "
+            "the inverters may be asked for more than the network can carry; try another P_set0 or V_set0"
+        )
+
+
+def equilibrium(
+    circuit: Circuit,
+    units: Units,
+    P: Real,
+    Q: Real,
+    V_set: Real | None,
+    *,
+    swing_voltage: Complex = PHASES,
+    online: NDArray[np.bool_] | None = None,
+) -> OperatingPoint:
+    """Operating point of section 7.
+
+    Parameters
+    ----------
+    circuit
+        The network at the start.
+    units
+        The inverters.
+    P
+        Real power of each (pu); ignored for a swing.
+    Q
+        Reactive power of each (pu), or the first guess where `V_set` is given.
+    V_set
+        Voltage set-point of each (pu), from which Q follows by droop; None to keep Q.
+    swing_voltage
+        The three phasors that a swing holds (pu of nominal).
+    online
+        Connected inverters; all by default.
+
+    Raises
+    ------
+    PlantError
+        If there is no such point.
+    """
+    n = units.S_b.size
+    online = np.ones(n, bool) if online is None else online
+    _, label = circuit.components()
+    island = label[circuit.terminals[:, 0]]
+    sourced = np.isin(island, label[circuit.sources])
+    swing = np.zeros(n, bool)
+    for k in np.unique(island[units.forming & online & ~sourced]):
+        swing[np.flatnonzero((island == k) & units.forming & online)[0]] = True
+
+    nodes = circuit.terminals[swing].ravel()
+    at_swing = (units.V_b[swing, None] * swing_voltage).ravel()
+    held = replace(
+        circuit,
+        sources=np.concatenate([circuit.sources, nodes]),
+        source_voltage=np.concatenate([circuit.source_voltage, at_swing]),
+    )
+    flow = _PowerFlow(held, units, swing, online)
+    J = np.zeros((n, 3), complex)
+    if V_set is None:
+        J, V = flow.solve(J, P, Q, swing)
+    else:
+        J, V, Q = _by_droop(flow, J, P, Q, V_set, swing)
+
+    if swing.any():
+        # what the swings had to deliver becomes their EMF; then their buses are released
+        node_voltage = flow.reduction.all_voltages(J, flow.I_b, held.source_voltage)
+        drawn = circuit.Y @ node_voltage + circuit.C[:, flow.reduction.branches] @ flow.I_b
+        S = np.sum(V * np.conj(drawn[circuit.terminals]), axis=1)
+        own = np.sum(V * np.conj(units.y_f[:, None] * V), axis=1)
+        V_1 = V @ np.array([1.0, A120, A120**2]) / 3.0
+        J[swing] = np.conj((S + own) / (3.0 * V_1))[swing, None] * PHASES
+        flow = _PowerFlow(circuit, units, np.zeros(n, bool), online)
+        J, V = flow.solve(J, P, Q, swing)
+
+    I_out = J - flow.y[:, None] * V
+    return OperatingPoint(J=I_out + units.y_f[:, None] * V, V=V, I=I_out, V_branch=flow.V_b)
+
+
+def _by_droop(
+    flow: _PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: NDArray[np.bool_]
+) -> tuple[Complex, Complex, Real]:
+    """Find the Q at which V_set - m_q Q is each terminal's voltage, within the apparent-power limit."""
+    units = flow.units
+    free = np.flatnonzero(~swing & flow.reduction.online)
+    limit = np.sqrt(np.maximum(units.S_max**2 - P**2, 0.0))
+
+    def deviation(q: Real) -> Real:
+        nonlocal J
+        trial = Q.copy()
+        trial[free] = q
+        J, V = flow.solve(J, P, trial, swing)
+        v = np.mean(np.abs(V), axis=1) / units.V_b
+        wanted = np.clip((V_set - v) / units.m_q, -limit, limit)
+        return np.asarray((wanted - trial)[free] * units.m_q[free])
+
+    found = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
+    if not found.success and float(np.max(np.abs(found.fun))) > 1e-10:
+        raise PlantError(
+            f"no initial operating point: V_set0 cannot be met by droop, mismatch {np.max(np.abs(found.fun)):.1e} pu; "
+            "try another V_set0"
+        )
+    Q = Q.copy()
+    Q[free] = found.x
+    J, V = flow.solve(J, P, Q, swing)
+    return J, V, Q

@@ -1,0 +1,212 @@
+r"""What the inner loop needs of the network: small dense matrices, made once per switch state.
+
+With the filters' admittances in Y, the network seen from the load branches (voltages V_b, currents I_b)
+and from the inverter terminals (voltages V_G, injections J) is
+
+.. math::
+    V_b = T_{bG} J + s_b - Z_{bb} I_b(V_b), \qquad  V_G = Z_{GG} J + s_G - Z_{Gb} I_b(V_b).
+
+Splitting the load law into its tangent at a point V_lin and the remainder, I_b = i_c + A V_b + B V_b^* + N(V_b), and
+solving for V_b gives x = P J + x_c - Q N(x) on real vectors x = [Re V_b; Im V_b]. N is of second order in the
+deviation from V_lin, so the fixed point converges by about two decades an iteration, where the plain current
+injection gains less than one.
+
+An island without a source turns away from nominal; loads do not care (I_b turns with V_b). So each such island is
+solved in a frame that turns with its first GFM, and the tangent stays good for the whole run.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from plant.dynamics.circuit import Circuit
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Reduced(NamedTuple):
+    """Arrays of the inner loop. Real matrices act on [Re; Im] and are stored transposed, rows contiguous."""
+
+    PT: Real
+    """J to x, (6 n_inv) x (2 m)."""
+    QT: Real
+    """N to x, (2 m) x (2 m)."""
+    x_c: Real
+    """Constant part of x, 2 m (V)."""
+    GGT: Real
+    """J to V_G, (6 n_inv) x (6 n_inv)."""
+    GBT: Real
+    """I_b to V_G, (2 m) x (6 n_inv)."""
+    s_G: Real
+    """Constant part of V_G, 6 n_inv (V)."""
+    S: Complex
+    """Constant power of the live branches (VA)."""
+    I0: Complex
+    """Constant current of the live branches (A)."""
+    i_c: Complex
+    """Tangent of the load law, constant part (A)."""
+    A: Complex
+    """Tangent, factor of V_b (S)."""
+    B: Complex
+    """Tangent, factor of V_b^* (S)."""
+    branch_island: NDArray[np.int64]
+    """Island of each live branch."""
+    inverter_island: NDArray[np.int64]
+    """Island of each inverter."""
+    leader: NDArray[np.int64]
+    """For each island the inverter whose angle turns its frame; -1: the frame stands still."""
+    theta_lin: Real
+    """That inverter's angle at the point of linearisation (rad)."""
+
+
+class Reduction:
+    """One switch state, factored: the island structure and the linear maps, before any linearisation.
+
+    Parameters
+    ----------
+    circuit
+        The network.
+    y_f
+        Filter admittance of each inverter (S per phase); 0 for a current source.
+    forming
+        Which inverters are GFM.
+    online
+        Which inverters are connected; the others neither inject nor load the network.
+    """
+
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+        self.circuit = circuit
+        n_inv = circuit.terminals.shape[0]
+        n = circuit.Y.shape[0]
+        self.count, self.label = circuit.components()
+        self.inverter_island = self.label[circuit.terminals[:, 0]] if n_inv else np.zeros(0, np.int64)
+
+        fed = np.zeros(self.count, bool)
+        fed[self.label[circuit.sources]] = True
+        self.has_source = fed.copy()
+        fed[self.inverter_island[forming & online]] = True
+        self.live = fed
+        """Whether each island has a source or a GFM."""
+        self.online = online & fed[self.inverter_island]
+        """Inverters that are connected and in a live island."""
+        self.leader = np.full(self.count, -1, np.int64)
+        for i in reversed(range(n_inv)):
+            if forming[i] and self.online[i] and not self.has_source[self.inverter_island[i]]:
+                self.leader[self.inverter_island[i]] = i
+
+        used = np.diff(circuit.Y.indptr) > 0
+        held = np.zeros(n, bool)
+        held[circuit.sources] = True
+        unknown = np.flatnonzero(fed[self.label] & ~held & used)
+        place = np.full(n, -1, np.int64)
+        place[unknown] = np.arange(unknown.size)
+
+        C = circuit.C.tocsc()
+        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
+        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first
+        """Branches in live islands."""
+        self.branch_island = self.label[first[self.branches]]
+
+        G = circuit.terminals.T.ravel()  # all A, then all B, then all C
+        y_diagonal = np.zeros(n, complex)
+        np.add.at(y_diagonal, G, np.tile(np.where(self.online, y_f, 0.0), 3))
+        Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
+        C = C[:, self.branches]
+        C_U = C.tocsr()[unknown].toarray()
+        C_S = C.tocsr()[circuit.sources].toarray()
+        E_G = np.zeros((unknown.size, G.size))
+        free = np.flatnonzero((place[G] >= 0) & np.tile(self.online, 3))
+        E_G[place[G[free]], free] = 1.0
+        Y_US = Y[unknown][:, circuit.sources].toarray()
+
+        if unknown.size:
+            right = np.hstack([E_G, C_U, -Y_US]).astype(complex)
+            columns = splu(Y[unknown][:, unknown].tocsc()).solve(right)
+        else:
+            columns = np.zeros((0, G.size + C_U.shape[1] + C_S.shape[0]), complex)
+        Z_G, Z_C, Z_S = np.split(columns, [G.size, G.size + C_U.shape[1]], axis=1)
+
+        seen = np.flatnonzero(place[G] >= 0)
+
+        def at_terminals(of_unknown: Complex) -> Complex:
+            rows = np.zeros((G.size, of_unknown.shape[1]), complex)
+            rows[seen] = of_unknown[place[G[seen]]]
+            return rows
+
+        self._unknown, self._columns = unknown, (Z_G, Z_C, Z_S)
+        self._T_bG, self._Z_bb, self._b_S = C_U.T @ Z_G, C_U.T @ Z_C, C_U.T @ Z_S + C_S.T
+        self._Z_GG, self._Z_Gb, self._G_S = at_terminals(Z_G), at_terminals(Z_C), at_terminals(Z_S)
+        for row, node in enumerate(G):
+            if held[node]:
+                self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = 1.0
+
+    def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
+        """What the ideal sources alone give at the branches and at the terminals (V)."""
+        return self._b_S @ source_voltage, self._G_S @ source_voltage
+
+    def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
+        """Inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
+
+        Parameters
+        ----------
+        V_b
+            Point of linearisation.
+        source_voltage
+            Phasors of the ideal sources (V).
+        theta
+            Angle of every inverter at that point (rad).
+        """
+        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
+        magnitude = np.abs(V_b)
+        A = I0 / (2.0 * magnitude)
+        B = -np.conj(S) / np.conj(V_b) ** 2 - I0 * V_b / (2.0 * magnitude * np.conj(V_b))
+        i_c = np.conj(S / V_b) + I0 * V_b / magnitude - A * V_b - B * np.conj(V_b)
+        s_b, s_G = self.source_parts(source_voltage)
+        m = V_b.size
+        M = np.eye(2 * m) + _linear(self._Z_bb * A) + _conjugate_linear(self._Z_bb * B)
+        M_inverse = np.linalg.inv(M)
+        return Reduced(
+            PT=np.ascontiguousarray((M_inverse @ _linear(self._T_bG)).T),
+            QT=np.ascontiguousarray((M_inverse @ _linear(self._Z_bb)).T),
+            x_c=M_inverse @ _stack(s_b - self._Z_bb @ i_c),
+            GGT=np.ascontiguousarray(_linear(self._Z_GG).T),
+            GBT=np.ascontiguousarray(_linear(self._Z_Gb).T),
+            s_G=_stack(s_G),
+            S=S,
+            I0=I0,
+            i_c=i_c,
+            A=A,
+            B=B,
+            branch_island=self.branch_island,
+            inverter_island=self.inverter_island,
+            leader=self.leader,
+            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
+        )
+
+    def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
+        """Voltage of every node (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents (A)."""
+        V = np.zeros(self.circuit.Y.shape[0], complex)
+        Z_G, Z_C, Z_S = self._columns
+        V[self._unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
+        V[self.circuit.sources] = source_voltage
+        return V
+
+
+def _linear(M: Complex) -> Real:
+    """Real form of V -> M V on [Re; Im]."""
+    return np.block([[M.real, -M.imag], [M.imag, M.real]])
+
+
+def _conjugate_linear(M: Complex) -> Real:
+    """Real form of V -> M V^* on [Re; Im]."""
+    return np.block([[M.real, M.imag], [M.imag, -M.real]])
+
+
+def _stack(V: Complex) -> Real:
+    return np.concatenate([V.real, V.imag])

@@ -1,0 +1,110 @@
+"""The network solution of the inner loop, compiled: see `plant.dynamics.reduction` for the equations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.arithmetic import multiply_add
+from plant.dynamics.compiled import compiled
+
+MAX_ITERATIONS = 60
+
+
+@compiled
+def load_currents(
+    S: NDArray[np.complex128], I0: NDArray[np.complex128], x: NDArray[np.float64], I_b: NDArray[np.complex128]
+) -> None:
+    """Branch currents (A) of constant-power and constant-current loads at x = [Re V_b; Im V_b]."""
+    m = S.size
+    for b in range(m):
+        re, im = x[b], x[m + b]
+        square = re * re + im * im
+        V = complex(re, im)
+        # (S/V)* = S* V / |V|^2
+        I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
+
+
+@compiled
+def solve_network(
+    net: Any,
+    J: NDArray[np.complex128],
+    rotation: NDArray[np.complex128],
+    x: NDArray[np.float64],
+    I_b: NDArray[np.complex128],
+    V: NDArray[np.complex128],
+    tolerance: float,
+    work: NDArray[np.float64],
+) -> int:
+    """Solve for the terminal voltages; returns the iterations, or -1 if they did not converge.
+
+    Parameters
+    ----------
+    net
+        A `plant.dynamics.reduction.Reduced`.
+    J
+        Injections, n_inv x 3 (A).
+    rotation
+        exp(-j angle) into each island's frame.
+    x
+        Branch voltages in that frame (V), [Re; Im]: first guess, then solution.
+    I_b
+        Branch currents in that frame (A), written here.
+    V
+        Terminal voltages, n_inv x 3 (V), written here.
+    tolerance
+        Largest change of a branch voltage in the last iteration (V).
+    work
+        Room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
+    """
+    n = J.shape[0]
+    m = net.S.size
+    n3, m2 = 3 * n, 2 * m
+    j, base, trial, rest, V_G = (
+        work[: 2 * n3],
+        work[2 * n3 : 2 * n3 + m2],
+        work[2 * n3 + m2 : 2 * n3 + 2 * m2],
+        work[2 * n3 + 2 * m2 : 2 * n3 + 3 * m2],
+        work[2 * n3 + 3 * m2 : 4 * n3 + 3 * m2],
+    )
+    for i in range(n):
+        turn = rotation[net.inverter_island[i]]
+        for phase in range(3):
+            turned = J[i, phase] * turn
+            j[phase * n + i], j[n3 + phase * n + i] = turned.real, turned.imag
+
+    base[:] = net.x_c
+    multiply_add(net.PT, j, 1.0, base)
+    iterations = 0
+    while m > 0:
+        iterations += 1
+        load_currents(net.S, net.I0, x, I_b)
+        for b in range(m):
+            V_b = complex(x[b], x[m + b])
+            N = I_b[b] - net.i_c[b] - net.A[b] * V_b - net.B[b] * V_b.conjugate()
+            rest[b], rest[m + b] = N.real, N.imag
+        trial[:] = base
+        multiply_add(net.QT, rest, -1.0, trial)
+        change = 0.0
+        for b in range(m2):
+            change = max(change, abs(trial[b] - x[b]))
+            x[b] = trial[b]
+        if change <= tolerance:
+            break
+        if iterations >= MAX_ITERATIONS or not change < 1e12:
+            return -1
+
+    V_G[:] = net.s_G
+    multiply_add(net.GGT, j, 1.0, V_G)
+    if m > 0:
+        load_currents(net.S, net.I0, x, I_b)
+        for b in range(m):
+            rest[b], rest[m + b] = I_b[b].real, I_b[b].imag
+        multiply_add(net.GBT, rest, -1.0, V_G)
+    for i in range(n):
+        back = rotation[net.inverter_island[i]].conjugate()
+        for phase in range(3):
+            V[i, phase] = complex(V_G[phase * n + i], V_G[n3 + phase * n + i]) * back
+    return iterations
