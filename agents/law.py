@@ -24,21 +24,21 @@ is a pu frequency and k_p is in seconds. Hz or rad/s enter nowhere.
 
 where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To first order in T this is (12)-(15).
 
-- *Consensus term*: the exact solution when the neighbours come towards me as I go towards them, which they do, as they
-  run the same law; so at most half of the way. Holding the neighbours still, y += (1 - exp(-kappa d T)) (ybar - y), lets
-  a pair with kappa d T >> 1 swap its values for ever, and with a leader added stars, even rings and bipartite graphs have
-  spectral radii up to 1.6. Half of the way leaves no eigenvalue of the consensus below 0, whatever T and d, and nine
-  meshed agents at 20 ms still share within 0.1 s.
-- *Leader term*: the exact solution against the own quasi-steady response de/dy = 1, that of a lone leader, the strongest
-  there is. Under one exponential with the consensus term it would be multiplied by (1 - exp(-kappa d T))/(kappa d T):
-  restoration with eight neighbours at 20 ms would be 2.5 times slower.
+- *Consensus term*: the exact solution when the neighbours come towards me as I go towards them, which they do, as
+  they run the same law; so at most half of the way. Holding them still, y += (1 - exp(-kappa d T)) (ybar - y), lets a
+  pair with kappa d T >> 1 swap its values for ever, and with a leader added stars, even rings and bipartite graphs
+  have spectral radii up to 1.6. Half of the way leaves no eigenvalue of the consensus below 0, whatever T and d, and
+  nine meshed agents at 20 ms still share within 0.1 s.
+- *Leader term*: the exact solution against the own quasi-steady response de/dy = 1, that of a lone leader, which is
+  the strongest. Under one exponential with the consensus term it would be multiplied by
+  (1 - exp(-kappa d T))/(kappa d T): restoration with eight neighbours at 20 ms would be 2.5 times slower.
 - *Equilibrium*, unchanged: followers have y = ybar and leaders a (ybar - y) = b e, a and b the two factors above. With
-  L the Laplacian whose rows are weighted by a/d that is L y = -g b e; the left null vector of L is positive and all e of
-  an island are equal, so e = 0, and then all y agree.
+  L the Laplacian whose rows are weighted by a/d that is L y = -g b e; the left null vector of L is positive and all e
+  of an island are equal, so e = 0, and then all y agree.
 - *Stability* was found by search over random and structured graphs, not proven. With the quasi-steady plant
-  e = sum_i w_i y_i + const, w_i = (s_i/m_p,i)/sum_j (s_j/m_p,j), the spectral radius is below 1 for every connected graph
-  tried, of up to 30 inverters with one leader or more, for every T, with one rating up to thirtyfold the others. Where
-  one inverter far from the leaders on a sparse graph outweighs all others by hundredfold, the paper's own
+  e = sum_i w_i y_i + const, w_i = (s_i/m_p,i)/sum_j (s_j/m_p,j), the spectral radius is below 1 for every connected
+  graph tried, of up to 30 inverters with one leader or more, for every T, with one rating up to thirtyfold the others.
+  Where one inverter far from the leaders on a sparse graph outweighs all others by hundredfold, the paper's own
   continuous law loses stability too. For the voltage, over random networks v = H V_set, z = (1 - H) V_set, gains and
   periods: none unstable with ratings up to threefold apart. `tests/unit/test_law.py` repeats both searches.
 

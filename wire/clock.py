@@ -6,14 +6,15 @@ from __future__ import annotations
 def time_of(tick: int, T_c: float) -> float:
     """Run time (s) of a tick.
 
-    A product and never a running sum, so that every process finds the same bits for the same tick.
+    A product and never a running sum, so that every process finds the same bits for the same tick; rounded to the
+    nanosecond, as the plant's rows are.
 
     Examples
     --------
     >>> time_of(3, 0.02)
     0.06
     """
-    return tick * T_c
+    return round(tick * T_c, 9)
 
 
 def ticks_until(end: float, T_c: float) -> int:
