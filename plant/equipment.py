@@ -171,6 +171,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     load_set: str
     """Which loads these are: "main" was read from loads_main.csv."""
     buses: tuple[Bus, ...]
+    """Their order is that of the nodes in every vector."""
     lines: tuple[Line, ...]
     line_configs: tuple[LineConfig, ...]
     switches: tuple[Switch, ...]

@@ -67,18 +67,20 @@ class Network:
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
         self._index = {node: i for i, node in enumerate(self.nodes)}
-        self.V_nom = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
-        self.nominal = self.V_nom * np.exp(1j * np.array([ANGLE[phase] for _, phase in self.nodes]))
+        self.V_nom: NDArray[np.float64] = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
+        self.nominal: NDArray[np.complex128] = np.array(
+            [cmath.rect(V, ANGLE[phase]) for V, (_, phase) in zip(self.V_nom, self.nodes, strict=True)],
+            dtype=np.complex128,
+        )
         self.switches = {switch.name: switch for switch in feeder.switches}
         self.closed0 = frozenset(switch.name for switch in feeder.switches if switch.closed)
         self.inverters: tuple[InverterRow, ...] = feeder.inverters
         source = feeder.source
-        self.source_nodes = np.array(
+        self.source_nodes: NDArray[np.int64] = np.array(
             [self.index(source.bus, phase) for phase in PHASES] if source else [], dtype=np.int64
         )
-        self.source_voltage = self.nominal[self.source_nodes]
-        if source:
-            self.source_voltage = self.source_voltage * cmath.rect(source.V_pu, source.angle)
+        turned = cmath.rect(source.V_pu, source.angle) if source else 1.0
+        self.source_voltage: NDArray[np.complex128] = self.nominal[self.source_nodes] * turned
         self.Y_branches = self._branches()
         self.Y_capacitors = self._capacitors()
         self.Y_loads = self._impedance_loads()

@@ -10,19 +10,25 @@ from plant.tables.buses import BusTable
 from plant.tables.table import Row, Table, did_you_mean
 
 
-def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig]:
-    """Read line_configs.csv: the upper triangles of the matrices, one element per row."""
+def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig] | None:
+    """Read line_configs.csv: the upper triangles of the matrices, one element per row. None if it is unreadable."""
     columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
     last_row: dict[str, Row] = {}
-    for row in Table(folder, "line_configs.csv", columns, mistakes, required=True):
+    spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
+    table = Table(folder, "line_configs.csv", columns, mistakes, required=True)
+    for row in table:
         name = row.text("config")
         first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
-        diagonal = first == second
+        misplaced = row.mistaken
+        diagonal = first == second and not misplaced
         R = row.number("R_ohm_per_km", **({"above": 0.0} if diagonal else {}))
         X = row.number("X_ohm_per_km", **({"above": 0.0} if diagonal else {}))
         B = row.number("B_uS_per_km", **({"at_least": 0.0} if diagonal else {})) * 1e-6
         matrix = elements.setdefault(name, {})
+        if misplaced:
+            spoiled.add(name)
+            continue
         if (first, second) in matrix:
             row.mistake(f'config "{name}" element {first}-{second}: given already; give each element once')
         matrix[first, second] = matrix[second, first] = (complex(R, X), B)
@@ -31,7 +37,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
     for name, matrix in elements.items():
         phases = "".join(phase for phase in PHASES if any(phase in pair for pair in matrix))
         missing = [f"{a}-{b}" for a in phases for b in phases if a <= b and (a, b) not in matrix]
-        if missing:
+        if missing and name not in spoiled:
             last_row[name].mistake(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
         blank = (0j, 0.0)
         configs[name] = LineConfig(
@@ -40,10 +46,12 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
             Z=tuple(tuple(matrix.get((a, b), blank)[0] for b in phases) for a in phases),
             B=tuple(tuple(matrix.get((a, b), blank)[1] for b in phases) for a in phases),
         )
-    return configs
+    return configs if table.readable else None
 
 
-def read_lines(folder: Path, buses: BusTable, configs: dict[str, LineConfig], mistakes: list[str]) -> tuple[Line, ...]:
+def read_lines(
+    folder: Path, buses: BusTable, configs: dict[str, LineConfig] | None, mistakes: list[str]
+) -> tuple[Line, ...]:
     """Read lines.csv; lengths in m."""
     columns = ("line", "from_bus", "to_bus", "phases", "config", "length_m")
     lines: dict[str, Line] = {}
@@ -51,9 +59,11 @@ def read_lines(folder: Path, buses: BusTable, configs: dict[str, LineConfig], mi
         name, config, phases = row.text("line"), row.text("config"), row.phases()
         length = row.number("length_m", above=0.0)
         ends = buses.find_ends(row, phases)
-        if config and config not in configs:
+        if configs is None or not config:
+            pass
+        elif config not in configs:
             row.mistake(f'config "{config}": no such line configuration; {did_you_mean(config, configs)}')
-        elif config and not set(phases) <= set(configs[config].phases):
+        elif not set(phases) <= set(configs[config].phases):
             row.mistake(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
         if name in lines:
             row.mistake(f'line "{name}": there is one of this name already; names must differ')

@@ -31,15 +31,23 @@ def did_you_mean(text: str, known: Collection[str]) -> str:
 
 
 class Row:
-    """One line of a table. Every reader notes a mistake and returns a harmless stand-in when the cell is wrong."""
+    """One line of a table. Every reader notes a mistake and returns a harmless stand-in when the cell is wrong.
+
+    Attributes
+    ----------
+    mistaken : bool
+        Whether a mistake was noted so far.
+    """
 
     def __init__(self, file: str, number: int, cells: dict[str, str], mistakes: list[str]) -> None:
         self._where = f"{file} row {number}"
         self._cells = cells
         self._mistakes = mistakes
+        self.mistaken = False
 
     def mistake(self, text: str) -> None:
         """Note that something is wrong with this row."""
+        self.mistaken = True
         self._mistakes.append(f"{self._where}: {text}")
 
     def text(self, column: str, default: str | None = None) -> str:
@@ -112,6 +120,11 @@ class Table:
         Where mistakes are noted.
     required : bool
         Whether it is a mistake if the file does not exist; else it then has no rows.
+
+    Attributes
+    ----------
+    readable : bool
+        Whether its rows are what the file says; if not, references to them cannot be judged.
     """
 
     def __init__(
@@ -120,7 +133,12 @@ class Table:
         self.file = file
         self._mistakes = mistakes
         self._rows: list[Row] = []
-        path = folder / file
+        before = len(mistakes)
+        self._open(folder / file, columns, required)
+        self.readable = len(mistakes) == before
+
+    def _open(self, path: Path, columns: Collection[str], required: bool) -> None:
+        file, mistakes = self.file, self._mistakes
         if not path.is_file():
             if required:
                 mistakes.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")

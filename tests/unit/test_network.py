@@ -1,0 +1,396 @@
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from plant.equipment import Bus, Feeder, Line, LineConfig, Load, Source, Switch, Transformer
+from plant.merging import merge_nodes
+from plant.network import Network, solve_power_flow
+from plant.tables import read_feeder
+
+IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+PAPER_ISLANDS = ("13-152", "sw1_2", "sw2_3")
+
+
+@pytest.fixture(scope="module")
+def network() -> Network:
+    """The networked microgrids."""
+    return Network(read_feeder("microgrid123"))
+
+
+@pytest.fixture(scope="module")
+def standard() -> Network:
+    """The standard feeder."""
+    return Network(read_feeder("standard123"))
+
+
+def opened(network: Network, *switches: str) -> frozenset[str]:
+    """Switches that are still closed after opening some of the first ones."""
+    return network.closed0 - {network.switch_name(text) for text in switches}
+
+
+def zones(network: Network, *names: str) -> frozenset[str]:
+    """Buses of some zones of the microgrids."""
+    return frozenset(bus.name for bus in network.feeder.buses if bus.zone in names)
+
+
+def feeder(**tables: Any) -> Feeder:
+    """A feeder of which only some tables have rows."""
+    empty: dict[str, Any] = dict.fromkeys(("lines", "line_configs", "switches", "loads", "capacitors"), ())
+    empty |= dict.fromkeys(("regulators", "transformers", "inverters"), ())
+    return Feeder(name="test", load_set="test", **(empty | {"source": None} | tables))
+
+
+def three_phase_bus(name: str, V_nom: float = 2400.0) -> Bus:
+    """A bus with all phases."""
+    return Bus(name=name, phases="ABC", V_nom=V_nom)
+
+
+# --- nodes, source, switches
+
+
+def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:
+    """Nodes follow buses.csv and then A, B, C; index finds them again."""
+    assert network.nodes[:5] == (("1", "A"), ("1", "B"), ("1", "C"), ("2", "B"), ("3", "C"))
+    assert [network.index(*node) for node in network.nodes] == list(range(286))
+
+
+def test_nominal_phasors(network: Network) -> None:
+    """Nominal phasors are V_nom at 0, -120, +120 degrees, behind the delta-delta transformer too."""
+    a, b, c = (network.nominal[network.index("610", phase)] for phase in "ABC")
+
+    assert abs(a) == pytest.approx(480 / 3**0.5)
+    np.testing.assert_allclose(np.degrees(np.angle([a, b, c])), [0.0, -120.0, 120.0], atol=1e-12)
+
+
+def test_source_is_bus_150_at_nominal_voltage(network: Network) -> None:
+    """The substation is bus 150 at 1.0 pu, and its nodes represent themselves."""
+    assert [network.nodes[i] for i in network.source_nodes] == [("150", "A"), ("150", "B"), ("150", "C")]
+    np.testing.assert_allclose(network.source_voltage, network.nominal[network.source_nodes])
+    merge = network.merge(network.closed0)
+    assert list(merge.representative[network.source_nodes]) == list(network.source_nodes)
+
+
+@pytest.mark.parametrize("text", ["67s-67", "67-67s", "sw1_2"])
+def test_switch_is_found_by_every_name(network: Network, text: str) -> None:
+    """A switch answers to its buses in both orders and to its alias."""
+    assert network.switch_name(text) == "67s-67"
+
+
+def test_unknown_switch_is_told_with_the_nearest(network: Network) -> None:
+    """An unknown switch is told with the one that was probably meant."""
+    with pytest.raises(ValueError, match=r'switch "13-125": no such switch in .*; did you mean "13-152"'):
+        network.switch_name("13-125")
+    with pytest.raises(ValueError, match=r'switch "zebra": no such switch in .*; there are 13-152, 60-160'):
+        network.switch_name("zebra")
+
+
+def test_aliases_are_not_names(network: Network) -> None:
+    """A set of closed switches holds names; an alias or a misspelled name in it is an error, not an open switch."""
+    with pytest.raises(ValueError, match=r'"sw1_2" is not in Network.switches; pass it through switch_name'):
+        network.admittance(frozenset({"sw1_2"}))
+
+
+# --- islands
+
+
+def test_all_is_one_island_at_first(network: Network) -> None:
+    """Grid-connected, every bus hangs together."""
+    assert network.islands(network.closed0) == (frozenset(bus.name for bus in network.feeder.buses),)
+
+
+def test_event_1_islands_the_microgrids(network: Network) -> None:
+    """Opening 13-152 leaves 1-34 with the substation and islands everything beyond."""
+    assert network.islands(opened(network, "13-152")) == (
+        zones(network, "rest"),
+        zones(network, "passive", "MG1", "MG2", "MG3"),
+    )
+
+
+def test_event_2_drops_the_passive_zone(network: Network) -> None:
+    """Opening 60-160 as well leaves the passive zone dead and the three microgrids together."""
+    assert set(network.islands(opened(network, "13-152", "60-160"))) == {
+        zones(network, "rest"),
+        zones(network, "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
+def test_opening_60_160_alone_keeps_the_passive_zone_on_the_grid(network: Network) -> None:
+    """With 13-152 closed, opening 60-160 leaves the passive zone with the substation."""
+    assert set(network.islands(opened(network, "60-160"))) == {
+        zones(network, "rest", "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
+def test_three_microgrids(network: Network) -> None:
+    """sw1_2 and sw2_3 split the island into MG1 with the passive zone, MG2 and MG3, one GFM in each."""
+    islands = network.islands(opened(network, *PAPER_ISLANDS))
+
+    assert set(islands) == {
+        zones(network, "rest"),
+        zones(network, "passive", "MG1"),
+        zones(network, "MG2"),
+        zones(network, "MG3"),
+    }
+    grid_forming = {inverter.bus for inverter in network.inverters if inverter.kind == "GFM"}
+    assert sorted(len(grid_forming & island) for island in islands) == [0, 1, 1, 1]
+
+
+def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
+    """Islands come in the order of their first bus in the table, whatever the switches."""
+    order = [bus.name for bus in network.feeder.buses]
+    islands = network.islands(opened(network, *PAPER_ISLANDS, "60-160"))
+
+    firsts = [min(order.index(bus) for bus in island) for island in islands]
+    assert firsts == sorted(firsts)
+    assert sum(len(island) for island in islands) == len(order)
+
+
+# --- merging and admittance
+
+
+def test_closing_again_restores_exactly(network: Network) -> None:
+    """The matrix is a function of the switches alone: opened and closed again, it is the same to the bit."""
+    before = network.admittance(network.closed0)
+    apart = network.admittance(opened(network, *PAPER_ISLANDS))
+    after = network.admittance(opened(network, *PAPER_ISLANDS) | set(map(network.switch_name, PAPER_ISLANDS)))
+
+    assert np.array_equal(before.toarray(), after.toarray())
+    assert not np.array_equal(before.toarray(), apart.toarray())
+
+
+def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
+    """The admittance matrix is symmetric and has no entry between two islands."""
+    closed = opened(network, *PAPER_ISLANDS, "60-160")
+    Y = network.admittance(closed)
+    island_of = {bus: i for i, island in enumerate(network.islands(closed)) for bus in island}
+    label = np.array([island_of[bus] for bus, _ in network.nodes])
+    entries = Y.tocoo()
+
+    assert abs(Y - Y.T).max() < 1e-9 * abs(Y).max()
+    assert np.array_equal(label[entries.row], label[entries.col])
+
+
+def test_only_representatives_have_entries(network: Network) -> None:
+    """Rows and columns of nodes that follow another one are empty; each representative is its own, at ratio 1."""
+    merge = network.merge(network.closed0)
+    followers = np.setdiff1d(np.arange(len(network.nodes)), merge.representatives)
+    Y = network.admittance(network.closed0)
+
+    assert len(followers) > 0
+    assert abs(Y[followers]).sum() == abs(Y[:, followers]).sum() == 0.0
+    assert np.all(merge.ratio[merge.representatives] == 1.0)
+    terminals = [network.index(inverter.bus, phase) for inverter in network.inverters for phase in "ABC"]
+    assert np.isin(terminals, merge.representatives).all()
+
+
+def test_merging_keeps_power(standard: Network) -> None:
+    """Power at the representatives equals power at all nodes, also across regulators: ideal devices take none."""
+    merge = standard.merge(standard.closed0)
+    random = np.random.default_rng(3)
+    V_rep = standard.nominal * random.uniform(0.9, 1.1, len(standard.nodes))
+    current = random.normal(size=len(standard.nodes)) + 1j * random.normal(size=len(standard.nodes))
+
+    at_nodes = merge.expand(V_rep) @ np.conj(current)
+    at_representatives = V_rep @ np.conj(merge.gather(current))
+
+    assert at_representatives == pytest.approx(at_nodes, rel=1e-12)
+    np.testing.assert_allclose(merge.matrix() @ V_rep, merge.expand(V_rep))
+
+
+def test_regulators_hold_their_ratio(standard: Network) -> None:
+    """Each regulator's output is 1 + 0.00625 tap times its input, with the published taps."""
+    V = solve_power_flow(standard, standard.closed0).V
+    gain = {
+        (bus, phase): abs(V[standard.index(bus + "r", phase)] / V[standard.index(bus, phase)])
+        for bus, phase in (("150", "A"), ("9", "A"), ("25", "A"), ("25", "C"), ("160", "A"), ("160", "C"))
+    }
+
+    assert list(gain.values()) == pytest.approx([1 + 0.00625 * tap for tap in (7, -1, 0, -1, 8, 5)], rel=1e-14)
+
+
+def test_ideal_switches_are_the_limit_of_small_impedances(standard: Network) -> None:
+    """Very short lines in place of the closed switches give the same voltages, only less exactly."""
+    table = standard.feeder
+    short = LineConfig(
+        name="short", phases="ABC", Z=tuple(tuple(1e-3j * x for x in row) for row in IDENTITY), B=((0.0,) * 3,) * 3
+    )
+    lines = [
+        Line(name=s.name, from_bus=s.from_bus, to_bus=s.to_bus, phases=s.phases, config="short", length=1e-3)
+        for s in table.switches
+        if s.closed
+    ]
+    other = Network(
+        msgspec.structs.replace(
+            table, switches=(), lines=(*table.lines, *lines), line_configs=(*table.line_configs, short)
+        )
+    )
+
+    ideal = solve_power_flow(standard, standard.closed0).V
+    nearly = solve_power_flow(other, frozenset(), tolerance=1e-9).V
+
+    assert 1e-6 < np.abs(ideal - nearly).max() < 5e-3
+
+
+def test_parallel_regulator_and_switch_are_an_error() -> None:
+    """Two ties between the same nodes at different ratios are a short circuit, which is told with both nodes."""
+    with pytest.raises(ValueError, match=r"a bus and b bus are tied twice, at 1.00000 and at 1.05000"):
+        merge_nodes(["a bus", "b bus"], [(0, 1, 1.0), (0, 1, 1.05)], [])
+
+
+def test_ties_in_a_loop_are_no_error() -> None:
+    """Closed switches in a ring tie their nodes more often than needed, which is harmless."""
+    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.0), (1, 2, 1.0), (2, 0, 1.0)], [2])
+
+    assert merge.representative.tolist() == [2, 2, 2]
+    assert merge.ratio.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_ratios_multiply_along_a_chain() -> None:
+    """Through two regulators in a row, and against their direction, ratios multiply."""
+    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.05), (1, 2, 1.1)], [1])
+
+    assert merge.representative.tolist() == [1, 1, 1]
+    np.testing.assert_allclose(merge.ratio, [1 / 1.05, 1.0, 1.1])
+
+
+# --- branches
+
+
+def test_lines_without_charging_carry_no_current_at_equal_voltages() -> None:
+    """A line's series admittance sees only voltage differences; with charging, half its capacitance is at each end."""
+    config = LineConfig(
+        name="c",
+        phases="ABC",
+        Z=tuple(tuple((0.3 + 0.9j) * x for x in row) for row in IDENTITY),
+        B=tuple(tuple(4e-6 * x for x in row) for row in IDENTITY),
+    )
+    line = Line(name="l", from_bus="1", to_bus="2", phases="AC", config="c", length=2.0)
+    table = feeder(buses=(three_phase_bus("1"), three_phase_bus("2")), lines=(line,), line_configs=(config,))
+    V = np.full(6, 2400.0 + 0j)
+
+    bare, charged = (Network(table, line_charging=charging).Y_branches @ V for charging in (False, True))
+
+    np.testing.assert_allclose(bare, 0.0, atol=1e-9)
+    np.testing.assert_allclose(charged, 2400.0 * 4e-6j * np.array([1, 0, 1, 1, 0, 1]), atol=1e-9)
+
+
+@pytest.mark.parametrize("connection", ["D-D", "Yg-Yg"])
+def test_transformer_impedance_and_ratio(connection: Any) -> None:
+    """Short-circuited at its secondary, a transformer draws 1/z of its rated current; open, it has its ratio."""
+    z = 0.0127 + 0.0272j
+    transformer = Transformer(name="t", from_bus="1", to_bus="2", connection=connection, S_rated=150e3, z=z)
+    network = Network(
+        feeder(buses=(three_phase_bus("1", 2400.0), three_phase_bus("2", 240.0)), transformers=(transformer,))
+    )
+    Y = network.Y_branches.toarray()
+    V = network.nominal[:3]
+
+    short_circuit = Y[:3, :3] @ V
+    open_secondary = -np.linalg.solve(Y[3:, 3:], Y[3:, :3] @ V)
+
+    np.testing.assert_allclose(short_circuit, V / 2400.0 * 150e3 / (3 * 2400.0) / z, rtol=1e-12)
+    np.testing.assert_allclose(open_secondary, V / 10.0, rtol=1e-12)
+
+
+def test_delta_transformer_passes_no_zero_sequence() -> None:
+    """A voltage common to all phases drives no current through a delta winding."""
+    transformer = Transformer(name="t", from_bus="1", to_bus="2", connection="D-D", S_rated=150e3, z=0.01 + 0.03j)
+    network = Network(feeder(buses=(three_phase_bus("1"), three_phase_bus("2")), transformers=(transformer,)))
+
+    current = network.Y_branches @ np.array([1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0])
+
+    np.testing.assert_allclose(current, 0.0, atol=1e-9)
+
+
+def test_capacitors_give_their_reactive_power_at_rated_voltage(network: Network) -> None:
+    """The banks of the feeder give 750 kvar together at their rated voltage."""
+    V = network.nominal * 2401.8 / (4160 / 3**0.5)
+
+    assert V @ np.conj(network.Y_capacitors @ V) == pytest.approx(-750e3j)
+
+
+# --- power flow
+
+
+def two_buses(load: complex) -> Network:
+    """A source, a line of 1 + 1j ohm per phase, a constant-power load, and a switch to a third bus."""
+    config = LineConfig(
+        name="c",
+        phases="ABC",
+        Z=tuple(tuple((1 + 1j) * x for x in row) for row in IDENTITY),
+        B=((0.0,) * 3,) * 3,
+    )
+    return Network(
+        feeder(
+            buses=tuple(three_phase_bus(name) for name in "123"),
+            lines=(Line(name="l", from_bus="1", to_bus="2", phases="ABC", config="c", length=1.0),),
+            line_configs=(config,),
+            switches=(Switch(name="2-3", alias="", from_bus="2", to_bus="3", phases="ABC", closed=True),),
+            loads=(Load(bus="3", connection="Y", model="P", S=(load,) * 3),),
+            source=Source(bus="1", V_pu=1.02, angle=0.1),
+        )
+    )
+
+
+def test_power_flow_satisfies_the_equations(network: Network) -> None:
+    """At the solution, currents into every node but the source's sum to zero, and the power balance closes."""
+    solved = solve_power_flow(network, network.closed0)
+    merge = network.merge(network.closed0)
+    parts: sp.csc_array = network.Y_branches + network.Y_capacitors + network.Y_loads
+    residual = merge.gather(parts @ solved.V + network.loads().currents(solved.V))
+    source = solved.V[network.source_nodes] @ np.conj(residual[network.source_nodes])
+    residual[network.source_nodes] = 0.0
+
+    assert np.abs(residual).max() < 1e-4
+    assert source == pytest.approx(solved.S_source, rel=1e-9)
+    assert solved.S_source == pytest.approx(solved.S_loads + solved.S_losses + solved.S_capacitors, rel=1e-12)
+
+
+def test_dead_buses_have_no_voltage_and_no_load() -> None:
+    """What the substation does not reach has zero volts and takes no power."""
+    network = two_buses(100e3 + 50e3j)
+
+    solved = solve_power_flow(network, frozenset())
+
+    np.testing.assert_allclose(np.abs(solved.V), [2448.0] * 6 + [0.0] * 3)
+    assert solved.S_loads == 0
+    assert abs(solved.S_source) < 1e-3
+
+
+def test_injection_and_shunt_are_part_of_the_balance() -> None:
+    """A current fed in at the load relieves the source by its power; a shunt takes its own."""
+    network = two_buses(100e3 + 50e3j)
+    at = [network.index("3", phase) for phase in "ABC"]
+    shunt = np.zeros(9, dtype=np.complex128)
+    shunt[at] = 1e-3 - 2e-3j
+
+    def feed(V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        current = np.zeros(9, dtype=np.complex128)
+        current[at] = np.conj((100e3 + 50e3j) / V[at]) + shunt[at] * V[at]
+        return current
+
+    solved = solve_power_flow(network, network.closed0, shunt=shunt, injection=feed)
+
+    np.testing.assert_allclose(np.abs(solved.V), 2448.0, rtol=1e-9)
+    assert abs(solved.S_source) < 1.0
+    assert solved.S_loads == pytest.approx(300e3 + 150e3j)
+
+
+def test_unbearable_load_is_told() -> None:
+    """A load beyond what the line can carry ends in an error that names the bus, not in numbers."""
+    network = two_buses(5e6 + 0j)
+
+    with pytest.raises(ArithmeticError, match=r"power flow did not converge: after \d+ iterations bus [23] phase"):
+        solve_power_flow(network, network.closed0)
+
+
+def test_feeder_without_source_has_no_power_flow() -> None:
+    """Without a substation there is no slack, and the error says so."""
+    with pytest.raises(ValueError, match='feeder "test" has no source'):
+        solve_power_flow(Network(feeder(buses=(three_phase_bus("1"),))), frozenset())

@@ -1,0 +1,256 @@
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+
+from plant.equipment import Feeder
+from plant.tables import FeederError, feeders, read_feeder
+from plant.tables.read import DATA
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A copy of microgrid123 to break."""
+    return Path(shutil.copytree(DATA / "microgrid123", tmp_path / "mine"))
+
+
+def edit(folder: Path, file: str, row: int, **cells: str) -> None:
+    """Change cells of one row; the header is row 1, a row beyond the end repeats the last one."""
+    with (folder / file).open(newline="") as stream:
+        table = list(csv.DictReader(stream))
+    if row - 2 == len(table):
+        table.append(dict(table[-1]))
+    table[row - 2] |= cells
+    with (folder / file).open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, list(table[0]))
+        writer.writeheader()
+        writer.writerows(table)
+
+
+def mistakes(folder: Path, load_set: str = "main") -> tuple[str, ...]:
+    """What reading a broken feeder tells."""
+    with pytest.raises(FeederError) as caught:
+        read_feeder(str(folder), load_set)
+    return caught.value.mistakes
+
+
+def zone_powers(feeder: Feeder) -> dict[str, complex]:
+    """Sum of the loads of each zone (VA)."""
+    zone = {bus.name: bus.zone for bus in feeder.buses}
+    powers: dict[str, complex] = {}
+    for load in feeder.loads:
+        powers[zone[load.bus]] = powers.get(zone[load.bus], 0j) + sum(load.S)
+    return powers
+
+
+def test_standard_feeder_has_the_published_load() -> None:
+    """The standard feeder's spot loads add up to the published 3490 kW and 1920 kvar."""
+    feeder = read_feeder("standard123")
+
+    assert sum(sum(load.S) for load in feeder.loads) == 3490e3 + 1920e3j
+    assert (len(feeder.buses), len(feeder.lines), len(feeder.loads), len(feeder.inverters)) == (130, 118, 85, 0)
+
+
+def test_zones_of_the_microgrids_carry_their_loads() -> None:
+    """Load set main has 760, 1252, 985 and 1195 kW in its four zones; MG1 has only inverters of its own."""
+    assert zone_powers(read_feeder("microgrid123", "main")) == {
+        "rest": 760e3 + 380e3j,
+        "passive": 1252e3 + 660e3j,
+        "MG2": 985e3 + 550e3j,
+        "MG3": 1195e3 + 690e3j,
+    }
+
+
+def test_event2_load_set_drops_more() -> None:
+    """Load set event2 has 1360 kW in the zone that event 2 drops, and 0.95 of the load in MG2 and MG3."""
+    main, event2 = (zone_powers(read_feeder("microgrid123", load_set)) for load_set in ("main", "event2"))
+
+    assert event2["passive"].real == 1360e3
+    assert event2["MG2"] == pytest.approx(0.95 * main["MG2"])
+    assert event2["MG3"] == pytest.approx(0.95 * main["MG3"])
+
+
+def test_inverters_are_those_of_the_paper() -> None:
+    """Three GFM of 600 kW and six GFL of 350 kW, 1 % and 5 % droop, three in each microgrid."""
+    inverters = read_feeder("microgrid123").inverters
+
+    assert [inverter.name for inverter in inverters] == [f"inv{i}" for i in range(1, 10)]
+    assert {inverter.name for inverter in inverters if inverter.kind == "GFM"} == {"inv1", "inv4", "inv7"}
+    assert {(inverter.kind, inverter.P_rated) for inverter in inverters} == {("GFM", 600e3), ("GFL", 350e3)}
+    assert {(inverter.m_p, inverter.m_q) for inverter in inverters} == {(0.01, 0.05)}
+    assert [inverter.microgrid for inverter in inverters] == ["MG1"] * 3 + ["MG2"] * 3 + ["MG3"] * 3
+
+
+def test_quantities_are_in_si_units() -> None:
+    """Tables give kV, kW, m; the feeder has V (line-to-neutral), W, km."""
+    feeder = read_feeder("microgrid123")
+
+    assert feeder.buses[0].V_nom == pytest.approx(4160 / 3**0.5)
+    assert feeder.lines[0].length == pytest.approx(175 * 0.3048e-3)
+    config = next(config for config in feeder.line_configs if config.name == "1")
+    assert config.Z[0][1] == pytest.approx((0.1560 + 0.5017j) / 1.609344)
+    assert config.Z[1][0] == config.Z[0][1]
+    assert config.B[0][0] == pytest.approx(5.6765e-6 / 1.609344)
+
+
+def test_folder_can_be_read_by_its_path(folder: Path) -> None:
+    """A feeder outside of the package is read from the path of its folder."""
+    feeder = read_feeder(str(folder), "event2")
+
+    assert (feeder.name, feeder.load_set) == ("mine", "event2")
+    assert feeder.loads == read_feeder("microgrid123", "event2").loads
+
+
+MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
+    ("buses.csv", 3, {"phases": "BX"}, 'phases must be letters out of A, B, C, each once (as "ABC" or "B"), got "BX"'),
+    ("buses.csv", 3, {"V_nom_kV_LL": "-4.16"}, "V_nom_kV_LL must be greater than 0 kV, got -4.16 kV"),
+    ("buses.csv", 136, {"bus": "162"}, 'bus "162": there is one of this name already; names must differ'),
+    ("buses.csv", 136, {"bus": "999", "phases": "AB"}, 'bus "999" phase A, B: nothing connects it; '),
+    ("lines.csv", 5, {"to_bus": "47x"}, 'to_bus "47x": no such bus; did you mean "47"?'),
+    ("lines.csv", 5, {"to_bus": ""}, "to_bus is empty; give a name"),
+    ("lines.csv", 5, {"to_bus": "3"}, 'both ends are bus "3"; a branch needs two buses'),
+    ("lines.csv", 2, {"phases": "A", "config": "9"}, 'bus "2" has no phase A; it has B'),
+    ("lines.csv", 4, {"length_m": "-5"}, "length_m must be greater than 0 m, got -5 m"),
+    ("lines.csv", 4, {"length_m": "0"}, "length_m must be greater than 0 m, got 0 m"),
+    ("lines.csv", 4, {"length_m": "300 ft"}, 'length_m must be a number, got "300 ft"'),
+    ("lines.csv", 4, {"length_m": "nan"}, 'length_m must be a number, got "nan"'),
+    ("lines.csv", 4, {"config": "13"}, 'config "13": no such line configuration; '),
+    ("lines.csv", 4, {"config": "7"}, 'config "7" is for phases AC, the line carries ABC'),
+    ("lines.csv", 3, {"line": "L1_2"}, 'line "L1_2": there is one of this name already; names must differ'),
+    ("lines.csv", 122, {"line": "extra", "to_bus": "610"}, "a line between buses of 4.16 kV and 0.48 kV; "),
+    ("line_configs.csv", 3, {"phase_2": "D"}, 'phase_2 "D": no such phase; choose one of A, B, C'),
+    ("line_configs.csv", 2, {"R_ohm_per_km": "0"}, "R_ohm_per_km must be greater than 0 ohm/km, got 0 ohm/km"),
+    ("line_configs.csv", 53, {}, 'config "12" element C-C: given already; give each element once'),
+    ("switches.csv", 2, {"state": "shut"}, 'state "shut": no such state of a switch; choose one of closed, open'),
+    ("switches.csv", 12, {"from_bus": "94", "to_bus": "54"}, 'switch "94-54": there is one of this name already; '),
+    ("switches.csv", 5, {"alias": "sw1_2"}, 'switch "sw1_2": there is one of this name already; names must differ'),
+    ("switches.csv", 11, {"phases": "AB"}, 'bus "94" has no phase B; it has A'),
+    ("regulators.csv", 3, {"tap": ""}, 'tap must be a number, got ""'),
+    ("regulators.csv", 3, {"tap": "-161"}, "tap and tap_step_pu give a ratio of -0.00625; it must be positive"),
+    ("regulators.csv", 5, {"phases": "A"}, 'regulator "reg3" phase A: given already; give each phase once'),
+    ("transformers.csv", 2, {"connection": "D-Yg"}, 'connection "D-Yg": no such connection of a transformer; '),
+    ("transformers.csv", 2, {"X_percent": "0"}, "X_percent must be greater than 0 %, got 0 %"),
+    ("transformers.csv", 3, {}, 'transformer "XFM1": there is one of this name already; names must differ'),
+    ("loads_main.csv", 12, {"bus": "47x"}, 'bus "47x": no such bus; did you mean "47"?'),
+    ("loads_main.csv", 2, {"model": "ZIP"}, 'model "ZIP": no such load model; choose one of P, I, Z'),
+    ("loads_main.csv", 2, {"connection": "W"}, 'connection "W": no such connection of a load; choose one of Y, D'),
+    ("loads_main.csv", 3, {"P_c_kW": "5"}, 'bus "2" has a load on phase C but no phase C; it has B'),
+    ("loads_main.csv", 3, {"connection": "D"}, 'bus "2" has a load between B and C but no phase C; it has B'),
+    ("loads_main.csv", 3, {"Q_b_kvar": "ten"}, 'Q_b_kvar must be a number, got "ten"'),
+    ("capacitors.csv", 3, {"Q_b_kvar": "50"}, 'bus "88" has no phase B; it has A'),
+    ("capacitors.csv", 3, {"Q_a_kvar": "-50"}, "Q_a_kvar must not be less than 0 kvar, got -50 kvar"),
+    ("capacitors.csv", 3, {"V_rated_kV_LN": "0"}, "V_rated_kV_LN must be greater than 0 kV, got 0 kV"),
+    ("inverters.csv", 3, {"bus": "160"}, 'bus "160" has inverter "inv1" already; only one can stand on a bus'),
+    ("inverters.csv", 3, {"bus": "94"}, 'bus "94" has no phase B, C; it has A'),
+    ("inverters.csv", 3, {"name": "inv1"}, 'inverter "inv1": there is one of this name already; names must differ'),
+    ("inverters.csv", 3, {"kind": "PV"}, 'kind "PV": no such kind of inverter; choose one of GFM, GFL'),
+    ("inverters.csv", 3, {"P_rated_kW": "0"}, "P_rated_kW must be greater than 0 kW, got 0 kW"),
+    ("source.csv", 3, {}, "a second source; a feeder has one at most"),
+    ("source.csv", 2, {"V_pu": "0"}, "V_pu must be greater than 0 pu, got 0 pu"),
+]
+
+
+@pytest.mark.parametrize(("file", "row", "cells", "told"), MISTAKES, ids=[f"{m[0]}-{m[3][:40]}" for m in MISTAKES])
+def test_mistake_is_told(folder: Path, file: str, row: int, cells: dict[str, str], told: str) -> None:
+    """Every kind of mistake is told once, with file, row, value and what would be right, and drags no others behind."""
+    edit(folder, file, row, **cells)
+
+    found = mistakes(folder)
+
+    assert len(found) == 1, found
+    assert found[0].startswith(f"{file} row {row}: {told}")
+
+
+def test_all_mistakes_come_at_once(folder: Path) -> None:
+    """Mistakes in several tables are raised together, in one exception whose text lists them."""
+    edit(folder, "lines.csv", 4, length_m="-5", config="13")
+    edit(folder, "loads_main.csv", 12, bus="47x", model="PQ")
+    edit(folder, "inverters.csv", 2, bus="")
+
+    with pytest.raises(FeederError, match="has 5 mistakes") as caught:
+        read_feeder(str(folder))
+
+    assert len(caught.value.mistakes) == 5
+    assert all(mistake in str(caught.value) for mistake in caught.value.mistakes)
+
+
+def test_missing_file_is_told_alone(folder: Path) -> None:
+    """A missing table is one mistake, not one for every reference into it."""
+    (folder / "buses.csv").unlink()
+    (folder / "line_configs.csv").unlink()
+
+    assert [mistake.split(";")[0] for mistake in mistakes(folder)] == [
+        "buses.csv: no such file",
+        "line_configs.csv: no such file",
+    ]
+
+
+def test_missing_column_is_told_alone(folder: Path) -> None:
+    """A missing column is told with the nearest one that is there."""
+    lines = (folder / "lines.csv").read_text().replace("length_m", "length", 1)
+    (folder / "lines.csv").write_text(lines)
+
+    assert 'lines.csv: no column "length_m"; did you mean "length"?' in mistakes(folder)
+
+
+def test_misnamed_file_is_told(folder: Path) -> None:
+    """A file that is no table of a feeder is a mistake, for optional tables would else be missed silently."""
+    (folder / "inverters.csv").rename(folder / "inverter.csv")
+
+    assert mistakes(folder) == ('inverter.csv: not a table of a feeder; did you mean "inverters.csv"?',)
+
+
+def test_surplus_cells_are_told(folder: Path) -> None:
+    """A row longer than the header, as an unquoted comma makes it, is a mistake."""
+    with (folder / "transformers.csv").open("a") as stream:
+        stream.write("XFM2,61,610,D-D,150,1.27,2.72,no load, or little\n")
+
+    assert mistakes(folder)[0].startswith("transformers.csv row 3: 1 cells more than the header has columns")
+
+
+def test_unreadable_file_is_told(folder: Path) -> None:
+    """A file that is not UTF-8 text is a mistake of the feeder, not an exception of another kind."""
+    (folder / "loads_main.csv").write_bytes(b"\xff\xfe\x00bus")
+
+    assert mistakes(folder)[0].startswith("loads_main.csv: not a CSV file in UTF-8")
+
+
+def test_incomplete_matrix_is_told(folder: Path) -> None:
+    """A line configuration that lacks an element of its matrix is a mistake."""
+    text = (folder / "line_configs.csv").read_text()
+    (folder / "line_configs.csv").write_text("".join(x for x in text.splitlines(True) if not x.startswith("1,A,B")))
+
+    assert mistakes(folder)[0].endswith('config "1" lacks element A-B; give the whole upper triangle')
+
+
+def test_unknown_load_set_is_told_with_the_choice(folder: Path) -> None:
+    """An unknown load set is told with those that exist."""
+    assert mistakes(folder, "man") == ('load set "man": no such set; there are event2, main',)
+
+
+def test_feeder_without_load_sets_is_told(folder: Path) -> None:
+    """A feeder without any load table is told which file it needs."""
+    for path in folder.glob("loads_*.csv"):
+        path.unlink()
+
+    assert mistakes(folder)[0].startswith("loads_main.csv: no such file; a feeder needs it, with the columns bus,")
+
+
+def test_unknown_feeder_is_told_with_the_choice() -> None:
+    """An unknown feeder is told with those that come with the package."""
+    with pytest.raises(FeederError, match="no such feeder and no such folder; there are microgrid123, standard123"):
+        read_feeder("microgrid321")
+
+    assert feeders() == ("microgrid123", "standard123")
+
+
+def test_feeder_fed_by_inverters_only_needs_no_source(folder: Path) -> None:
+    """Tables that a feeder does not need may be missing: here no substation, no capacitor, no transformer row."""
+    (folder / "source.csv").unlink()
+    (folder / "capacitors.csv").unlink()
+
+    feeder = read_feeder(str(folder))
+
+    assert feeder.source is None
+    assert feeder.capacitors == ()
