@@ -10,6 +10,7 @@ from math import pi, sqrt
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
 from plant.loads import LoadBranches
@@ -149,7 +150,7 @@ class Network:
         number = {bus.name: i for i, bus in enumerate(feeder.buses)}
         rows, columns = ([number[end[side]] for end in ends] for side in (0, 1))
         graph = sp.coo_array((np.ones(len(ends)), (rows, columns)), shape=(len(number), len(number)))
-        _, label = sp.csgraph.connected_components(graph, directed=False)
+        _, label = connected_components(graph, directed=False)
         members: dict[int, list[str]] = {}
         for bus, of in zip(number, label, strict=True):
             members.setdefault(int(of), []).append(bus)

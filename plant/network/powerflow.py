@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import factorized
 
 from plant.loads import LoadBranches
 from plant.network.network import Network
@@ -85,7 +87,7 @@ def solve_power_flow(
         Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
     own = loads if loads is not None else network.loads()
     unknown = _reached(Y, network.source_nodes)
-    solve = sp.linalg.factorized(sp.csc_matrix(Y[unknown][:, unknown]))
+    solve = factorized(sp.csc_matrix(Y[unknown][:, unknown]))
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
 
     V_rep = np.zeros(len(network.nodes), dtype=np.complex128)
@@ -113,7 +115,7 @@ def solve_power_flow(
 
 def _reached(Y: sp.csc_array, source: NDArray[np.int64]) -> NDArray[np.int64]:
     """Nodes connected to the source through the matrix, without the source's own."""
-    _, label = sp.csgraph.connected_components(sp.csr_array(abs(Y)), directed=False)
+    _, label = connected_components(sp.csr_array(abs(Y)), directed=False)
     reached = np.isin(label, label[source])
     reached[source] = False
     return np.flatnonzero(reached).astype(np.int64)

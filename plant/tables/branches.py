@@ -138,6 +138,8 @@ def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tup
         if name in transformers:
             row.mistake(f'transformer "{name}": there is one of this name already; names must differ')
         elif ends:
+            if connection == "D-D":
+                buses.mark_floating(ends[1])
             transformers[name] = Transformer(
                 name=name,
                 from_bus=ends[0].name,

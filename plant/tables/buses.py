@@ -40,6 +40,7 @@ class BusTable:
                 self._by_name[name] = bus
                 self._row_of[name] = row
         self.rows = tuple(self._by_name.values())
+        self._floating: set[str] = set()
 
     def find(self, row: Row, column: str = "bus") -> Bus | None:
         """Read a reference to a bus; None, and a mistake noted, if there is no such bus."""
@@ -76,6 +77,18 @@ class BusTable:
             row.mistake(
                 f"a {what} between buses of {V_from:g} kV and {V_to:g} kV; "
                 f"it joins equal nominal voltages only, use transformers.csv"
+            )
+
+    def mark_floating(self, bus: Bus) -> None:
+        """Note that a bus stands behind a delta winding, where no current can return through ground."""
+        self._floating.add(bus.name)
+
+    def require_ground(self, row: Row, bus: Bus, what: str) -> None:
+        """Note a mistake if something connected to ground stands behind a delta winding."""
+        if bus.name in self._floating:
+            row.mistake(
+                f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; '
+                f"use delta loads there, or a Yg-Yg transformer"
             )
 
     def row_of(self, name: str) -> Row:

@@ -24,6 +24,8 @@ def read_loads(folder: Path, file: str, buses: BusTable, mistakes: list[str]) ->
         S = tuple(1000.0 * complex(row.number(f"P_{p}_kW"), row.number(f"Q_{p}_kvar")) for p in "abc")
         if bus is None:
             continue
+        if connection == "Y":
+            buses.require_ground(row, bus, "a Y load")
         across = ("A", "B", "C") if connection == "Y" else ("AB", "BC", "CA")
         for branch, power in zip(across, S, strict=True):
             missing = [phase for phase in branch if phase not in bus.phases]
@@ -52,6 +54,7 @@ def read_capacitors(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple
         V_rated = row.number("V_rated_kV_LN", above=0.0) * 1000.0
         if bus is not None:
             buses.require_phases(row, bus, [phase for phase, q in zip("ABC", Q, strict=True) if q])
+            buses.require_ground(row, bus, "a capacitor bank")
             capacitors.append(Capacitor(bus=bus.name, Q=(Q[0], Q[1], Q[2]), V_rated=V_rated))
     return tuple(capacitors)
 
@@ -72,6 +75,7 @@ def read_inverters(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[
         if bus is None:
             continue
         buses.require_phases(row, bus, "ABC")
+        buses.require_ground(row, bus, "an inverter")
         if bus.name in at:
             row.mistake(f'bus "{bus.name}" has inverter "{at[bus.name]}" already; only one can stand on a bus')
         at.setdefault(bus.name, name)

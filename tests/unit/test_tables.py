@@ -102,6 +102,7 @@ def test_folder_can_be_read_by_its_path(folder: Path) -> None:
     assert feeder.loads == read_feeder("microgrid123", "event2").loads
 
 
+FLOATING = 'bus "610" stands behind a delta winding without ground'
 MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("buses.csv", 3, {"phases": "BX"}, 'phases must be letters out of A, B, C, each once (as "ABC" or "B"), got "BX"'),
     ("buses.csv", 3, {"V_nom_kV_LL": "-4.16"}, "V_nom_kV_LL must be greater than 0 kV, got -4.16 kV"),
@@ -138,6 +139,24 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("loads_main.csv", 3, {"P_c_kW": "5"}, 'bus "2" has a load on phase C but no phase C; it has B'),
     ("loads_main.csv", 3, {"connection": "D"}, 'bus "2" has a load between B and C but no phase C; it has B'),
     ("loads_main.csv", 3, {"Q_b_kvar": "ten"}, 'Q_b_kvar must be a number, got "ten"'),
+    (
+        "loads_main.csv",
+        90,
+        {"bus": "610"},
+        f"{FLOATING}, and a Y load needs ground; ",
+    ),
+    (
+        "inverters.csv",
+        3,
+        {"bus": "610"},
+        f"{FLOATING}, and an inverter needs ground; ",
+    ),
+    (
+        "capacitors.csv",
+        7,
+        {"bus": "610"},
+        f"{FLOATING}, and a capacitor bank needs ground; ",
+    ),
     ("capacitors.csv", 3, {"Q_b_kvar": "50"}, 'bus "88" has no phase B; it has A'),
     ("capacitors.csv", 3, {"Q_a_kvar": "-50"}, "Q_a_kvar must not be less than 0 kvar, got -50 kvar"),
     ("capacitors.csv", 3, {"V_rated_kV_LN": "0"}, "V_rated_kV_LN must be greater than 0 kV, got 0 kV"),
