@@ -9,8 +9,8 @@ from plant.equipment import Feeder
 from scenarios.spec.mistakes import Mistakes, suggestion
 from scenarios.spec.model import Case, Scenario
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
-"""Names become folders and parts of keys."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
+"""Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
 
 
 def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
@@ -30,11 +30,20 @@ def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
                 "move it, or raise end_s",
             )
     for i, (first, second) in enumerate(pairwise(scenario.events)):
-        if not mistakes.touch(f"event[{i}].t_s", f"event[{i + 1}].t_s") and second.t_s <= first.t_s:
+        path, gap = f"event[{i + 1}].t_s", second.t_s - first.t_s
+        if mistakes.touch(f"event[{i}].t_s", path):
+            continue
+        if gap <= 0:
             mistakes.add(
-                f"event[{i + 1}].t_s",
+                path,
                 f'event "{second.label}" at {second.t_s:g} s is written after "{first.label}" at {first.t_s:g} s; '
                 "write events in the order of time, and what happens at once as one event",
+            )
+        elif not mistakes.touch("time.record_s") and gap < 1.5 * time.record_s:
+            mistakes.add(
+                path,
+                f'event "{second.label}" follows "{first.label}" by {gap:g} s, so that no recorded row lies between '
+                f"them to measure; write them as one event, or lower record_s = {time.record_s:g} s",
             )
 
 
@@ -46,7 +55,7 @@ def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
         *((f"event[{i}].label", event.label) for i, event in enumerate(scenario.events)),
     ]:
         if not mistakes.touch(path) and not _NAME.fullmatch(name):
-            mistakes.add(path, f'name "{name}" must be of letters, digits, "_", "-" and ".", as it names files')
+            mistakes.add(path, f'name "{name}" must be up to 31 letters, digits, "_", "-" or ".", as it names files')
     labels = [event.label for event in scenario.events]
     for i, label in enumerate(labels):
         if label in labels[:i]:

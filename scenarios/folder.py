@@ -1,0 +1,84 @@
+"""The run folder: where it is, that it is empty, what state the run in it is in."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from datetime import datetime
+from pathlib import Path
+
+RUNS = Path("runs")
+"""Where runs go when the user names no folder, seen from the working directory."""
+
+
+class FolderError(ValueError):
+    """The output folder cannot be used."""
+
+
+def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
+    """Choose and make the run folder.
+
+    Parameters
+    ----------
+    out : Path or None
+        What the user asked for; None makes `runs/<scenario>/<time>`, and `runs/<scenario>/latest` point to it.
+    scenario : str
+        Name of the scenario.
+    now : datetime
+        For the name.
+
+    Raises
+    ------
+    FolderError
+        If the folder has something in it, is a file, or cannot be made. Nothing is written then.
+    """
+    folder = out if out is not None else _free(RUNS / scenario, now)
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise FolderError(f"--out {folder}: this is a file; give a new or an empty folder")
+        if folder.is_dir() and any(folder.iterdir()):
+            raise FolderError(f"--out {folder}: the folder is not empty; give a new or an empty one")
+        folder.mkdir(parents=True, exist_ok=True)
+        set_status(folder, "running")
+    except OSError as error:
+        raise FolderError(
+            f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
+        ) from None
+    if out is None:
+        _point_latest(folder)
+    return folder
+
+
+def set_status(folder: Path, status: str) -> None:
+    """Write the one line of status.txt: "running", "complete", or "broken: why"."""
+    write_whole(folder / "status.txt", status.replace("\n", " ") + "\n")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file at once or not at all."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8", newline="\n")
+    partial.replace(path)
+
+
+def shown(folder: Path) -> str:
+    """Folder as short as it can be named from here."""
+    with contextlib.suppress(ValueError):
+        return str(folder.resolve().relative_to(Path.cwd().resolve()))
+    return str(folder)
+
+
+def _free(parent: Path, now: datetime) -> Path:
+    stem = now.strftime("%Y-%m-%dT%H-%M-%S")
+    folder, number = parent / stem, 2
+    while folder.exists():
+        folder, number = parent / f"{stem}-{number}", number + 1
+    return folder
+
+
+def _point_latest(folder: Path) -> None:
+    """Make `latest` a link to the folder; a file system without links goes without."""
+    latest, new = folder.parent / "latest", folder.parent / f".latest-{os.getpid()}"
+    with contextlib.suppress(OSError):
+        new.symlink_to(folder.name)
+        new.replace(latest)

@@ -1,0 +1,89 @@
+"""A recorded case as arrays, and the nameplates that its quantities are measured by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.equipment import InverterRow
+from scenarios.record import QUANTITIES, header
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plates:
+    """Nameplates of N inverters as arrays, in the order of the history's columns."""
+
+    names: tuple[str, ...]
+    """Names."""
+    GFM: NDArray[np.bool_]
+    """Which are grid-forming."""
+    s: Floats
+    """Rated real power s_i (W)."""
+    V_nom: Floats
+    """Nominal terminal voltage (V, line-to-neutral RMS)."""
+    m_p: Floats
+    """P-f droop (pu per pu)."""
+    m_q: Floats
+    """Q-V droop (pu per pu)."""
+
+    @classmethod
+    def of(cls, inverters: Sequence[InverterRow]) -> Plates:
+        """Take the nameplates from a feeder's inverters."""
+        return cls(
+            names=tuple(row.name for row in inverters),
+            GFM=np.array([row.kind == "GFM" for row in inverters]),
+            s=np.array([row.P_rated for row in inverters]),
+            V_nom=np.array([row.V_nom for row in inverters]),
+            m_p=np.array([row.m_p for row in inverters]),
+            m_q=np.array([row.m_q for row in inverters]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """One case: T rows of N inverters, terminal quantities as the plant told them."""
+
+    inverters: tuple[str, ...]
+    """Names, order of the columns."""
+    t: Floats
+    """Time (s), shape (T,)."""
+    f: Floats
+    """Frequency (Hz), shape (T, N)."""
+    P: Floats
+    """Real power (W), shape (T, N)."""
+    Q: Floats
+    """Reactive power (var), shape (T, N)."""
+    V: Floats
+    """Terminal voltage (V), shape (T, N)."""
+    P_set: Floats
+    """Real-power set-point (W), shape (T, N)."""
+    V_set: Floats
+    """Voltage set-point (V), shape (T, N)."""
+
+    @classmethod
+    def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]]) -> History:
+        """Arrays from recorded rows, see `wire.messages.Telemetry.rows`."""
+        table = np.array(rows, dtype=np.float64).reshape(len(rows), 1 + len(QUANTITIES) * len(inverters))
+        f, P, Q, V, P_set, V_set = np.moveaxis(table[:, 1:].reshape(len(rows), len(inverters), len(QUANTITIES)), 2, 0)
+        return cls(inverters=inverters, t=table[:, 0], f=f, P=P, Q=Q, V=V, P_set=P_set, V_set=V_set)
+
+
+def read_history(path: Path) -> History:
+    """Read history.csv back.
+
+    Raises
+    ------
+    ValueError
+        If its header is not that of a history.
+    """
+    lines = path.read_text(encoding="ascii").splitlines()
+    names = tuple(column.removesuffix("_f_Hz") for column in lines[0].split(",") if column.endswith("_f_Hz"))
+    if tuple(lines[0].split(",")) != header(names):
+        raise ValueError(f"{path.name}: the first line is not the header of a history: {lines[0][:80]}")
+    return History.of(names, [tuple(map(float, line.split(","))) for line in lines[1:]])

@@ -1,0 +1,170 @@
+"""The paper's measures of a run: abs(f - 60), MPSI (16), MQSI (17), V_error, and the time to restore.
+
+Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end.
+Powers enter per unit of each inverter's own rating (the paper writes kW in (9) and pu elsewhere).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.history import Floats, History, Plates
+
+STEADY = 0.2
+"""Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
+
+F_BAND, MPSI_BAND = 0.01, 0.01
+"""Frequency (Hz) and MPSI below which a microgrid counts as restored."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steady:
+    """What one event left behind."""
+
+    f_error_Hz: float
+    """abs(f - f_nom) (Hz), mean over the GFM."""
+    MPSI: float
+    """Mean power sharing index, (16)."""
+    V_error: float
+    """Mean of abs(V_i - 1) (pu)."""
+    MQSI: float
+    """Mean var sharing index, (17)."""
+    t_restore_s: float | None
+    """Time (s) from the event until abs(f - f_nom) < 0.01 Hz at every GFM and MPSI < 0.01 for good; None if never."""
+    p: dict[str, float]
+    """Real power of each inverter (pu of its rating)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """Time that belongs to one event."""
+
+    label: str
+    start: float
+    """Time of the event (s)."""
+    end: float
+    """Time of the next one, or the end of the run (s)."""
+
+
+def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
+    """Windows of events given as (label, time in s).
+
+    Examples
+    --------
+    >>> [(window.label, window.end) for window in windows([("event1", 1.0), ("event2", 4.0)], 7.0)]
+    [('event1', 4.0), ('event2', 7.0)]
+    """
+    ends = [*(t for _, t in events[1:]), end]
+    return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
+
+
+def eta(x: Floats, s: Floats, m: Floats) -> Floats:
+    r"""Equal-sharing value of each row, (9).
+
+    .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
+
+    Parameters
+    ----------
+    x : Floats
+        Powers (W or var), shape (T, N).
+    s : Floats
+        Ratings (W), shape (N,).
+    m : Floats
+        Droops (pu per pu), shape (N,).
+
+    Examples
+    --------
+    >>> eta(np.array([[300.0, 700.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
+    array([0.005])
+    """
+    total: Floats = x.sum(axis=1)
+    return total / float((s / m).sum())
+
+
+def sharing_index(x: Floats, s: Floats, m: Floats) -> Floats:
+    r"""Mean sharing index of each row: (16) with P and m_p, (17) with Q and m_q.
+
+    .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
+
+    It is not a number where nothing is shared (eta = 0).
+
+    Examples
+    --------
+    >>> sharing_index(np.array([[300.0, 700.0], [400.0, 600.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
+    array([0.        , 0.23809524])
+    """
+    equal = eta(x, s, m)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        index: Floats = np.abs((m * x / s - equal) / equal).mean(axis=1)
+    index[equal[:, 0] == 0.0] = np.nan
+    return index
+
+
+def mean_frequency(history: History, plates: Plates) -> Floats:
+    """Frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
+    f: Floats = history.f[:, plates.GFM].mean(axis=1)
+    return f
+
+
+def MPSI(history: History, plates: Plates) -> Floats:
+    """Mean power sharing index of each row, (16)."""
+    return sharing_index(history.P, plates.s, plates.m_p)
+
+
+def MQSI(history: History, plates: Plates) -> Floats:
+    """Mean var sharing index of each row, (17)."""
+    return sharing_index(history.Q, plates.s, plates.m_q)
+
+
+def V_error(history: History, plates: Plates) -> Floats:
+    """Mean of abs(V_i - 1) of each row (pu)."""
+    error: Floats = np.abs(history.V / plates.V_nom - 1.0).mean(axis=1)
+    return error
+
+
+def measure(history: History, plates: Plates, window: Window, f_nom: float) -> Steady:
+    """Measure one event of one case.
+
+    Parameters
+    ----------
+    history : History
+        The case as recorded.
+    plates : Plates
+        Nameplates in the order of its columns.
+    window : Window
+        The event's window. Rows at the very moments of events are left out: they belong to both sides.
+    f_nom : float
+        Nominal frequency (Hz).
+    """
+    assert plates.names == history.inverters
+    f_errors = np.abs(history.f[:, plates.GFM] - f_nom)
+    sharing = MPSI(history, plates)
+    inside = _between(history.t, window)
+    steady = inside & (history.t >= window.end - STEADY - 1e-9)
+    restored = (f_errors < F_BAND).all(axis=1) & (sharing < MPSI_BAND)
+    return Steady(
+        f_error_Hz=float(f_errors[steady].mean()),
+        MPSI=float(sharing[steady].mean()),
+        V_error=float(V_error(history, plates)[steady].mean()),
+        MQSI=float(MQSI(history, plates)[steady].mean()),
+        t_restore_s=_for_good(history.t[inside], restored[inside], window.start),
+        p=dict(zip(plates.names, (history.P[steady].mean(axis=0) / plates.s).tolist(), strict=True)),
+    )
+
+
+def _between(t: Floats, window: Window) -> NDArray[np.bool_]:
+    """Rows after the event and before the next one; the run's last row has no next event and belongs to the window."""
+    tolerance = 1e-9
+    last = window.end >= t[-1] - tolerance
+    return (t > window.start + tolerance) & (t < window.end + (tolerance if last else -tolerance))
+
+
+def _for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
+    """Time (s) from `start` to the first row from which on all rows hold; None when the last one does not."""
+    failing = np.flatnonzero(~holds)
+    first = 0 if failing.size == 0 else int(failing[-1]) + 1
+    return None if first >= t.size else round(float(t[first]) - start, 9)

@@ -1,0 +1,122 @@
+"""The reference pages that `gridpeers doc` prints, made from the code: keys, messages, the scenario file."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterable, Iterator
+
+import msgspec
+
+from agents.config import Gains
+from plant.config import GflParameters, GfmParameters
+from scenarios.field_docs import FieldDoc, class_doc, field_docs
+from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
+from wire import keys, messages
+from wire.codec import KINDS, LIMIT
+
+TOPICS = ("keys", "messages", "scenario")
+"""Pages there are."""
+
+_SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
+    ("Top of the file", Scenario),
+    ("[time]", Time),
+    ("[plant]", PlantTable),
+    ("[plant.gfm]", GfmParameters),
+    ("[plant.gfl]", GflParameters),
+    ("[gains]", Gains),
+    ("[processes]", Processes),
+    ("[[event]]", Event),
+    ("[case.NAME]", Case),
+)
+
+
+def page(topic: str) -> str:
+    """Markdown of one page.
+
+    Parameters
+    ----------
+    topic : str
+        One of `TOPICS`.
+    """
+    makers = {"keys": _keys, "messages": _messages, "scenario": _scenario}
+    return "\n".join(makers[topic]()) + "\n"
+
+
+def _keys() -> Iterator[str]:
+    yield "# Keys of a run"
+    yield ""
+    header = ("key", "kind", "message", "from", "to", "when")
+    rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.describe())
+    yield from _table(header, rows)
+
+
+def _messages() -> Iterator[str]:
+    yield "# Messages"
+    yield ""
+    yield f"msgpack maps with a field `type` that names the message; SI units; at most {LIMIT} bytes. Unknown fields,"
+    yield "missing fields, wrong types and numbers that are not finite are refused: counted by kind, logged once and"
+    yield "dropped."
+    common = {doc.name for doc in field_docs(messages.Message)}
+    yield from _section("Fields of every message", messages.Message, "")
+    for kind in (*typing.get_args(messages.AnyMessage), messages.PlantEvent):
+        yield from _section(
+            kind.__name__, kind, class_doc(kind), leave_out=common if kind != messages.PlantEvent else set()
+        )
+    yield ""
+    yield "## Kinds of refused messages"
+    yield ""
+    yield from _table(("kind", "meaning"), KINDS.items())
+
+
+def _scenario() -> Iterator[str]:
+    yield "# The scenario file"
+    yield ""
+    yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
+    yield "inverter's own rating or nominal voltage). What has no default must be given. Gains have the units told"
+    yield "here."
+    for title, cls in _SCENARIO_TABLES:
+        by_name = {field.encode_name: key_of(cls, field) for field in msgspec.structs.fields(cls)}
+        yield ""
+        yield f"## {title}"
+        yield ""
+        yield class_doc(cls)
+        yield ""
+        rows = [
+            (f"`{by_name[doc.name]}`", _default(doc), doc.text)
+            for doc in field_docs(cls)
+            if not _is_table(cls, doc.name)
+        ]
+        yield from _table(("key", "default", "meaning"), rows)
+
+
+def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterable[str] = ()) -> Iterator[str]:
+    skipped = set(leave_out)
+    rows = [(f"`{doc.name}`", f"`{doc.type}`", doc.text) for doc in field_docs(cls) if doc.name not in skipped]
+    yield from ("", f"## {title}", "")
+    if text:
+        yield from (text, "")
+    if rows:
+        yield from _table(("field", "type", "meaning"), rows)
+
+
+def _is_table(cls: type, key: str) -> bool:
+    """Whether a field is a table of its own, which has a section of its own."""
+    kind = next(field.type for field in msgspec.structs.fields(cls) if field.encode_name == key)
+    inner = [kind, *typing.get_args(kind)]
+    return cls is not Case and any(isinstance(part, type) and issubclass(part, msgspec.Struct) for part in inner)
+
+
+def _default(doc: FieldDoc) -> str:
+    if not doc.default:
+        return "required"
+    if doc.default.startswith("Gains("):
+        return "`[gains]`"
+    shown = doc.default.replace("'", '"').replace("()", "[]")
+    return f"`{ {'True': 'true', 'False': 'false'}.get(shown, shown) }`"
+
+
+def _table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+    yield f"| {' | '.join(header)} |"
+    yield f"|{'---|' * len(header)}"
+    for row in rows:
+        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"
