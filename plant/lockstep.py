@@ -1,0 +1,380 @@
+"""The plant's side of simulated time, sans-IO: tokens and messages in, actions out.
+
+A driver (`plant.runtime` over Zenoh, `scenarios.inprocess` on a bus) does, from one thread,
+
+    side.appeared(key, now) | side.vanished(key, now)       a liveliness token came or went
+    side.received(key, payload, now)                        a message, or the answer to a `Fetch`
+    side.work(now)                                          at most one tick of the plant, if all is here for it
+    for action in side.take_actions(): ...                  do it, in this order
+    side.expire(now)                                        when `side.until` has passed
+
+until `side.over`. `now` is the driver's clock (s) and serves deadlines only.
+
+**Phases.** *gathering*: until every agent of the configuration has a token and a nameplate, and every recorder a token.
+*preparing*: `Prepare` with the roster is out, until every agent on it is `Ready`. *ticking*: Measurement(k) is out,
+until the whole roster has sent State(k); then the set-points are held, the plant goes on to k+1, and so on. A change of
+the roster goes through *preparing* again, between two ticks. *closing*: `Stop` and the last telemetry are out, until
+all tokens are gone, as proof that everybody has heard it.
+
+An agent that dies is taken off the roster and the run goes on, marked not reproducible; one that dies before tick 0
+ends the run. Why there is no deadlock is written in `agents.lockstep`.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from plant.config import PlantConfig
+from plant.interface import PlantLike
+from wire.actions import Action, Fetch, Publish
+from wire.clock import ticks_until, time_of
+from wire.codec import LIMIT, RejectedError, Rejects, decode, encode
+from wire.keys import Keys, check_name
+from wire.messages import PLANT, Measurement, Nameplate, PlantEvent, Prepare, Ready, State, Stop, Telemetry
+from wire.patience import Awaited, Patience
+
+Phase = Literal["gathering", "preparing", "ticking", "closing", "over"]
+
+TELEMETRY_TICKS = 10
+"""Telemetry is sent at tick 0 and then every so many ticks: enough for a progress bar, few enough to be cheap."""
+
+CLOSING = 2.0
+"""Longest wait for the others to close (s)."""
+
+_NUMBER_BYTES = 9
+"""Bytes of one float in msgpack."""
+
+
+class PlantSide:
+    """The plant in simulated time.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        Names the agents and recorders to wait for, the control period and the end.
+    plant : PlantLike
+        The plant at t = 0.
+    """
+
+    def __init__(self, config: PlantConfig, plant: PlantLike) -> None:
+        for name in config.agents:
+            check_name("agents", name)
+            if name not in plant.inverters:
+                raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
+        self.keys = Keys(config.run)
+        self.rejects = Rejects(PLANT)
+        self.phase: Phase = "gathering"
+        self.outcome = ""
+        """Why the run broke; empty while it goes well."""
+        self.reproducible = True
+        self.tick = 0
+        """k: the plant stands at k T_c."""
+        self._config, self._plant = config, plant
+        self._ticks = ticks_until(config.end, config.T_c)
+        self._patience = Patience(PLANT, config.deadline)
+        self._actions: list[Action] = []
+        self._instances: dict[str, str] = {}
+        """The one instance of each agent that takes part."""
+        self._plates: dict[str, Nameplate] = {}
+        self._recorders: set[str] = set()
+        self._tokens: set[str] = set()
+        """All tokens of agents and recorders that are there now, dismissed ones too."""
+        self._roster: tuple[str, ...] = ()
+        self._roster_number = -1
+        self._roster_changed = False
+        self._waiting: set[str] = set()
+        self._states: dict[str, State] = {}
+        self._state_keys = {self.keys.state(name): name for name in config.agents}
+        self._ready_keys = {self.keys.ready(name): name for name in config.agents}
+        self._measurement_keys = {name: self.keys.measurement(name) for name in config.agents}
+        self._rows: list[tuple[float, ...]] = []
+        self._events: list[PlantEvent] = []
+        self._telemetry_seq = 0
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def token(self) -> str:
+        """Key of the plant's liveliness token."""
+        return self.keys.alive_plant
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the token is declared."""
+        return self.keys.any_state, self.keys.any_ready
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return self.phase == "over"
+
+    @property
+    def until(self) -> float | None:
+        """When the deadline of the present wait passes (s on the driver's clock)."""
+        return self._patience.until
+
+    def start(self, now: float) -> None:
+        """Begin to wait for the agents."""
+        self._patience.renew(now)
+        self._gather(now)
+
+    def take_actions(self) -> list[Action]:
+        """What is to be done now, in this order."""
+        actions, self._actions = self._actions, []
+        return actions
+
+    def missing(self) -> tuple[Awaited, ...]:
+        """Who is awaited, and for what."""
+        agents = self._config.agents
+        match self.phase:
+            case "gathering":
+                absent = [Awaited("token", name) for name in agents if name not in self._instances]
+                mute = [Awaited("nameplate", name) for name in self._instances if name not in self._plates]
+                recorders = [Awaited("token", name) for name in self._config.recorders if name not in self._recorders]
+                return (*absent, *mute, *recorders)
+            case "preparing":
+                return tuple(Awaited(f"Ready({self._roster_number})", name) for name in agents if name in self._waiting)
+            case "ticking":
+                return tuple(Awaited(f"State({self.tick})", name) for name in agents if name in self._waiting)
+        return ()
+
+    def expire(self, now: float) -> None:
+        """End the run if the deadline has passed."""
+        if self.until is not None and now >= self.until:
+            if self.phase == "closing":
+                self._be_over()
+            else:
+                self.abort(self._patience.complaint(self.missing(), now), now)
+
+    def abort(self, reason: str, now: float) -> None:
+        """End the run because something went wrong."""
+        if self.phase not in ("closing", "over"):
+            self.outcome = reason
+            self.reproducible = False
+            self._close(reason, now)
+
+    # ---------------------------------------------------------------- liveliness
+
+    def appeared(self, key: str, now: float) -> None:
+        """Note that a token appeared; of two processes of one name the first takes part."""
+        match self.keys.parts(key):
+            case ("alive", "recorder", name):
+                self._tokens.add(key)
+                self._recorders.add(name)
+                self._gather(now)
+            case ("alive", "agent", name, instance):
+                self._tokens.add(key)
+                refusal = self._refusal(name, instance)
+                if refusal:
+                    self._stop(self.keys.dismissal(name, instance), refusal)
+                elif name not in self._instances:
+                    self._instances[name] = instance
+                    self._actions.append(Fetch(self.keys.nameplate(name, instance)))
+
+    def _refusal(self, name: str, instance: str) -> str:
+        if name not in self._config.agents:
+            return f"{name}: the plant waits for no agent of this name, only for {', '.join(self._config.agents)}"
+        if self._instances.get(name, instance) != instance:
+            return f"{name}: another agent of this name takes part in the run already; give this one another name"
+        if self.phase != "gathering" and name not in self._instances:
+            return f"{name}: the run has begun, at t = {self._t:g} s; an agent can join only before its start"
+        return ""
+
+    def vanished(self, key: str, now: float) -> None:
+        """Note that a token is gone, and with it its holder."""
+        self._tokens.discard(key)
+        match self.keys.parts(key):
+            case ("alive", "recorder", name):
+                self._recorders.discard(name)
+            case ("alive", "agent", name, instance) if self._instances.get(name) == instance:
+                self._lose(name, now)
+        if self.phase == "closing" and not self._tokens:
+            self._be_over()
+
+    def _lose(self, name: str, now: float) -> None:
+        del self._instances[name]
+        self._plates.pop(name, None)
+        if self.phase == "gathering" or (self.phase == "preparing" and self._roster_number == 0):
+            self.abort(f"{name} died before the run began", now)
+        elif self.phase in ("preparing", "ticking"):
+            self.reproducible = False
+            self._roster_changed = True
+            self._waiting.discard(name)
+            text = f"{name} died at t = {self._t:g} s; its inverter stays on primary droop at its last set-points"
+            self._events.append(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
+
+    # ---------------------------------------------------------------- messages
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message; what cannot be used is counted and dropped."""
+        try:
+            message = decode(payload)
+            name = message.sender
+            if key in self._state_keys and isinstance(message, State):
+                self._check_sender(self._state_keys[key], message.incarnation, name)
+                self._on_state(message)
+            elif key in self._ready_keys and isinstance(message, Ready):
+                self._check_sender(self._ready_keys[key], message.incarnation, name)
+                self._on_ready(message)
+            elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self._instances.get(name, "")):
+                self._plates[name] = message
+                self._gather(now)
+            else:
+                raise RejectedError("foreign", f"a {type(message).__name__} of {name}")
+            self._patience.heard(name, message.seq, now)
+        except RejectedError as rejected:
+            self.rejects.add(rejected.kind, key, rejected.text)
+
+    def _check_sender(self, expected: str, incarnation: int, name: str) -> None:
+        if name != expected:
+            raise RejectedError("foreign", f"sender {name}, {expected} was expected")
+        plate = self._plates.get(name)
+        if plate is None or incarnation != plate.incarnation:
+            raise RejectedError("ghost", f"life {incarnation} of {name} does not take part")
+
+    def _on_state(self, message: State) -> None:
+        if self.phase != "ticking" or message.seq != self.tick or message.sender not in self._waiting:
+            kind = "stale" if message.seq <= self.tick else "unexpected"
+            raise RejectedError(kind, f"State({message.seq}) of {message.sender} at tick {self.tick} ({self.phase})")
+        self._states[message.sender] = message
+        self._waiting.discard(message.sender)
+
+    def _on_ready(self, message: Ready) -> None:
+        if self.phase != "preparing" or message.seq != self._roster_number:
+            raise RejectedError("stale", f"Ready({message.seq}) of {message.sender} in phase {self.phase}")
+        self._waiting.discard(message.sender)
+
+    # ---------------------------------------------------------------- work
+
+    def work(self, now: float) -> bool:
+        """Go on if all that is awaited is here: a roster, or one tick of the plant. Whether anything was done."""
+        if self._waiting or self.phase not in ("preparing", "ticking"):
+            return False
+        if self.phase == "ticking":
+            self._finish_tick(now)
+        if self.tick < self._ticks:
+            if self._roster_changed:
+                self._prepare(now)
+            else:
+                self._grant(now)
+        return True
+
+    def _gather(self, now: float) -> None:
+        config = self._config
+        if self.phase == "gathering" and not self.missing():
+            self._roster_changed = True
+            self._rows += self._plant.take_rows()
+            self._events += self._plant.take_events()
+            self._prepare(now)
+            self._patience.renew(now)
+            assert set(self._roster) == set(config.agents)
+
+    def _prepare(self, now: float) -> None:
+        self._roster = tuple(name for name in self._config.agents if name in self._instances)
+        self._roster_number += 1
+        self._roster_changed = False
+        self._waiting = set(self._roster)
+        self.phase = "preparing"
+        self._patience.renew(now)
+        prepare = Prepare(
+            sender=PLANT,
+            incarnation=self._config.incarnation,
+            seq=self._roster_number,
+            t=self._t,
+            roster=self._roster,
+            instances=tuple(self._instances[name] for name in self._roster),
+        )
+        self._actions.append(Publish(self.keys.control, encode(prepare)))
+
+    def _grant(self, now: float) -> None:
+        """Send every agent its measurement, and with it the grant of this tick."""
+        self.phase = "ticking"
+        self._waiting = set(self._roster)
+        self._patience.renew(now)
+        readings = self._plant.measure()
+        t, tick, roster, incarnation = self._t, self.tick, self._roster, self._config.incarnation
+        for name in roster:
+            reading = readings[name]
+            measurement = Measurement(
+                sender=PLANT,
+                incarnation=incarnation,
+                seq=tick,
+                t=t,
+                to=name,
+                P=reading.P,
+                Q=reading.Q,
+                V=reading.V,
+                f=reading.f,
+                P_set=reading.P_set,
+                V_set=reading.V_set,
+                grid_connected=reading.grid_connected,
+                island=reading.island,
+                roster=roster,
+            )
+            self._actions.append(Publish(self._measurement_keys[name], encode(measurement)))
+        if tick == 0:
+            self._report(final=False)
+
+    def _finish_tick(self, now: float) -> None:
+        for name in self._roster:
+            state = self._states.get(name)
+            if state is not None:
+                self._plant.hold(name, state.P_set, state.V_set)
+        self._states = {}
+        self._plant.advance()
+        self.tick += 1
+        self._rows += self._plant.take_rows()
+        self._events += self._plant.take_events()
+        if self.tick == self._ticks:
+            self._close("end of the scenario", now)
+        elif self.tick % TELEMETRY_TICKS == 0:
+            self._report(final=False)
+
+    # ---------------------------------------------------------------- telemetry and the end
+
+    @property
+    def _t(self) -> float:
+        return time_of(self.tick, self._config.T_c)
+
+    def _report(self, *, final: bool) -> None:
+        """Send rows and events; as many messages as the limit of their size asks for."""
+        inverters = self._plant.inverters
+        bytes_per_row = _NUMBER_BYTES * (1 + 6 * len(inverters)) + 8
+        at_once = max(1, LIMIT // 2 // bytes_per_row)
+        rows, events = self._rows, self._events
+        self._rows, self._events = [], []
+        while True:
+            part, rows = rows[:at_once], rows[at_once:]
+            telemetry = Telemetry(
+                sender=PLANT,
+                incarnation=self._config.incarnation,
+                seq=self._telemetry_seq,
+                t=self._t,
+                inverters=inverters,
+                rows=tuple(part),
+                events=() if rows else tuple(events),
+                final=final and not rows,
+                outcome=self.outcome,
+                reproducible=self.reproducible,
+            )
+            self._telemetry_seq += 1
+            self._actions.append(Publish(self.keys.telemetry, encode(telemetry)))
+            if not rows:
+                return
+
+    def _close(self, reason: str, now: float) -> None:
+        self._report(final=True)
+        self._stop(self.keys.control, reason)
+        self.phase = "closing"
+        self._waiting = set()
+        self._patience.until = now + CLOSING
+        if not self._tokens:
+            self._be_over()
+
+    def _stop(self, key: str, reason: str) -> None:
+        stop = Stop(sender=PLANT, incarnation=self._config.incarnation, seq=self.tick, t=self._t, reason=reason)
+        self._actions.append(Publish(key, encode(stop)))
+
+    def _be_over(self) -> None:
+        self.phase = "over"
+        self._patience.rest()

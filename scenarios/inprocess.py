@@ -1,0 +1,189 @@
+"""Driver without processes: plant and agents in one thread, on a bus that delivers in order.
+
+Every message is encoded and decoded, and discovery, roster and ticks are those of `agents.lockstep` and
+`plant.lockstep`; so the result is that of the processes, byte by byte, and is the reference for them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable
+from time import perf_counter
+from typing import NamedTuple, cast
+
+import msgspec
+
+from agents.config import AgentConfig
+from agents.lockstep import AgentSide
+from plant.config import PlantConfig
+from plant.interface import PlantLike
+from plant.lockstep import PlantSide
+from scenarios.outcome import Outcome
+from wire.actions import Action, Fetch, Publish
+from wire.codec import decode
+from wire.messages import PlantEvent, Telemetry
+
+
+class _Delivery(NamedTuple):
+    """One message on its way to one receiver."""
+
+    to: PlantSide | AgentSide
+    key: str
+    payload: bytes
+
+
+class Bus:
+    """Delivers what the cores publish, in the order of publication.
+
+    Parameters
+    ----------
+    plant : PlantSide
+        The plant's core.
+    agents : Iterable[AgentSide]
+        The agents' cores, in the order in which they start.
+    on_telemetry : Callable[[Telemetry], None]
+        Takes the plant's telemetry.
+    broken : type[Exception]
+        What the plant raises when it has no solution.
+    """
+
+    def __init__(
+        self,
+        plant: PlantSide,
+        agents: Iterable[AgentSide],
+        on_telemetry: Callable[[Telemetry], None],
+        broken: type[Exception],
+    ) -> None:
+        self._plant, self._agents = plant, list(agents)
+        self._on_telemetry, self._broken = on_telemetry, broken
+        self._subscribers: defaultdict[str, list[PlantSide | AgentSide]] = defaultdict(list)
+        self._nameplates: dict[str, bytes] = {}
+        self._queue: deque[_Delivery] = deque()
+
+    def run(self) -> None:
+        """Run until the plant is over. There is no clock: `now` is 0, and no deadline passes."""
+        plant = self._plant
+        plant.start(0.0)
+        for agent in self._agents:
+            agent.start(0.0)
+            self._start(agent)
+        while not plant.over:
+            self._do(plant, plant.take_actions())
+            while self._queue:
+                to, key, payload = self._queue.popleft()
+                to.received(key, payload, 0.0)
+                self._do(to, to.take_actions())
+            self._end_the_stopped()
+            if not (self._work() or plant.over or self._queue):
+                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing())
+                raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
+
+    def _work(self) -> bool:
+        try:
+            return self._plant.work(0.0)
+        except self._broken as error:
+            self._plant.abort(str(error), 0.0)
+            return True
+
+    def _start(self, agent: AgentSide) -> None:
+        """Let an agent and everybody before it see each other."""
+        name = agent.token
+        for key in agent.subscriptions:
+            self._subscribers[key].append(agent)
+        nameplate, answer = agent.nameplate
+        self._nameplates[nameplate] = answer
+        inverter = self._plant.keys.parts(name)[2]
+        for key in (self._plant.keys.state(inverter), self._plant.keys.ready(inverter)):
+            if self._plant not in self._subscribers[key]:
+                self._subscribers[key].append(self._plant)
+        self._plant.appeared(name, 0.0)
+        self._do(self._plant, self._plant.take_actions())
+        agent.appeared(self._plant.token, 0.0)
+        for other in self._agents[: self._agents.index(agent)]:
+            other.appeared(name, 0.0)
+            agent.appeared(other.token, 0.0)
+            self._do(other, other.take_actions())
+        self._do(agent, agent.take_actions())
+
+    def _do(self, side: PlantSide | AgentSide, actions: list[Action]) -> None:
+        for action in actions:
+            if isinstance(action, Publish):
+                key, payload = action
+                for to in self._subscribers.get(key, ()):
+                    self._queue.append(_Delivery(to, key, payload))
+                if key == self._plant.keys.telemetry:
+                    self._on_telemetry(cast("Telemetry", decode(payload)))
+            elif isinstance(action, Fetch):
+                if action.key in self._nameplates:
+                    self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
+            else:
+                self._subscribers[action.key].append(side)
+
+    def _end_the_stopped(self) -> None:
+        for agent in [agent for agent in self._agents if agent.over]:
+            self._agents.remove(agent)
+            self._nameplates.pop(agent.nameplate[0])
+            for receivers in self._subscribers.values():
+                if agent in receivers:
+                    receivers.remove(agent)
+            self._plant.vanished(agent.token, 0.0)
+            for other in self._agents:
+                other.vanished(agent.token, 0.0)
+
+
+def run_inprocess(
+    plant_config: PlantConfig,
+    agent_configs: Iterable[AgentConfig],
+    on_telemetry: Callable[[Telemetry], None],
+    *,
+    plant: PlantLike | None = None,
+) -> Outcome:
+    """Run a scenario in this process and this thread.
+
+    Parameters
+    ----------
+    plant_config : PlantConfig
+        The plant; its endpoints and recorders do not matter here.
+    agent_configs : Iterable[AgentConfig]
+        The agents, in the order in which they start.
+    on_telemetry : Callable[[Telemetry], None]
+        Called with every telemetry message as it comes; the first at t = 0.
+    plant : PlantLike, optional
+        A plant at t = 0 to use instead of building the configuration's.
+
+    Returns
+    -------
+    Outcome
+        How it ended. A plant without solution is an outcome; a bad feeder or name is an exception, before the start.
+    """
+    from plant.dynamics import PlantError  # numba and scipy: only for who runs a plant
+
+    began = perf_counter()
+    started = began
+    events: list[PlantEvent] = []
+
+    def note(telemetry: Telemetry) -> None:
+        nonlocal started
+        if started == began:
+            started = perf_counter()
+        events.extend(telemetry.events)
+        on_telemetry(telemetry)
+
+    if plant is None:
+        from plant.build import build_plant
+
+        plant = build_plant(plant_config)
+    side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant)
+    agents = [AgentSide(config, f"p{i}") for i, config in enumerate(agent_configs)]
+    Bus(side, agents, note, PlantError).run()
+    failed = tuple(agent.failed for agent in agents if agent.failed)
+    rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
+    return Outcome(
+        broke=side.outcome,
+        reproducible=side.reproducible,
+        events=tuple(events),
+        notes=(*failed, *rejects),
+        ticks=side.tick,
+        start_s=started - began,
+        run_s=perf_counter() - started,
+    )
