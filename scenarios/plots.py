@@ -202,7 +202,7 @@ def _powers(drawing: Drawing, *, GFM: bool) -> Figure:
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     chosen = np.flatnonzero(drawing.plates.GFM == GFM)
-    widths = np.linspace(2.8, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
+    widths = np.linspace(2.4, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
     for panel, (case, history) in zip(grid.flat, drawing.histories.items(), strict=False):
         for number, i in enumerate(chosen):
             colour = OTHER_STYLES[number % len(OTHER_STYLES)][0]

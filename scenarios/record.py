@@ -33,6 +33,8 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """What happened, in the order of time."""
     sha256: str
     """Of the bytes of history.csv."""
+    reproducible: bool
+    """Whether the same scenario and seed give the same bytes again."""
 
 
 class RecordError(RuntimeError):
@@ -68,8 +70,11 @@ class Recorder:
         self._file = (folder / PARTIAL).open("wb")
         self._hash = hashlib.sha256()
         self._inverters: tuple[str, ...] = ()
+        self._finished = False
         self.rows: list[tuple[float, ...]] = []
         self.events: list[PlantEvent] = []
+        self.reproducible = True
+        """False once something unscripted, as a dead agent, has entered the run."""
 
     def __enter__(self) -> Recorder:
         return self
@@ -77,7 +82,7 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
+        self.close()
 
     def __call__(self, telemetry: Telemetry) -> None:
         """Write the rows of one telemetry message."""
@@ -90,6 +95,7 @@ class Recorder:
             self.rows.append(row)
             self._write(",".join(map(repr, row)) + "\n")
         self.events.extend(telemetry.events)
+        self.reproducible = self.reproducible and telemetry.reproducible
 
     def finish(self, end: float, record_step: float) -> Recorded:
         """Check that the whole run is there, and give the files their names.
@@ -115,14 +121,20 @@ class Recorder:
             )
         self._write_events()
         (self._folder / PARTIAL).rename(self._folder / "history.csv")
+        self._finished = True
         return Recorded(
-            inverters=self._inverters, rows=self.rows, events=tuple(self.events), sha256=self._hash.hexdigest()
+            inverters=self._inverters,
+            rows=self.rows,
+            events=tuple(self.events),
+            sha256=self._hash.hexdigest(),
+            reproducible=self.reproducible,
         )
 
-    def give_up(self) -> None:
-        """End the record of a broken case: what came stays, under the partial name."""
-        self._file.close()
-        self._write_events()
+    def close(self) -> None:
+        """End the record. What came of a case that was not finished stays, under the partial name."""
+        if not self._finished:
+            self._file.close()
+            self._write_events()
 
     def _write(self, text: str) -> None:
         bytes_ = text.encode("ascii")

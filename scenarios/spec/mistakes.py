@@ -110,7 +110,8 @@ def suggestion(wrong: str, known: Iterable[str], what: str) -> str:
     """
     names = list(known)
     by_lower = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(wrong.lower(), by_lower, n=1)
+    near = [name for name in by_lower if len(wrong) > 2 and name.startswith(wrong.lower())]
+    near = near or difflib.get_close_matches(wrong.lower(), by_lower, n=1)
     listed = f"he {what} are {', '.join(names)}" if names else f"here are no {what}"
     return f'did you mean "{by_lower[near[0]]}"? T{listed}' if near else f"t{listed}"
 

@@ -1,0 +1,37 @@
+"""The rendezvous of a run: a TCP port on the loopback that nobody uses."""
+
+from __future__ import annotations
+
+import socket
+
+HOST = "127.0.0.1"
+
+
+class PortError(ValueError):
+    """The port that the scenario names cannot be used."""
+
+
+def endpoint(port: int) -> str:
+    """Zenoh endpoint at a port of this machine.
+
+    Parameters
+    ----------
+    port : int
+        The port; 0 takes one that is free.
+
+    Raises
+    ------
+    PortError
+        If the port is in use, or not ours to use.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except OSError as error:
+            raise PortError(
+                f"processes.port: port {port} of {HOST} cannot be used: {(error.strerror or str(error)).lower()}; "
+                "end what uses it, choose another, or write 0 to take a free one"
+            ) from None
+        return f"tcp/{HOST}:{probe.getsockname()[1]}"

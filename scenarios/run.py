@@ -1,0 +1,200 @@
+"""One run from a checked scenario to its folder: cases, records, metrics, figures, claims, report.
+
+The drivers are `scenarios.inprocess` and `scenarios.fleet`; this module gives them configurations and takes telemetry.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+from plant.equipment import Feeder
+from scenarios import claims, metrics
+from scenarios.folder import set_status, shown, write_whole
+from scenarios.history import History, Plates
+from scenarios.outcome import Outcome
+from scenarios.ports import endpoint
+from scenarios.record import Recorded, Recorder, RecordError
+from scenarios.report import Report, plain
+from scenarios.spec import Scenario
+from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.writing import to_toml
+from wire.messages import Telemetry
+
+Driver = Literal["processes", "inprocess"]
+"""How a case is run: as one process per agent over Zenoh, or all in this process."""
+
+Progress = Callable[[str, float, float], None]
+"""Told the case, the time it has reached (s) and its end (s)."""
+
+_VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
+
+
+class BrokenRunError(RuntimeError):
+    """The run could not be finished; the folder says so too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is to be run."""
+
+    scenario: Scenario
+    """Checked; with the seed and the cases asked for."""
+    feeder: Feeder
+    """Its feeder."""
+    driver: Driver
+    folder: Path
+    """An empty folder."""
+
+
+def run(request: Request, progress: Progress) -> Report:
+    """Run all cases and write the whole folder.
+
+    Raises
+    ------
+    BrokenRunError
+        If a case broke. What came until then stays in the folder, and `status.txt` tells that it is not whole.
+    """
+    (request.folder / "log").mkdir()
+    with (request.folder / "log" / "run.log").open("w", encoding="utf-8") as log:
+        try:
+            return _run(request, progress, log)
+        except KeyboardInterrupt:
+            set_status(request.folder, "broken: interrupted from the keyboard")
+            raise
+        except BrokenRunError as error:
+            print(f"broken: {error}", file=log)
+            set_status(request.folder, f"broken: {error}")
+            raise
+        except Exception as error:
+            traceback.print_exc(file=log)
+            text = f"{type(error).__name__}: {error}"
+            set_status(request.folder, f"broken: {text}")
+            raise BrokenRunError(f"{text} (traceback in {shown(request.folder / 'log' / 'run.log')})") from error
+
+
+def _run(request: Request, progress: Progress, log: TextIO) -> Report:
+    scenario, folder = request.scenario, request.folder
+    write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
+    recorded, notes = {}, []
+    for case in scenario.cases:
+        recorded[case], outcome = _run_case(request, case, progress)
+        notes += [f"case {case}: {note}" for note in outcome.notes]
+        print(
+            f"case {case}: start {outcome.start_s:.2f} s, run {outcome.run_s:.2f} s, {outcome.ticks} ticks",
+            *outcome.notes,
+            sep="\n  ",
+            file=log,
+            flush=True,
+        )
+    plates = Plates.of(request.feeder.inverters)
+    histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
+    events = [(event.label, event.t_s) for event in scenario.events]
+    results = {
+        case: {
+            window.label: metrics.measure(history, plates, window, F_NOM)
+            for window in metrics.windows(events, scenario.time.end_s)
+        }
+        for case, history in histories.items()
+    }
+    sha256 = {case: record.sha256 for case, record in recorded.items()}
+    write_whole(folder / "metrics.json", metrics_json(request, results, sha256))
+    titles = {case: rule.title for case, rule in scenario.cases.items()}
+    _draw(histories, titles, plates, events, folder / "plots")
+    report = Report(
+        scenario=scenario.name,
+        titles=titles,
+        results=results,
+        verdicts=_judge(request, plates, results),
+        notes=[*notes, *_notes(recorded)],
+        folder=shown(folder) + "/",
+    )
+    write_whole(folder / "report.txt", plain(report))
+    set_status(folder, "complete")
+    return report
+
+
+def metrics_json(request: Request, results: claims.Results, sha256: Mapping[str, str]) -> str:
+    """Text of metrics.json; what is not a number (nothing to share) is null."""
+    cases: dict[str, dict[str, Any]] = {}
+    for case, steady in results.items():
+        cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
+        cases[case]["history_sha256"] = sha256[case]
+    scenario = request.scenario
+    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": request.driver, "cases": cases}
+    return json.dumps(whole, indent=2, allow_nan=False) + "\n"
+
+
+def _numbers(steady: dict[str, Any]) -> dict[str, float | None]:
+    measures = {name: value for name, value in steady.items() if name != "p"}
+    return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
+
+
+def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded, Outcome]:
+    """Run one case by the driver asked for, and record it."""
+    time = request.scenario.time
+    listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
+    plant, agents = configs(request.scenario, request.feeder, case, listen)
+    with Recorder(request.folder / case) as recorder:
+
+        def note(telemetry: Telemetry) -> None:
+            recorder(telemetry)
+            progress(case, recorder.rows[-1][0] if recorder.rows else 0.0, time.end_s)
+
+        progress(case, 0.0, time.end_s)
+        try:
+            if request.driver == "inprocess":
+                from scenarios.inprocess import run_inprocess
+
+                outcome = run_inprocess(plant, agents, note)
+            else:
+                from scenarios.fleet import run_processes
+
+                outcome = run_processes(plant, agents, request.folder / "log" / case, note)
+            if outcome.broke:
+                raise BrokenRunError(f"case {case}: {outcome.broke}")
+            return recorder.finish(time.end_s, time.record_s), outcome
+        except RecordError as error:
+            raise BrokenRunError(f"case {case}: {error}") from error
+
+
+def _draw(
+    histories: Mapping[str, History],
+    titles: Mapping[str, str],
+    plates: Plates,
+    events: list[tuple[str, float]],
+    folder: Path,
+) -> None:
+    from scenarios import plots  # matplotlib takes longer to import than a case to run; nothing else waits for it
+
+    drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM)
+    plots.draw_all(drawing, folder)
+
+
+def _judge(request: Request, plates: Plates, results: claims.Results) -> tuple[claims.Verdict, ...]:
+    if not request.scenario.paper:
+        return ()
+    GFL = tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM)
+    return claims.judge(results, claims.Start(P_set0=request.scenario.plant.P_set0_pu, GFL=GFL))
+
+
+def _notes(recorded: Mapping[str, Recorded]) -> list[str]:
+    """What makes a case differ from what its scenario says."""
+    notes = []
+    for case, record in recorded.items():
+        if not record.reproducible:
+            notes.append(f"case {case} cannot be reproduced: something happened in it that the scenario does not tell")
+    return notes
+
+
+def _as_run(request: Request) -> dict[str, Any]:
+    return {"driver": request.driver, "python": platform.python_version()} | {
+        name: metadata.version(name) for name in _VERSIONS
+    }
