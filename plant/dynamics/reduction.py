@@ -101,6 +101,7 @@ class Reduction:
                 self.leader[self.inverter_island[i]] = i
 
         used = np.diff(circuit.Y.indptr) > 0
+        used[circuit.terminals[self.online].ravel()] = True  # a lone inverter without load has only its filter
         held = np.zeros(n, bool)
         held[circuit.sources] = True
         unknown = np.flatnonzero(fed[self.label] & ~held & used)

@@ -1,0 +1,143 @@
+"""Small circuits for the plant's checks: a stiff bus, a lone inverter, two inverters, the autotest system."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from plant.config import GflParameters, GfmParameters
+from plant.dynamics import Circuit, Dynamics, Inverter
+
+S_B = 200e3
+V_B = 277.1363
+Z_B = V_B**2 / (S_B / 3.0)
+A = np.exp(2j * np.pi / 3.0)
+BALANCED = np.array([1.0, A**2, A])
+
+GFM_D = GfmParameters(R_f=0.01, X_f=0.15, P_max=1.5, k_ip=30.0)
+"""Defaults of inverter-models section 8."""
+GFM_A = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.5, k_ip=30.0)
+"""The same with the autotest's filter."""
+GFL_D = GflParameters(
+    F_current=0.0,
+    frequency_watt=False,
+    volt_var=False,
+    T_ff=0.1,
+    T_pf=0.5,
+    T_vf=0.05,
+    T_qf=0.2,
+    S_max=1.0,
+    i_max=1.0,
+)
+"""Defaults of inverter-models section 8."""
+
+NONE = np.zeros(0, np.complex128)
+
+
+def inverter(parameters: GfmParameters | GflParameters, *, m_p: float = 0.01, m_q: float = 0.05) -> Inverter:
+    """Make an inverter of 200 kVA."""
+    kind = "GFM" if isinstance(parameters, GfmParameters) else "GFL"
+    return Inverter(name=kind, kind=kind, S_b=S_B, V_b=V_B, m_p=m_p, m_q=m_q, parameters=parameters)
+
+
+def circuit(
+    Y: NDArray[np.complex128], terminals: list[list[int]], *, source: NDArray[np.complex128] | None = None
+) -> Circuit:
+    """Make a circuit without load branches; `source` holds nodes 0 to 2."""
+    n = Y.shape[0]
+    return Circuit(
+        Y=sp.csc_array(Y),
+        sources=np.arange(3 if source is not None else 0),
+        source_voltage=NONE if source is None else source,
+        terminals=np.array(terminals, np.int64),
+        C=sp.csc_array((n, 0)),
+        S=NONE,
+        I0=NONE,
+        V_branch=NONE,
+    )
+
+
+def on_stiff_bus(parameters: GfmParameters | GflParameters, *, h: float = 0.002, **droops: float) -> Dynamics:
+    """One inverter at an infinite bus of 1 pu, at rest at p = q = 0."""
+    return at_rest(circuit(np.zeros((3, 3), complex), [[0, 1, 2]], source=V_B * BALANCED), parameters, h=h, **droops)
+
+
+def lone(parameters: GfmParameters, p: float, *, h: float = 0.002) -> Dynamics:
+    """One GFM with a resistive load of p at 1 pu, at rest."""
+    return at_rest(loaded(p), parameters, h=h)
+
+
+def loaded(p: float) -> Circuit:
+    """One terminal with a resistive load of p at 1 pu."""
+    return circuit(np.eye(3, dtype=complex) * p / Z_B, [[0, 1, 2]])
+
+
+def at_rest(network: Circuit, parameters: GfmParameters | GflParameters, *, h: float, **droops: float) -> Dynamics:
+    """One inverter at rest."""
+    dynamics = Dynamics(network, (inverter(parameters, **droops),), h)
+    dynamics.start(np.zeros(1), np.zeros(1))
+    return dynamics
+
+
+def pair(first: GfmParameters, second: GfmParameters, load: float) -> Dynamics:
+    """Two GFM joined by 0.0002 + j0.0004 pu, resistive load in the middle, at rest."""
+    y = 1.0 / ((0.0001 + 0.0002j) * Z_B)
+    Y = np.zeros((9, 9), complex)
+    for phase in range(3):
+        a, b, c = phase, 3 + phase, 6 + phase
+        for end in (a, b):
+            Y[end, end] += y
+            Y[c, c] += y
+            Y[end, c] -= y
+            Y[c, end] -= y
+        Y[c, c] += load / Z_B
+    network = circuit(Y, [[0, 1, 2], [3, 4, 5]])
+    dynamics = Dynamics(network, (inverter(first), inverter(second)), 0.002)
+    dynamics.start(np.full(2, load / 2.0), np.zeros(2))
+    return dynamics
+
+
+LINES = (
+    ("Meter1", "Load1", 0.01 + 0.01j, 0.0106 + 0.0103j),
+    ("Load1", "Load2", 0.0035 + 0.0034j, 0.0035 + 0.0034j),
+    ("Load2", "Load3", 0.0279 + 0.0115j, 0.0279 + 0.0115j),
+    ("Meter1", "Meter3", 0.0189 + 0.0968j, 0.0189 + 0.0968j),
+    ("Meter3", "Load4", 0.0350 + 0.0116j, 0.0350 + 0.0116j),
+)
+"""GridLAB-D's test_inverter_dyn_GFM_GFL: from, to, ohm of phase A, ohm of phases B and C."""
+
+
+def autotest_circuit(z_load4: complex) -> Circuit:
+    """Make the autotest system with Load4 at this impedance (ohm)."""
+    buses = ("Meter1", "Load1", "Load2", "Load3", "Meter3", "Load4")
+    start = {bus: 3 * i for i, bus in enumerate(buses)}
+    Y = np.zeros((18, 18), complex)
+    for first, second, z_A, z_BC in LINES:
+        for phase in range(3):
+            y = 1.0 / (z_A if phase == 0 else z_BC)
+            i, j = start[first] + phase, start[second] + phase
+            Y[i, i] += y
+            Y[j, j] += y
+            Y[i, j] -= y
+            Y[j, i] -= y
+    for phase in range(3):
+        Y[start["Load1"] + phase, start["Load1"] + phase] += 1.0 / 2.42
+        Y[start["Load4"] + phase, start["Load4"] + phase] += 1.0 / z_load4
+    terminals = [[start[bus] + phase for phase in range(3)] for bus in ("Meter1", "Load2")]
+    return circuit(Y, terminals)
+
+
+def autotest(gfl: GflParameters) -> Dynamics:
+    """Start the autotest system: its swing phasors are those of its file, of which B and C are rounded."""
+    gfm = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
+    # its mp is 3.77 rad/s per pu, not 1 % to the last digit
+    former = inverter(gfm, m_p=3.77 / (2.0 * np.pi * 60.0))
+    dynamics = Dynamics(autotest_circuit(5.76), (former, inverter(gfl)), 0.002)
+    swing = np.array([277.1363, -138.5682 - 240.0j, -138.5682 + 240.0j]) / V_B
+    dynamics.start(np.array([0.3, 0.3]), np.array([0.0, 0.05]), swing_voltage=swing)
+    return dynamics
+
+
+AUTOTEST_GFL = GflParameters(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)
+"""Inverter A2 of the autotest."""

@@ -1,0 +1,185 @@
+"""The whole plant: rest, islanding, load loss, three islands, dead islands, re-closing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from plant.config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
+from plant.feeder import Plant
+from plant.network import Network
+from plant.tables import read_feeder
+
+T_C = 0.02
+
+
+COUPLING = GfmParameters(R_f=0.0025, X_f=0.05)
+"""The GFM impedance of the independent power flow: it decides how unbalanced the terminals are."""
+
+
+def plant(
+    *events: SwitchEvent,
+    load_set: str = "main",
+    gfm: GfmParameters | None = None,
+    gfl: GflParameters | None = None,
+    record: float = T_C,
+) -> Plant:
+    """Make the microgrid feeder with these switch operations."""
+    settings = PlantSettings(load_set=load_set, events=events, gfm=gfm or GfmParameters(), gfl=gfl or GflParameters())
+    return Plant(Network(read_feeder("microgrid123", load_set)), settings, T_C, record)
+
+
+def opened(t: float, *switches: str) -> tuple[SwitchEvent, ...]:
+    """Open these switches at t."""
+    return tuple(SwitchEvent(t=t, switch=name, action="open") for name in switches)
+
+
+def run(p: Plant, until: float) -> None:
+    """Advance to a time."""
+    while p.tick * T_C < until - 1e-9:
+        p.advance()
+
+
+def totals(p: Plant) -> tuple[float, float]:
+    """Give the inverters' total kW and kvar."""
+    readings = p.measure().values()
+    return sum(r.P for r in readings) / 1e3, sum(r.Q for r in readings) / 1e3
+
+
+@pytest.mark.parametrize("model", ["voltage_source", "current_source"])
+def test_the_feeder_rests(model: str) -> None:
+    """Row 2 on the real feeder: without an event nothing moves for 10 s, and every V_set is exactly what was asked."""
+    p = plant(gfl=GflParameters(model=model))
+    first = p.measure()
+
+    run(p, 10.0)
+
+    for name, start in first.items():
+        now = p.measure()[name]
+        assert pytest.approx(start.P, abs=1e-6) == now.P
+        assert pytest.approx(start.Q, abs=1e-6) == now.Q
+        assert now.f == pytest.approx(60.0, abs=1e-9)
+        assert now.V_set == pytest.approx(p.network.inverters[0].V_nom, rel=1e-9)
+        assert now.grid_connected
+        assert now.island == "grid"
+
+
+@pytest.mark.parametrize(
+    ("load_set", "switches", "f", "P", "Q"),
+    [
+        ("main", ("13-152",), 59.8640, 3407.4, 1162.6),
+        ("main", ("13-152", "60-160"), 60.0543, 2170.4, 498.7),
+        ("event2", ("13-152",), 59.864, 3409.0, None),
+        ("event2", ("13-152", "60-160"), 60.071, 2063.0, None),
+    ],
+)
+def test_droop_alone_settles_where_the_power_flow_says(
+    load_set: str, switches: tuple[str, ...], f: float, P: float, Q: float | None
+) -> None:
+    """The dynamics end at the steady states of an independent power flow of the same feeder."""
+    p = plant(*opened(0.1, *switches), load_set=load_set, gfm=COUPLING)
+
+    run(p, 6.0)
+    kW, kvar = totals(p)
+
+    assert p.measure()["inv1"].f == pytest.approx(f, abs=0.0006)
+    assert kW == pytest.approx(P, abs=1.5)
+    if Q is not None:
+        assert kvar == pytest.approx(Q, abs=3.0)
+
+
+def test_three_islands_each_at_their_own_frequency() -> None:
+    """Two switches opened in one step leave three islands, each at the frequency of its own droop."""
+    p = plant(*opened(0.1, "13-152"), *opened(2.0, "sw1_2", "sw2_3"), gfm=COUPLING)
+
+    run(p, 8.0)
+    now = p.measure()
+
+    assert [now[name].f for name in ("inv1", "inv4", "inv7")] == pytest.approx([59.8147, 59.9340, 59.8435], abs=0.001)
+    assert [now[name].island for name in p.inverters] == ["inv1"] * 3 + ["inv4"] * 3 + ["inv7"] * 3
+    assert not any(reading.grid_connected for reading in now.values())
+
+
+def test_an_island_without_gfm_is_dead_and_said() -> None:
+    """A GFL without a GFM stops, its island has no voltage, the event names the load lost, and the rest goes on."""
+    p = plant(*opened(0.1, "13-152"), *opened(0.5, "60-160"))
+
+    run(p, 1.0)
+    events = p.take_events()
+
+    assert [event.kind for event in events] == ["switch", "island", "switch", "island", "dead"]
+    assert "1252 kW" in events[-1].text
+    assert all(reading.P > 0.0 for reading in p.measure().values())
+
+
+def test_a_gfl_alone_stops_and_comes_back() -> None:
+    """A GFL cut off from every GFM delivers nothing; reconnected it ramps up again without an error."""
+    network = Network(read_feeder("microgrid123", "main"))
+    feeder = replace(
+        network.feeder,
+        inverters=tuple(unit for unit in network.inverters if unit.microgrid != "MG2" or unit.kind == "GFL"),
+    )
+    settings = PlantSettings(
+        events=(
+            *opened(0.1, "13-152", "60-160"),
+            *opened(0.5, "sw1_2", "sw2_3"),
+            SwitchEvent(t=1.0, switch="sw1_2", action="close"),
+        )
+    )
+    p = Plant(Network(feeder), settings, T_C, T_C)
+
+    run(p, 0.9)
+    off = p.measure()["inv5"]
+    run(p, 4.0)
+    on = p.measure()["inv5"]
+
+    assert (off.P, off.Q, off.V, off.f) == (0.0, 0.0, 0.0, 60.0)
+    assert on.P > 200e3
+    assert pytest.approx(2401.8, rel=0.05) == on.V
+
+
+def test_closing_again_restores_the_start() -> None:
+    """Opened and closed again at the passive zone, the island comes back to where it was."""
+    p = plant(*opened(0.1, "13-152"), *opened(3.0, "60-160"), SwitchEvent(t=4.0, switch="60-160", action="close"))
+
+    run(p, 3.0)
+    before = p.measure()
+    run(p, 8.0)
+
+    for name, reading in p.measure().items():
+        assert pytest.approx(before[name].P, rel=2e-3) == reading.P
+        assert reading.f == pytest.approx(before[name].f, abs=1e-3)
+
+
+def test_both_gfl_representations_settle_alike() -> None:
+    """Voltage-source and current-source GFL end at the same operating point on the feeder."""
+    ends = []
+    for model in ("voltage_source", "current_source"):
+        p = plant(*opened(0.1, "13-152"), gfl=GflParameters(model=model))
+        run(p, 6.0)
+        ends.append([(r.P, r.Q) for r in p.measure().values()])
+
+    assert np.array(ends[0]) == pytest.approx(np.array(ends[1]), abs=50.0)
+
+
+def test_rows_come_at_the_recording_step() -> None:
+    """Rows stand at every multiple of the recording step, the first at t = 0, none twice."""
+    p = plant(*opened(0.03, "13-152"), record=0.004)
+
+    run(p, 0.1)
+    t = [row[0] for row in p.take_rows()]
+
+    assert t == pytest.approx([0.004 * k for k in range(26)], abs=1e-12)
+    assert p.take_rows() == ()
+
+
+def test_an_event_between_ticks_acts_at_its_own_step() -> None:
+    """A switch operated at 0.03 s, between two ticks of 0.02 s, shows in the row of 0.032 s and not before."""
+    p = plant(*opened(0.03, "13-152"), record=0.002)
+
+    run(p, 0.06)
+    P = {round(row[0], 3): row[2] for row in p.take_rows()}
+
+    assert P[0.03] == pytest.approx(P[0.0], abs=1e-3)
+    assert abs(P[0.032] - P[0.03]) > 1e3
