@@ -12,11 +12,11 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     k_p: float = 0.0007
     """P_set gain (s; pu frequency per (pu power / s)). kappa = m_p / k_p is the rate, 1/s. > 0."""
-    k_q: float = 1.0
+    k_q: float = 0.25
     """V_set gain (s; pu reactive droop per (pu voltage / s)). > 0."""
-    alpha: float = 5.0
+    alpha: float = 1.0
     """Weight of the voltage error in (15), GFM only. >= 0."""
-    beta_GFM: float = 2.0
+    beta_GFM: float = 1.0
     """Weight of the var-sharing sum in (15). >= 0."""
     beta_GFL: float = 1.0
     """Weight of the var-sharing sum of a GFL, (14). The paper has 1. >= 0."""
@@ -77,5 +77,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Longest wait for any message (s)."""
     connect: tuple[str, ...]
     """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)
+    """Where other agents can connect; port 0 is any free one."""
     incarnation: int = 1
     """Which life of this agent."""

@@ -140,7 +140,7 @@ def V_set_step(
     A follower with more vars than its neighbours lowers its voltage set-point:
 
     >>> V_set_step(1.0, 0.02, 0.01, 8.0, 1.0, leader=False, gains=Gains(), T=0.02)
-    0.9986...
+    0.99639...
     """
     beta = gains.beta_GFM if leader else gains.beta_GFL
     change = -towards(beta / gains.k_q, d, T) * (z - z_bar)
