@@ -163,6 +163,34 @@ class Plant:
         self._dynamics.set_points[i, 0] = P_set / self._P_rated[i]
         self._dynamics.set_points[i, 1] = V_set / self._V_nom[i]
 
+    def switch(self, name: str, action: str) -> None:
+        """Operate a switch now ("open" or "close"), by its name or alias; it acts from the next step on.
+
+        Raises
+        ------
+        ValueError
+            If there is no such switch; the message lists those there are.
+        """
+        self._schedule.setdefault(self.tick * self._steps, []).append((self.network.switch_name(name), action))
+
+    def connect(self, name: str, on: bool) -> None:
+        """Put an inverter on the network, at zero current and in step with it, or take it off.
+
+        Raises
+        ------
+        PlantError
+            If the network has no solution then.
+        """
+        i = self._row[name]
+        if bool(self._dynamics.connected[i]) == on:
+            return
+        self._dynamics.switch_inverter(i, on)
+        t = round(self.tick * self._T_c, 9)
+        text = f"{name} {'connected, at no load' if on else 'disconnected'}"
+        self._events.append(PlantEvent(t=t, kind="inverter", subject=name, text=text))
+        self._report_islands(t)
+        self._now[i] = self._dynamics.readings()[i]
+
     def advance(self) -> None:
         """Go to the next tick; switches whose time comes are operated on the way.
 

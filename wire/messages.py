@@ -117,7 +117,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: float
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "roster", "warning"]
+    kind: Literal["switch", "island", "dead", "inverter", "roster", "warning"]
     """What sort of event."""
     subject: str
     """The switch, island or agent concerned."""

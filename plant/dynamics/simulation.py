@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from plant.config import GflParameters, GfmParameters
 from plant.dynamics import gfl as gfl_model
 from plant.dynamics import gfm as gfm_model
-from plant.dynamics.arithmetic import A120
+from plant.dynamics.arithmetic import A120, OMEGA_0
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.initial import PHASES, OperatingPoint, PlantError, Units, equilibrium
 from plant.dynamics.reduction import Complex, Real, Reduction
@@ -204,6 +204,33 @@ class Dynamics:
             self._solve(theta)
         if stopped.any():
             self.V[~self.reduction.live[self.reduction.inverter_island]] = 0.0
+
+    def switch_inverter(self, i: int, on: bool) -> None:
+        """Take an inverter off the network, or put it back at zero current, in step with the voltage there.
+
+        Back, its set-points are those at which it rests there: V_set the terminal's voltage, and the P_set whose
+        droop gives no power at the island's frequency. What comes next is a matter of control alone.
+
+        Raises
+        ------
+        PlantError
+            If the network without it, or with it, has no solution.
+        """
+        if on == bool(self.connected[i]):
+            return
+        w = self._island_speed(i)
+        self.connected[i] = on
+        if on:
+            v = float(np.mean(np.abs(self.V[i]))) / self.V_b[i]
+            self.set_points[i] = w / (self.inverters[i].m_p * OMEGA_0), v if v > 0.1 else 1.0, 0.0
+        self.connect(self.circuit)
+        if on and self.forming[i]:
+            self.gfm_state["w"][self.gfm_at == i] = w
+
+    def _island_speed(self, i: int) -> float:
+        """Speed (rad/s, relative to nominal) of the island that inverter i stands in; 0 with a source or dead."""
+        leader = self.reduction.leader[self.reduction.inverter_island[i]]
+        return 0.0 if leader < 0 else float(self.gfm_state["w"][self.gfm_at == leader][0])
 
     def _black_start(self, k: int) -> None:
         """A GFM that comes back: in step with the voltage it finds, or at its set-point where there is none."""

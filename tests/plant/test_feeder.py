@@ -183,3 +183,42 @@ def test_an_event_between_ticks_acts_at_its_own_step() -> None:
 
     assert P[0.03] == pytest.approx(P[0.0], abs=1e-3)
     assert abs(P[0.032] - P[0.03]) > 1e3
+
+
+@pytest.mark.parametrize("name", ["inv1", "inv2"])
+def test_an_inverter_leaves_and_comes_back_without_a_bump(name: str) -> None:
+    """Taken off, an inverter delivers nothing and the others take over; put back, it starts at no load in step."""
+    p = plant(*opened(0.1, "13-152", "60-160"))
+    run(p, 3.0)
+    before = p.measure()
+    p.connect(name, on=False)
+    run(p, 5.0)
+    away = p.measure()
+    p.connect(name, on=True)
+    p.advance()
+    back = p.measure()
+    run(p, 6.0)
+
+    assert (away[name].P, away[name].Q) == (0.0, 0.0)
+    assert sum(r.P for r in away.values()) == pytest.approx(sum(r.P for r in before.values()), rel=0.01)
+    assert abs(back[name].P) < 0.05 * before[name].P
+    assert abs(p.measure()[name].P) < 0.05 * before[name].P, "its set-point is the one at which it rests"
+    for other in p.inverters:
+        if other != name:
+            assert pytest.approx(away[other].P, rel=0.03) == back[other].P
+    assert [event.text for event in p.take_events() if event.kind == "inverter"] == [
+        f"{name} disconnected",
+        f"{name} connected, at no load",
+    ]
+
+
+def test_a_switch_can_be_operated_by_hand() -> None:
+    """Without any schedule a switch opens when it is told to, by its alias as well."""
+    p = plant(*opened(0.1, "13-152"))
+    run(p, 1.0)
+
+    p.switch("sw1_2", "open")
+    p.advance()
+
+    assert p.measure()["inv1"].island == "inv1"
+    assert p.measure()["inv4"].island == "inv4"
