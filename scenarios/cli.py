@@ -77,14 +77,14 @@ def run(
     from datetime import datetime
 
     from scenarios.folder import FolderError, new_folder
-    from scenarios.ports import PortError, endpoint
+    from scenarios.ports import PortError, check_port
 
     spec, feeder = _load(scenario)
     spec = _chosen(spec, case, seed)
     _require({"numba": "the plant"} | ({"zenoh": "the processes"} if driver is DriverName.processes else {}))
     try:
         if driver is DriverName.processes:
-            endpoint(spec.processes.port)
+            check_port(spec.processes.port)
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     except (FolderError, PortError) as error:
         _fail([str(error)], BAD_INPUT)

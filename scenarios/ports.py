@@ -1,4 +1,4 @@
-"""The rendezvous of a run: a TCP port on the loopback that nobody uses."""
+"""The rendezvous of a run: a TCP port on the loopback."""
 
 from __future__ import annotations
 
@@ -12,12 +12,23 @@ class PortError(ValueError):
 
 
 def endpoint(port: int) -> str:
-    """Zenoh endpoint at a port of this machine.
+    """Zenoh endpoint at a port of this machine; at port 0 the fleet takes a free one.
+
+    Examples
+    --------
+    >>> endpoint(7447)
+    'tcp/127.0.0.1:7447'
+    """
+    return f"tcp/{HOST}:{port}"
+
+
+def check_port(port: int) -> None:
+    """Find out whether the plant will be able to listen on a port, before anything is started or written.
 
     Parameters
     ----------
     port : int
-        The port; 0 takes one that is free.
+        The port; 0, which stands for any free one, can always be used.
 
     Raises
     ------
@@ -29,9 +40,9 @@ def endpoint(port: int) -> str:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
+            probe.listen()
         except OSError as error:
             raise PortError(
                 f"processes.port: port {port} of {HOST} cannot be used: {(error.strerror or str(error)).lower()}; "
                 "end what uses it, choose another, or write 0 to take a free one"
             ) from None
-        return f"tcp/{HOST}:{probe.getsockname()[1]}"

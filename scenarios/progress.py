@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -11,10 +12,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from scenarios.run import Progress as Tell
 
+PATIENCE = 3.0
+"""A start that takes longer than this (s) is explained; usually it takes about 1 s."""
+
+COMPILING = "compiling the plant's inner loop, which takes up to a minute and is done once ..."
+
 
 @contextmanager
 def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
-    """Give the function to tell how far each case is.
+    """Give the function to tell how far each case is; its first call for a case, at t = 0, is the start.
 
     Parameters
     ----------
@@ -23,9 +29,37 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
     cases : tuple[str, ...]
         Names of the cases, in the order in which they run.
     """
-    if not console.is_terminal:
-        yield _lines()
-        return
+    with _explained(lambda: console.print(COMPILING, highlight=False)) as started:
+        if console.is_terminal:
+            with _bars(console, cases) as tell:
+                yield _both(started, tell)
+        else:
+            yield _both(started, _lines(console))
+
+
+@contextmanager
+def _explained(explain: Callable[[], None]) -> Iterator[Tell]:
+    """Explain a start that takes long; the second call for the first case is its first sign of life."""
+    timer = threading.Timer(PATIENCE, explain)
+    timer.daemon = True
+    seen = 0
+
+    def tell(case: str, t: float, end: float) -> None:
+        nonlocal seen
+        seen += 1
+        if seen == 1:
+            timer.start()
+        elif seen == 2:
+            timer.cancel()
+
+    try:
+        yield tell
+    finally:
+        timer.cancel()
+
+
+@contextmanager
+def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
     columns = (
         TextColumn("case {task.fields[case]:4}"),
         BarColumn(bar_width=40),
@@ -33,19 +67,17 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, transient=True) as bars:
-        tasks = {case: bars.add_task(case, case=case, total=0.0, start=False) for case in cases}
+        tasks = {case: bars.add_task(case, case=case, total=1.0, start=False, visible=False) for case in cases}
 
         def tell(case: str, t: float, end: float) -> None:
             if t == 0.0:
                 bars.start_task(tasks[case])
-            bars.update(tasks[case], completed=t, total=end)
-            if t >= end:
-                bars.stop_task(tasks[case])
+            bars.update(tasks[case], completed=t, total=end, visible=True)
 
         yield tell
 
 
-def _lines() -> Tell:
+def _lines(console: Console) -> Tell:
     began: dict[str, float] = {}
     done: set[str] = set()
 
@@ -53,6 +85,15 @@ def _lines() -> Tell:
         began.setdefault(case, time.monotonic())
         if t >= end and case not in done:
             done.add(case)
-            print(f"case {case}: {end:g} s simulated in {time.monotonic() - began[case]:.1f} s", flush=True)
+            took = time.monotonic() - began[case]
+            console.print(f"case {case}: {end:g} s simulated in {took:.1f} s", markup=False, highlight=False)
+
+    return tell
+
+
+def _both(first: Tell, second: Tell) -> Tell:
+    def tell(case: str, t: float, end: float) -> None:
+        first(case, t, end)
+        second(case, t, end)
 
     return tell

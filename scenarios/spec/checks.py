@@ -16,9 +16,9 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
     """Every time of the scenario falls on the grid it belongs to."""
     time = scenario.time
-    _multiple("time.T_c_s", time.T_c_s, "time.h_s", time.h_s, "h_s must divide T_c_s", mistakes)
+    _divides("time.h_s", time.h_s, "time.T_c_s", time.T_c_s, mistakes)
     _multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "it must be a multiple of h_s", mistakes)
-    _multiple("time.T_c_s", time.T_c_s, "time.record_s", time.record_s, "record_s must divide T_c_s", mistakes)
+    _divides("time.record_s", time.record_s, "time.T_c_s", time.T_c_s, mistakes)
     _multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "it must be a multiple of T_c_s", mistakes)
     for i, event in enumerate(scenario.events):
         path = f"event[{i}].t_s"
@@ -132,6 +132,17 @@ def _multiple(path: str, value: float, of: str, step: float, rule: str, mistakes
     near = f"{max(round(ratio), 1) * step:.9g}"
     key = of.rpartition(".")[2]
     mistakes.add(path, f"{value:g} s is not a multiple of {key} = {step:g} s: {rule}; the nearest is {near}")
+
+
+def _divides(path: str, step: float, of: str, value: float, mistakes: Mistakes) -> None:
+    """Note a step that does not divide a value; the fault is the step's."""
+    if mistakes.touch(path, of) or value <= 0 or step <= 0:
+        return
+    ratio = value / step
+    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6:
+        return
+    key, near = of.rpartition(".")[2], value / max(round(ratio), 1)
+    mistakes.add(path, f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:.6g}")
 
 
 def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mistakes: Mistakes) -> None:

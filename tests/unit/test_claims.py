@@ -1,0 +1,94 @@
+"""Verdicts on the paper's claims, tried on the paper's own numbers and on numbers that are wrong."""
+
+from dataclasses import replace
+
+import pytest
+
+from scenarios.claims import CLAIMS, Start, Verdict, judge
+from scenarios.metrics import Steady
+from scenarios.paper_tables import COLUMNS, ISLANDING
+
+START = Start(P_set0=0.65, GFL=("inv2",))
+Table = dict[str, dict[str, Steady]]
+
+
+def paper() -> Table:
+    """Results that are exactly the paper's tables."""
+    restored = {("IV", "event1"): 0.8, ("IV", "event2"): 0.9}
+    return {
+        case: {
+            event: Steady(**numbers, t_restore_s=restored.get((case, event)), p={"inv2": 0.65})
+            for event, numbers in events.items()
+        }
+        for case, events in ISLANDING.items()
+    }
+
+
+def changed(case: str, event: str, **values: object) -> Table:
+    """The paper's tables with one cell changed."""
+    table = paper()
+    table[case][event] = replace(table[case][event], **values)  # type: ignore[arg-type]
+    return table
+
+
+def verdict(name: str, results: Table) -> Verdict:
+    """The verdict on one claim."""
+    return next(verdict for verdict in judge(results, START) if verdict.claim.name == name)
+
+
+def test_the_papers_own_numbers_pass_every_claim() -> None:
+    """Tables I and II of the paper bear out what its text says."""
+    assert {verdict.claim.name: verdict.status for verdict in judge(paper(), START)} == {
+        claim.name: "PASS" for claim in CLAIMS
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "results"),
+    [
+        ("table_I_f_error_Hz", changed("I", "event1", f_error_Hz=0.151)),
+        ("table_I_MPSI", changed("II", "event2", MPSI=0.215)),
+        ("table_II_V_error", changed("III", "event2", V_error=0.0051)),
+        ("only_IV_restores", changed("IV", "event1", f_error_Hz=0.011)),
+        ("only_IV_restores", changed("III", "event1", f_error_Hz=0.009)),
+        ("IV_within_1_s", changed("IV", "event2", t_restore_s=1.01)),
+        ("IV_within_1_s", changed("IV", "event1", t_restore_s=None)),
+        ("GFL_idle", changed("III", "event2", p={"inv2": 0.67})),
+        ("MQSI_order", changed("II", "event1", MQSI=1.76)),
+        ("MQSI_order", changed("IV", "event2", MQSI=1.2)),
+        ("IV_shares_vars", changed("IV", "event2", MQSI=0.101)),
+        ("IV_5_times_below_II_and_III", changed("III", "event2", MQSI=0.24)),
+        ("IV_MQSI_5_times_better_than_I", changed("I", "event1", MQSI=0.19)),
+        ("table_I_MPSI", changed("II", "event2", MPSI=float("nan"))),
+    ],
+)
+def test_a_number_that_is_off_fails_the_claim(name: str, results: Table) -> None:
+    """Each claim can fail, and says what was found."""
+    failed = verdict(name, results)
+
+    assert failed.status == "FAIL"
+    assert failed.found
+
+
+def test_a_known_miss_is_told_with_its_reason() -> None:
+    """A claim that cannot hold here is shown as such, neither as passed nor as failed."""
+    missed = verdict("IV_V_error_5_times_better_than_I", changed("IV", "event2", V_error=0.003))
+
+    assert missed.status == "MISS"
+    assert missed.claim.known_miss in missed.found
+
+
+def test_a_claim_about_a_case_that_was_left_out_is_not_judged() -> None:
+    """With case IV alone, what compares cases is not run, and what is about IV is judged."""
+    verdicts = {verdict.claim.name: verdict for verdict in judge({"IV": paper()["IV"]}, START)}
+
+    assert verdicts["IV_within_1_s"].status == "PASS"
+    assert verdicts["only_IV_restores"].status == "NOT RUN"
+    assert verdicts["only_IV_restores"].found == "case I, II, III was not run"
+
+
+def test_every_tolerance_has_its_reason() -> None:
+    """No number is compared, or left uncompared, without a word on why."""
+    assert all(column.reason for column in COLUMNS)
+    assert len({claim.name for claim in CLAIMS}) == len(CLAIMS)
+    assert all(claim.source for claim in CLAIMS)

@@ -1,0 +1,232 @@
+"""The command line: exit codes, words, and that bad input starts and writes nothing."""
+
+import json
+import socket
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from scenarios import cli
+from scenarios.spec.loading import CATALOGUE
+
+ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
+SHORT = ISLANDING.replace("end_s = 7.0", "end_s = 1.2").partition('[[event]]\nlabel = "event2"')[0] + (
+    '[case.I]\ntitle = "no control"\nsecondary = "none"\ngraph = "none"\n'
+)
+"""Case I, the first 1.2 s."""
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def invoke(*words: str) -> tuple[int, str]:
+    """Exit code of a command, and all that it printed."""
+    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("command", ["run", "list", "check", "doc"])
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    """--help tells what a command does and shows one."""
+    code, text = invoke(command, "--help")
+
+    assert code == 0
+    assert f"Example:  gridpeers {command}" in text
+
+
+def test_help_does_not_wait_for_heavy_modules() -> None:
+    """Importing the command imports neither numba nor matplotlib nor Zenoh."""
+    import subprocess
+
+    heavy = {"numba", "numpy", "scipy", "matplotlib", "zenoh"}
+    code = f"import sys, scenarios.cli; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert done.stdout.strip() == "[]"
+
+
+def test_list_shows_the_catalogue() -> None:
+    """Each scenario with its title and cases."""
+    code, text = invoke("list")
+
+    assert code == 0
+    assert text.startswith("islanding ")
+    assert "Cases: I, II, III, IV" in text
+
+
+def test_check_says_that_a_file_can_be_run(elsewhere: Path) -> None:
+    """A good file is told in one line."""
+    (elsewhere / "mine.toml").write_text(ISLANDING)
+
+    code, text = invoke("check", "mine.toml")
+
+    assert code == 0
+    assert text == "mine.toml: can be run: 4 case(s) I, II, III, IV; 2 event(s); 7 s; 9 inverters on 134 buses\n"
+
+
+@pytest.mark.parametrize("topic", ["keys", "messages", "scenario"])
+def test_doc_prints_a_page(topic: str) -> None:
+    """The reference comes from the code."""
+    code, text = invoke("doc", topic)
+
+    assert code == 0
+    assert text.startswith("# ")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["run"], "Missing argument 'SCENARIO'"),
+        (["run", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
+        (["run", "nowhere.toml"], "nowhere.toml: there is no such file"),
+        (["run", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"? The cases are I, II, III, IV'),
+        (["run", "islanding", "--case", ","], '--case: no case ","; the cases are I, II, III, IV'),
+        (["run", "islanding", "--driver", "threads"], "Invalid value for '--driver'"),
+        (["run", "islanding", "--seed", "many"], "Invalid value for '--seed'"),
+        (["run", "islanding", "--out", "full"], "--out full: the folder is not empty"),
+        (["run", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
+        (["check", "bad.toml"], "2 mistakes:"),
+        (["run", "used.toml"], "cannot be used: address already in use"),
+        (["doc", "everything"], "Invalid value for"),
+    ],
+)
+def test_bad_input_is_told_and_leaves_nothing(elsewhere: Path, words: list[str], said: str) -> None:
+    """Exit code 2, a clear message, no traceback, and no folder that was not there before."""
+    (elsewhere / "full").mkdir()
+    (elsewhere / "full" / "mine.txt").write_text("mine")
+    (elsewhere / "bad.toml").write_text(ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20").replace("= 0.0007", "= 0"))
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        (elsewhere / "used.toml").write_text(ISLANDING + f"\n[processes]\nport = {port}\n")
+        before = sorted(path for path in elsewhere.rglob("*"))
+
+        code, text = invoke(*words)
+
+    assert code == 2
+    assert said in text
+    assert "Traceback" not in text
+    assert sorted(path for path in elsewhere.rglob("*")) == before
+
+
+@pytest.mark.parametrize(("module", "package"), [("zenoh", "eclipse-zenoh"), ("numba", "numba")])
+def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch, module: str, package: str) -> None:
+    """Without Zenoh or numba nothing starts, and the message says what to install."""
+    monkeypatch.setitem(sys.modules, module, None)
+
+    code, text = invoke("run", "islanding")
+
+    assert code == 2
+    assert f"{package} is not installed" in text
+    assert not Path("runs").exists()
+
+
+def test_a_run_fills_its_folder(elsewhere: Path) -> None:
+    """Scenario as run, metrics, history, events, figures, log and report are there when the command ends."""
+    (elsewhere / "short.toml").write_text(SHORT)
+
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--out", "here")
+
+    assert code == 0, text
+    assert "Results: here/" in text
+    here = elsewhere / "here"
+    assert {path.name for path in here.iterdir()} == {
+        *("I", "log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt"),
+    }
+    assert (here / "status.txt").read_text() == "complete\n"
+    assert sorted(path.name for path in (here / "I").iterdir()) == ["events.csv", "history.csv"]
+    as_run = tomllib.loads((here / "scenario.toml").read_text())
+    assert as_run["seed"] == 7
+    assert as_run["as_run"].keys() >= {"driver", "gridpeers", "python", "eclipse-zenoh"}
+
+
+def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
+    """Exactly these keys, numbers where numbers are promised, null where nothing was restored."""
+    (elsewhere / "short.toml").write_text(SHORT)
+
+    invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
+
+    found = json.loads((elsewhere / "here" / "metrics.json").read_text())
+    assert {key: found[key] for key in ("scenario", "seed", "driver")} == {
+        "scenario": "islanding",
+        "seed": 1,
+        "driver": "inprocess",
+    }
+    assert found.keys() == {"scenario", "seed", "driver", "cases"}
+    assert found["cases"].keys() == {"I"}
+    assert found["cases"]["I"].keys() == {"event1", "history_sha256"}
+    measures = found["cases"]["I"]["event1"]
+    assert measures.keys() == {"f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s"}
+    assert measures["t_restore_s"] is None
+    assert all(isinstance(value, float) for name, value in measures.items() if name != "t_restore_s")
+
+
+def test_a_runs_copy_of_its_scenario_gives_the_same_bytes(elsewhere: Path) -> None:
+    """`gridpeers run FOLDER/scenario.toml` repeats the run."""
+    (elsewhere / "short.toml").write_text(SHORT)
+
+    invoke("run", "short.toml", "--driver", "inprocess", "--out", "a")
+    code, _ = invoke("run", "a/scenario.toml", "--driver", "inprocess", "--out", "b")
+
+    assert code == 0
+    assert Path("a/I/history.csv").read_bytes() == Path("b/I/history.csv").read_bytes()
+
+
+def test_a_failed_claim_is_exit_code_1(elsewhere: Path) -> None:
+    """Who departs from the paper and still asks for its verdict, gets it."""
+    text = ISLANDING.replace("k_p = 0.0007", "k_p = 0.1")
+    (elsewhere / "slow.toml").write_text(text)
+
+    code, text = invoke("run", "slow.toml", "--driver", "inprocess", "--case", "IV", "--out", "here")
+
+    assert code == 1
+    assert "FAIL" in text
+    assert "never" in text
+
+
+def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The reason stands on the screen and in the folder; no history bears its name."""
+    import scenarios.inprocess
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("no such luck")
+
+    monkeypatch.setattr(scenarios.inprocess, "run_inprocess", broken)
+    (elsewhere / "short.toml").write_text(SHORT)
+
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code == 3
+    assert "no such luck" in text
+    assert "Traceback" not in text
+    assert Path("here/status.txt").read_text() == "broken: RuntimeError: no such luck\n"
+    assert "Traceback" in Path("here/log/run.log").read_text()
+    assert not list(Path("here").rglob("history.csv"))
+    assert not Path("here/metrics.json").exists()
+
+
+def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C ends with one line, and the folder tells it."""
+    import scenarios.inprocess
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scenarios.inprocess, "run_inprocess", interrupted)
+    (elsewhere / "short.toml").write_text(SHORT)
+
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code == 130
+    assert text == "gridpeers: interrupted; what came until then is in here/\n"
+    assert Path("here/status.txt").read_text() == "broken: interrupted from the keyboard\n"

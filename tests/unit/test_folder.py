@@ -1,0 +1,53 @@
+"""Where a run's results go, and that nothing there is overwritten."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from scenarios.folder import FolderError, new_folder, set_status
+
+NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+
+
+def test_runs_get_folders_by_time_and_latest_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two runs within a second have two folders; `latest` leads to the second."""
+    monkeypatch.chdir(tmp_path)
+
+    first, second = new_folder(None, "islanding", NOW), new_folder(None, "islanding", NOW)
+
+    assert first == Path("runs/islanding/2026-01-02T03-04-05")
+    assert second == Path("runs/islanding/2026-01-02T03-04-05-2")
+    assert Path("runs/islanding/latest").resolve() == second.resolve()
+
+
+def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
+    """A folder that the user has made is as good as a new one, and is told to hold a running run."""
+    assert new_folder(tmp_path, "islanding", NOW) == tmp_path
+    assert (tmp_path / "status.txt").read_text() == "running\n"
+
+
+def test_a_folder_with_something_in_it_is_refused_and_left_alone(tmp_path: Path) -> None:
+    """Old results are never overwritten."""
+    (tmp_path / "mine.txt").write_text("mine")
+
+    with pytest.raises(FolderError, match="the folder is not empty; give a new or an empty one"):
+        new_folder(tmp_path, "islanding", NOW)
+
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    """A file in the place of the folder is told, also as a parent."""
+    (tmp_path / "file").write_text("")
+
+    for out in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(FolderError, match=r"this is a file|cannot be made or written: Not a directory"):
+            new_folder(out, "islanding", NOW)
+
+
+def test_the_status_is_one_line(tmp_path: Path) -> None:
+    """A reason of several lines is told in one."""
+    set_status(tmp_path, "broken: inv3 died\nlast lines")
+
+    assert (tmp_path / "status.txt").read_text() == "broken: inv3 died last lines\n"

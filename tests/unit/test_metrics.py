@@ -1,0 +1,160 @@
+"""The paper's measures, against forms that everybody can check."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios import metrics
+from scenarios.history import History, Plates
+from scenarios.metrics import Window
+
+F_NOM = 60.0
+PLATES = Plates(
+    names=("inv1", "inv2", "inv3"),
+    GFM=np.array([True, False, False]),
+    s=np.array([600e3, 350e3, 350e3]),
+    V_nom=np.full(3, 2400.0),
+    m_p=np.full(3, 0.01),
+    m_q=np.full(3, 0.05),
+)
+
+
+def history(t: list[float], f: list[float], p: list[list[float]], v: float = 1.0, q: float = 0.1) -> History:
+    """Rows of three inverters: f (Hz) of all, p (pu) of each, v and q (pu) of all."""
+    n = len(t)
+    rows = [
+        (
+            t[k],
+            *(
+                x
+                for i in range(3)
+                for x in (f[k], p[k][i] * PLATES.s[i], q * PLATES.s[i], v * 2400.0, 0.65 * PLATES.s[i], 2400.0)
+            ),
+        )
+        for k in range(n)
+    ]
+    return History.of(PLATES.names, rows)
+
+
+powers = st.lists(st.floats(min_value=0.01, max_value=1.0), min_size=3, max_size=3)
+droops = st.lists(st.floats(min_value=0.001, max_value=0.1), min_size=3, max_size=3)
+
+
+@given(x=powers, s=powers, m=droops)
+def test_the_sharing_index_is_equation_16_term_by_term(x: list[float], s: list[float], m: list[float]) -> None:
+    """The array form equals (16) written as a loop over inverters."""
+    eta = sum(x) / sum(s_i / m_i for s_i, m_i in zip(s, m, strict=True))
+    total = 0.0
+    for x_i, s_i, m_i in zip(x, s, m, strict=True):
+        total += abs((m_i * x_i / s_i - eta) / eta)
+
+    index = metrics.sharing_index(np.array([x]), np.array(s), np.array(m))
+
+    assert index[0] == pytest.approx(total / 3)
+
+
+@given(share=st.floats(min_value=0.01, max_value=1.0), s=powers, m=droops)
+def test_equal_sharing_has_index_zero(share: float, s: list[float], m: list[float]) -> None:
+    """Where every m_i x_i / s_i is the same, nothing is left to share, (9)."""
+    x = [share * s_i / m_i for s_i, m_i in zip(s, m, strict=True)]
+
+    assert metrics.sharing_index(np.array([x]), np.array(s), np.array(m))[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@given(x=powers, factor=st.floats(min_value=1e-3, max_value=1e3))
+def test_the_index_does_not_depend_on_the_unit_of_power(x: list[float], factor: float) -> None:
+    """Watts or kilowatts: (16) is the same, as long as ratings are in the same unit."""
+    s, m = np.array([600e3, 350e3, 350e3]), np.full(3, 0.01)
+
+    watts, other = (metrics.sharing_index(np.array([x]) * k, s * k, m)[0] for k in (1.0, factor))
+
+    assert other == pytest.approx(watts)
+
+
+def test_the_paper_s_own_case_II_gives_its_MPSI() -> None:
+    """GFM at 1.0 pu, GFL at 0.65 + 0.08 / 0.6 pu: Table I prints 0.12 (nine inverters, section 3)."""
+    s = np.array([600e3] * 3 + [350e3] * 6)
+    p = np.array([1.0] * 3 + [0.65 + 0.08 / 0.6] * 6)
+
+    assert metrics.sharing_index(np.array([p * s]), s, np.full(9, 0.01))[0] == pytest.approx(0.12, abs=0.005)
+
+
+def test_nothing_to_share_is_not_a_number() -> None:
+    """With no power at all the index has no value, and no warning."""
+    assert np.isnan(metrics.sharing_index(np.zeros((1, 3)), PLATES.s, PLATES.m_p)[0])
+
+
+def test_a_steady_value_is_the_mean_of_the_last_fifth_of_a_second() -> None:
+    """Rows before it, and the row at the next event's moment, do not count."""
+    t = [round(0.1 * k, 9) for k in range(41)]
+    f = [59.0] * 28 + [59.9, 59.8] + [58.0] * 11
+    case = history(t, f, [[0.5] * 3] * 41)
+
+    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=3.0), F_NOM)
+
+    assert steady.f_error_Hz == pytest.approx((0.1 + 0.2) / 2)
+
+
+def test_the_row_at_the_end_of_the_run_counts() -> None:
+    """The last window ends with the run, whose last row belongs to it."""
+    case = history([0.0, 1.0, 2.0], [60.0, 60.0, 59.7], [[0.5] * 3] * 3)
+
+    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=2.0), F_NOM)
+
+    assert steady.f_error_Hz == pytest.approx(0.3)
+
+
+def test_voltage_error_is_the_mean_distance_from_nominal() -> None:
+    """V_error of 0.98 pu everywhere is 0.02 (section 2)."""
+    case = history([0.0, 1.0, 2.0], [60.0] * 3, [[0.5] * 3] * 3, v=0.98)
+
+    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=2.0), F_NOM)
+
+    assert steady.V_error == pytest.approx(0.02)
+    assert steady.p == pytest.approx({"inv1": 0.5, "inv2": 0.5, "inv3": 0.5})
+
+
+EQUAL, UNEQUAL = [0.5] * 3, [0.5, 0.6, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("f", "p", "expected"),
+    [
+        ([59.9, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.2),
+        ([60.0, 59.9, 60.0, 60.0], [EQUAL] * 4, 0.3),
+        ([60.0, 60.0, 60.0, 60.0], [UNEQUAL, UNEQUAL, EQUAL, EQUAL], 0.3),
+        ([60.0, 60.0, 60.0, 59.98], [EQUAL] * 4, None),
+        ([60.0, 60.0, 60.0, 60.0], [EQUAL, EQUAL, EQUAL, UNEQUAL], None),
+        ([60.0, 60.0, 60.0, 60.0], [EQUAL] * 4, 0.1),
+    ],
+)
+def test_restored_means_frequency_and_sharing_both_and_for_good(
+    f: list[float], p: list[list[float]], expected: float | None
+) -> None:
+    """Time counts from the event to the first row from which both hold to the end of the window."""
+    case = history([1.0, 1.1, 1.2, 1.3, 1.4], [60.0, *f], [EQUAL, *p])
+
+    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=1.4), F_NOM)
+
+    assert steady.t_restore_s == expected
+
+
+def test_every_GFM_must_be_restored() -> None:
+    """Two GFM that are off to either side are not restored, though their mean is 60 Hz."""
+    both = Plates(
+        names=PLATES.names,
+        GFM=np.array([True, True, False]),
+        s=PLATES.s,
+        V_nom=PLATES.V_nom,
+        m_p=PLATES.m_p,
+        m_q=PLATES.m_q,
+    )
+    case = history([0.0, 1.0, 2.0], [60.0] * 3, [EQUAL] * 3)
+    case.f[:, 0] += 0.05
+    case.f[:, 1] -= 0.05
+
+    steady = metrics.measure(case, both, Window(label="e", start=1.0, end=2.0), F_NOM)
+
+    assert steady.t_restore_s is None
+    assert steady.f_error_Hz == pytest.approx(0.05)

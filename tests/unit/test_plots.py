@@ -1,0 +1,85 @@
+"""Figures: that they are made, that a case looks the same in all of them, that nothing warns."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from plant.tables import read_feeder
+from scenarios.history import History, Plates
+from scenarios.plots import CASE_STYLES, Drawing, case_style, draw_all, overview
+
+
+def drawing(*cases: str) -> Drawing:
+    """Made-up curves of all nine inverters."""
+    plates = Plates.of(read_feeder("microgrid123").inverters)
+    t = np.arange(0.0, 7.01, 0.05)
+    level = np.where(t > 1.0, 0.87, 0.65)[:, None] * np.ones(9)
+    histories = {
+        case: History(
+            inverters=plates.names,
+            t=t,
+            f=np.full((t.size, 9), 60.0 - 0.01 * number),
+            P=level * plates.s * (1 + 0.01 * np.arange(9)),
+            Q=0.1 * plates.s * np.ones((t.size, 9)),
+            V=plates.V_nom * np.ones((t.size, 9)),
+            P_set=0.65 * plates.s * np.ones((t.size, 9)),
+            V_set=plates.V_nom * np.ones((t.size, 9)),
+        )
+        for number, case in enumerate(cases)
+    }
+    return Drawing(
+        histories=histories,
+        titles=dict.fromkeys(cases, "made up"),
+        plates=plates,
+        events=[("event1", 1.0), ("event2", 4.0)],
+        f_nom=60.0,
+    )
+
+
+@pytest.mark.parametrize("cases", [("I", "II", "III", "IV"), ("IV",), ("ring", "path", "star")])
+def test_every_figure_of_the_paper_is_drawn(tmp_path: Path, cases: tuple[str, ...]) -> None:
+    """One file per figure, whole and readable, with as many cases as were run."""
+    files = draw_all(drawing(*cases), tmp_path)
+
+    assert {path.name for path in files} == {path.name for path in tmp_path.iterdir()}
+    assert {path.stem for path in files} >= {"frequency", "MPSI", "voltage", "MQSI", "power_GFM", "power_GFL"}
+    for path in files:
+        pixels = imread(path)
+        assert pixels.shape[0] > 300
+        assert pixels.std() > 0.01
+
+
+def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
+    """A reader who knows a case in one figure knows it in all, whichever cases are shown beside it."""
+    page = overview(drawing("IV", "II"))
+
+    for axes in page.axes:
+        colours = {line.get_label(): line.get_color() for line in axes.get_lines() if " " in str(line.get_label())}
+        assert colours == {"IV made up": CASE_STYLES["IV"][0], "II made up": CASE_STYLES["II"][0]}
+    assert len({colour for colour, _, _ in CASE_STYLES.values()}) == 4
+    assert len({case_style("x", number) for number in range(6)}) == 6
+
+
+def test_every_axis_says_its_quantity_and_events_are_marked() -> None:
+    """Frequencies are in Hz, voltages in pu, time in s; both events have their line and label."""
+    page = overview(drawing("I"))
+
+    assert [axes.get_ylabel() for axes in page.axes] == [
+        "mean of the GFM, f (Hz)",
+        "MPSI",
+        "mean of all inverters, V (pu)",
+        "MQSI",
+    ]
+    assert [axes.get_xlabel() for axes in page.axes] == ["", "", "time (s)", "time (s)"]
+    assert {text.get_text() for text in page.axes[0].texts} == {"event1", "event2"}
+
+
+def test_values_that_are_no_numbers_do_not_stop_a_figure(tmp_path: Path) -> None:
+    """A microgrid without any power has no sharing index, and still its figures."""
+    empty = drawing("I")
+    empty.histories["I"].P[:] = 0.0
+    empty.histories["I"].Q[:] = 0.0
+
+    assert all(path.exists() for path in draw_all(empty, tmp_path))

@@ -1,0 +1,131 @@
+"""What a case leaves on disk: bytes that are equal when the run is, whole files or none."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.history import History, read_history
+from scenarios.record import PARTIAL, Recorder, RecordError
+from wire.messages import PlantEvent, Telemetry
+
+Rows = tuple[tuple[float, ...], ...]
+
+
+def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: bool = True) -> Telemetry:
+    """A message of one inverter's rows."""
+    return Telemetry(
+        sender="plant",
+        incarnation=1,
+        seq=0,
+        t=rows[-1][0] if rows else 0.0,
+        inverters=("inv1",),
+        rows=rows,
+        events=events,
+        final=False,
+        outcome="",
+        reproducible=reproducible,
+    )
+
+
+def row(t: float, x: float = 0.1) -> tuple[float, ...]:
+    """A row of one inverter."""
+    return (t, 60.0, 388200.0, x, 2401.7771198288433, 388200.0, 2401.7771198288433)
+
+
+def test_the_header_names_every_column_with_its_unit(tmp_path: Path) -> None:
+    """A reader of history.csv needs no other page to know what a column is."""
+    with Recorder(tmp_path / "I") as recorder:
+        recorder(telemetry((row(0.0), row(0.5))))
+        recorder.finish(0.5, 0.5)
+
+    lines = (tmp_path / "I" / "history.csv").read_bytes().split(b"\n")
+    assert lines[0] == b"t_s,inv1_f_Hz,inv1_P_W,inv1_Q_var,inv1_V_V,inv1_P_set_W,inv1_V_set_V"
+    assert lines[1] == b"0.0,60.0,388200.0,0.1,2401.7771198288433,388200.0,2401.7771198288433"
+    assert lines[-1] == b""
+
+
+def test_the_hash_is_that_of_the_bytes_however_they_came(tmp_path: Path) -> None:
+    """How rows are spread over messages leaves no trace in the file."""
+    with Recorder(tmp_path / "a") as one:
+        one(telemetry((row(0.0), row(0.5), row(1.0))))
+        at_once = one.finish(1.0, 0.5)
+    with Recorder(tmp_path / "b") as other:
+        for t in (0.0, 0.5, 1.0):
+            other(telemetry((row(t),)))
+        in_pieces = other.finish(1.0, 0.5)
+
+    assert at_once.sha256 == in_pieces.sha256
+    assert at_once.sha256 == hashlib.sha256((tmp_path / "a" / "history.csv").read_bytes()).hexdigest()
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=6, max_size=6))
+def test_every_number_reads_back_to_the_same_bits(
+    tmp_path_factory: pytest.TempPathFactory, numbers: list[float]
+) -> None:
+    """The shortest text that reads back to a float is what is written."""
+    folder = tmp_path_factory.mktemp("record") / "case"
+    with Recorder(folder) as recorder:
+        recorder(telemetry(((0.0, *numbers),)))
+        recorder.finish(0.0, 1.0)
+
+    history = read_history(folder / "history.csv")
+
+    quantities = (history.f, history.P, history.Q, history.V, history.P_set, history.V_set)
+    assert [quantity[0, 0] for quantity in quantities] == numbers
+
+
+def test_a_case_that_was_not_finished_has_no_history_under_its_name(tmp_path: Path) -> None:
+    """What a broken case leaves can be read, and cannot be taken for the whole."""
+    event = PlantEvent(t=0.0, kind="roster", subject="inv3", text="inv3 died, says the plant")
+    with Recorder(tmp_path / "I") as recorder:
+        recorder(telemetry((row(0.0),), (event,)))
+
+    assert sorted(path.name for path in (tmp_path / "I").iterdir()) == ["events.csv", PARTIAL]
+    assert (tmp_path / "I" / "events.csv").read_text().splitlines()[1] == '0.0,roster,inv3,"inv3 died, says the plant"'
+
+
+def test_a_history_with_a_gap_is_no_history(tmp_path: Path) -> None:
+    """Lost telemetry is an error that says how much came."""
+    with Recorder(tmp_path / "I") as recorder:
+        recorder(telemetry((row(0.0), row(1.0))))
+        with pytest.raises(RecordError, match=r"2 rows, but 1 s in steps of 0.5 s are 3; the last one is of 1 s"):
+            recorder.finish(1.0, 0.5)
+
+
+def test_rows_come_in_the_order_of_time(tmp_path: Path) -> None:
+    """A row that comes twice is an error, not a row."""
+    with Recorder(tmp_path / "I") as recorder:
+        recorder(telemetry((row(0.5),)))
+        with pytest.raises(RecordError, match=r"a row of 0.5 s came after that of 0.5 s"):
+            recorder(telemetry((row(0.5),)))
+
+
+def test_one_unscripted_thing_makes_a_case_irreproducible_for_good(tmp_path: Path) -> None:
+    """Later telemetry does not make it reproducible again."""
+    with Recorder(tmp_path / "I") as recorder:
+        recorder(telemetry((row(0.0),), reproducible=False))
+        recorder(telemetry((row(0.5),)))
+        recorded = recorder.finish(0.5, 0.5)
+
+    assert not recorded.reproducible
+
+
+def test_a_file_that_is_no_history_is_told(tmp_path: Path) -> None:
+    """Reading checks the header, so that columns are never mixed up."""
+    (tmp_path / "history.csv").write_text("t_s,inv1_P_W,inv1_f_Hz\n0.0,1.0,2.0\n")
+
+    with pytest.raises(ValueError, match=r"history.csv: the first line is not the header of a history"):
+        read_history(tmp_path / "history.csv")
+
+
+def test_columns_go_to_the_quantity_they_name() -> None:
+    """Of two inverters' rows each number comes out where it was put in."""
+    rows = [(0.5, *(float(i) for i in range(12)))]
+
+    history = History.of(("inv1", "inv2"), rows)
+
+    assert (history.t[0], history.f[0].tolist(), history.V_set[0].tolist()) == (0.5, [0.0, 6.0], [5.0, 11.0])
+    assert (history.P[0].tolist(), history.Q[0].tolist(), history.V[0].tolist()) == ([1, 7], [2, 8], [3, 9])

@@ -1,0 +1,82 @@
+"""The pages made from the code: nothing undocumented, no unit forgotten, the copy in docs/ up to date."""
+
+import re
+import typing
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from agents.config import Gains
+from plant.config import GflParameters, GfmParameters
+from scenarios.field_docs import field_docs
+from scenarios.reference import TOPICS, page
+from scenarios.spec.model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
+from wire import keys, messages
+
+DOCS = Path(__file__).parents[2] / "docs"
+TABLES: tuple[type[msgspec.Struct], ...] = (
+    Scenario,
+    Time,
+    PlantTable,
+    GfmParameters,
+    GflParameters,
+    Gains,
+    Processes,
+    Event,
+    Case,
+)
+
+
+@pytest.mark.parametrize("cls", [*TABLES, *typing.get_args(messages.AnyMessage), messages.PlantEvent])
+def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
+    """A field without a docstring would have an empty line in the reference."""
+    assert [doc.name for doc in field_docs(cls) if not doc.text] == []
+
+
+@pytest.mark.parametrize("cls", list(UNIT_OF_KEY))
+def test_the_unit_in_a_key_is_the_one_in_its_sentence(cls: type[msgspec.Struct]) -> None:
+    """T_p_s is in seconds, and its docstring says so; what is in s, pu or Hz carries it in the key."""
+    units = {doc.name: re.search(r"\((s|pu|Hz)\)", doc.text) for doc in field_docs(cls)}
+
+    for field in msgspec.structs.fields(cls):
+        unit = UNIT_OF_KEY[cls].get(field.name)
+        found = units[field.name]
+        if unit is not None:
+            expected = unit if found is None else found[1]
+            assert unit == expected, field.name
+        elif not field.name.startswith(("k_", "F_")):
+            assert found is None, f"{field.name} is in {found and found[1]}, which its key does not say"
+
+
+def test_every_key_of_a_scenario_is_on_its_page() -> None:
+    """The page names each key with its unit; tables have sections of their own."""
+    text = page("scenario")
+
+    for cls in TABLES:
+        for field in msgspec.structs.fields(cls):
+            key = key_of(cls, field)
+            assert f"`{key}`" in text or f"[{key}" in text or f".{key}]" in text, (cls, key)
+
+
+def test_every_message_and_every_key_is_on_its_page() -> None:
+    """What can be sent is told, and where."""
+    assert all(f"## {kind.__name__}" in page("messages") for kind in typing.get_args(messages.AnyMessage))
+    assert all(f"`{spec.expression}`" in page("keys") for spec in keys.describe())
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_pages_are_plain_tables(topic: str) -> None:
+    """Every row of a table has as many cells as its header."""
+    widths: list[int] = []
+    for line in page(topic).splitlines():
+        if not line.startswith("|"):
+            widths = []
+            continue
+        widths.append(len(re.findall(r"(?<!\\)\|", line)))
+        assert widths[-1] == widths[0], line
+
+
+def test_the_reference_in_the_documentation_is_up_to_date() -> None:
+    """docs/scenarios.md ends with what `gridpeers doc scenario` prints; paste it again when this fails."""
+    assert page("scenario").partition("\n")[2].strip() in (DOCS / "scenarios.md").read_text(encoding="utf-8")

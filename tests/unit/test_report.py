@@ -1,0 +1,74 @@
+"""The report at the end of a run: plain text for files and pipes, colours on a terminal only."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from scenarios.claims import Start, judge
+from scenarios.metrics import Steady
+from scenarios.paper_tables import ISLANDING
+from scenarios.report import Report, plain, show
+
+
+def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
+    """A report whose numbers are the paper's, but for one frequency error."""
+    results = {
+        case: {
+            event: Steady(**numbers, t_restore_s=0.65 if case == "IV" else None, p={"inv2": 0.65})
+            for event, numbers in events.items()
+        }
+        for case, events in ISLANDING.items()
+    }
+    first = results["I"]["event1"]
+    results["I"]["event1"] = Steady(
+        f_error_Hz=f_error, MPSI=first.MPSI, V_error=first.V_error, MQSI=first.MQSI, t_restore_s=None, p=first.p
+    )
+    return Report(
+        scenario="islanding",
+        titles={"I": "no control"},
+        results=results,
+        verdicts=judge(results, Start(P_set0=0.65, GFL=("inv2",))) if judged else (),
+        notes=["case I: inv3 [died] at t = 2 s"],
+        folder="runs/islanding/x/",
+    )
+
+
+def test_ours_stand_beside_the_papers() -> None:
+    """A cell shows our number with a digit more than the paper's beside it."""
+    text = plain(report())
+
+    assert "0.137 | 0.14" in text
+    assert "I no control" in text
+    assert "PASS" in text
+    assert text.endswith("Results: runs/islanding/x/\n")
+
+
+def test_a_number_that_is_off_is_marked_and_fails() -> None:
+    """The cell carries a mark, the claim says FAIL and by how much."""
+    text = plain(report(f_error=0.2))
+
+    assert "0.200 | 0.14 !" in text
+    assert "worst is off by 0.0600 Hz (case I, event1)" in text
+    assert "FAIL" in text
+
+
+def test_without_a_paper_there_is_nothing_beside() -> None:
+    """A scenario of one's own has our numbers only, and no verdicts."""
+    text = plain(report(judged=False))
+
+    assert "|" not in text
+    assert "PASS" not in text
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_colours_are_for_terminals_only(terminal: bool) -> None:
+    """In a pipe no control character is printed; the words are the same."""
+    out = io.StringIO()
+
+    show(report(), Console(file=out, force_terminal=terminal, width=160))
+
+    assert ("\x1b[" in out.getvalue()) == terminal
+    assert "inv3 [died] at t = 2 s" in out.getvalue()
+    if not terminal:
+        assert out.getvalue() == plain(report())
