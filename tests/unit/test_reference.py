@@ -78,5 +78,7 @@ def test_pages_are_plain_tables(topic: str) -> None:
 
 
 def test_the_reference_in_the_documentation_is_up_to_date() -> None:
-    """docs/scenarios.md ends with what `gridpeers doc scenario` prints; paste it again when this fails."""
-    assert page("scenario").partition("\n")[2].strip() in (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    """docs/scenarios.md ends with what `gridpeers doc scenario` prints, a level lower; paste it when this fails."""
+    body = page("scenario").partition("\n")[2].strip().replace("\n## ", "\n### ")
+
+    assert body in (DOCS / "scenarios.md").read_text(encoding="utf-8")
