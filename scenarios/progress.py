@@ -12,10 +12,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from scenarios.run import Progress as Tell
 
-PATIENCE = 3.0
+PATIENCE = 4.0
 """A start that takes longer than this (s) is explained; usually it takes about 1 s."""
 
-COMPILING = "compiling the plant's inner loop, which takes up to a minute and is done once ..."
+COMPILING = "still starting: the first run ever compiles the plant's inner loop, which takes some seconds ..."
 
 
 @contextmanager
@@ -29,7 +29,7 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
     cases : tuple[str, ...]
         Names of the cases, in the order in which they run.
     """
-    with _explained(lambda: console.print(COMPILING, highlight=False)) as started:
+    with _explained(lambda: console.print(COMPILING, highlight=False, soft_wrap=True)) as started:
         if console.is_terminal:
             with _bars(console, cases) as tell:
                 yield _both(started, tell)
@@ -39,17 +39,17 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
 
 @contextmanager
 def _explained(explain: Callable[[], None]) -> Iterator[Tell]:
-    """Explain a start that takes long; the second call for the first case is its first sign of life."""
+    """Explain a start that takes long; it is over when time has moved, as the plant's first step is compiled last."""
     timer = threading.Timer(PATIENCE, explain)
     timer.daemon = True
-    seen = 0
+    begun = False
 
     def tell(case: str, t: float, end: float) -> None:
-        nonlocal seen
-        seen += 1
-        if seen == 1:
+        nonlocal begun
+        if not begun:
+            begun = True
             timer.start()
-        elif seen == 2:
+        elif t > 0.0:
             timer.cancel()
 
     try:

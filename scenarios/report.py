@@ -52,7 +52,10 @@ def plain(report: Report) -> str:
     blocks = [_plain_grid(grid) for grid in grids(report)]
     if report.verdicts:
         width = max(len(verdict.claim.text) for verdict in report.verdicts)
-        lines = [f"{v.status:7}  {v.claim.text:{width}}  {v.found}" for v in report.verdicts]
+        lines = []
+        for verdict in report.verdicts:
+            lines.append(f"{verdict.status:7}  {verdict.claim.text:{width}}  {verdict.found}")
+            lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
         blocks.append("\n".join([*lines, _count(report.verdicts)]))
     blocks += [f"NOTE  {note}" for note in report.notes]
     blocks.append(f"Results: {report.folder}")
@@ -76,6 +79,8 @@ def show(report: Report, console: Console) -> None:
         colour = _COLOURS[verdict.status]
         text, found = escape(verdict.claim.text), escape(verdict.found)
         console.print(f"[{colour}]{verdict.status:7}[/{colour}]  {text}  [dim]{found}[/dim]", highlight=False)
+        if verdict.status == "MISS":
+            console.print(f"{'':7}  [dim]{escape(verdict.claim.known_miss)}[/dim]", highlight=False)
     if report.verdicts:
         console.print(_count(report.verdicts), "\n", highlight=False)
     for note in report.notes:
