@@ -79,7 +79,7 @@ def within(column: Column, case: str, event: str, ours: float) -> bool | None:
 def _verdict(claim: Claim, results: Results, start: Start) -> Verdict:
     missing = [case for case in claim.cases if case not in results]
     if missing:
-        return Verdict(claim=claim, status="NOT RUN", found=f"case {', '.join(missing)} was not run")
+        return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
     holds, found = claim.judge(results, start)
     if not holds and claim.known_miss:
         return Verdict(claim=claim, status="MISS", found=found)

@@ -70,14 +70,15 @@ def show(report: Report, console: Console) -> None:
     for grid in grids(report):
         table = Table(title=grid.title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
         for number, heading in enumerate(grid.header):
-            table.add_column(escape(heading), justify="left" if number == 0 else "right", no_wrap=True)
+            table.add_column(escape(heading), justify="left" if number == 0 else "right", vertical="bottom")
         for row in grid.rows:
             table.add_row(*(f"[red]{escape(cell)}[/red]" if cell.endswith("!") else escape(cell) for cell in row))
         console.print(table)
         console.print()
+    width = max((len(verdict.claim.text) for verdict in report.verdicts), default=0)
     for verdict in report.verdicts:
         colour = _COLOURS[verdict.status]
-        text, found = escape(verdict.claim.text), escape(verdict.found)
+        text, found = escape(f"{verdict.claim.text:{width}}"), escape(verdict.found)
         console.print(f"[{colour}]{verdict.status:7}[/{colour}]  {text}  [dim]{found}[/dim]", highlight=False)
         if verdict.status == "MISS":
             console.print(f"{'':7}  [dim]{escape(verdict.claim.known_miss)}[/dim]", highlight=False)
@@ -94,8 +95,8 @@ def _grid(report: Report, table: str) -> Grid:
     judged = bool(report.verdicts)
     header = ["case"]
     for event in events:
-        header += [f"{event} {column.heading}" for column in columns]
-        header += ["restored in s"] if table == "I" else []
+        header += [f"{event}\n{column.heading}" for column in columns]
+        header += [f"{event}\nrestored in"] if table == "I" else []
     rows = []
     for case, steady in report.results.items():
         row = [f"{case} {report.titles.get(case, '')}".strip()]
@@ -103,7 +104,7 @@ def _grid(report: Report, table: str) -> Grid:
             row += [_cell(column, case, event, getattr(steady[event], column.quantity), judged) for column in columns]
             if table == "I":
                 t = steady[event].t_restore_s
-                row.append("never" if t is None else f"{t:.2f}")
+                row.append("never" if t is None else f"{t:.2f} s")
         rows.append(tuple(row))
     against = f", ours | paper's Table {table}" if judged else ""
     title = "Frequency and power sharing" if table == "I" else "Voltage and var sharing"
@@ -120,16 +121,17 @@ def _cell(column: Column, case: str, event: str, ours: float, judged: bool) -> s
 
 
 def _plain_grid(grid: Grid) -> str:
-    table = [grid.header, *grid.rows]
+    upper, lower = zip(*((["", *heading.split("\n")])[-2:] for heading in grid.header), strict=True)
+    table = [upper, lower, *grid.rows]
     widths = [max(len(row[i]) for row in table) for i in range(len(grid.header))]
-    lines = [
-        "  ".join(
+    lines = [grid.title]
+    for row in table:
+        cells = (
             cell.ljust(width) if i == 0 else cell.rjust(width)
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
-        for row in table
-    ]
-    return "\n".join([grid.title, *(line.rstrip() for line in lines)])
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:
