@@ -1,6 +1,7 @@
 """The command `gridpeers`. Heavy modules are imported where they are used, so that help comes at once.
 
-Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage or a bad file, 3 the run broke, 130 interrupted.
+Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage or a bad file, 3 the run broke, 130 interrupted by
+Ctrl-C, 143 by SIGTERM.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from plant.equipment import Feeder
     from scenarios.spec import Scenario
 
-PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
+PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 
 app = typer.Typer(
     add_completion=False,
@@ -74,14 +75,22 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
+    import signal
     from datetime import datetime
-
-    from scenarios.folder import FolderError, new_folder
-    from scenarios.ports import PortError, check_port
 
     spec, feeder = _load(scenario)
     spec = _chosen(spec, case, seed)
     _require({"numba": "the plant"} | ({"zenoh": "the processes"} if driver is DriverName.processes else {}))
+
+    from rich.console import Console
+
+    from scenarios.folder import FolderError, new_folder, shown
+    from scenarios.ports import PortError, check_port
+    from scenarios.progress import progress
+    from scenarios.report import show
+    from scenarios.run import BrokenRunError, Request, TerminatedError
+    from scenarios.run import run as run_scenario
+
     try:
         if driver is DriverName.processes:
             check_port(spec.processes.port)
@@ -89,14 +98,10 @@ def run(
     except (FolderError, PortError) as error:
         _fail([str(error)], BAD_INPUT)
 
-    from rich.console import Console
+    def terminate(*_: object) -> NoReturn:
+        raise TerminatedError
 
-    from scenarios.folder import shown
-    from scenarios.progress import progress
-    from scenarios.report import show
-    from scenarios.run import BrokenRunError, Request
-    from scenarios.run import run as run_scenario
-
+    before = signal.signal(signal.SIGTERM, terminate)
     console = Console()
     request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder)
     try:
@@ -104,8 +109,11 @@ def run(
             report = run_scenario(request, tell)
     except BrokenRunError as error:
         _fail([f"the run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
-    except KeyboardInterrupt:
-        _fail([f"interrupted; what came until then is in {shown(folder)}/"], INTERRUPTED)
+    except KeyboardInterrupt as error:
+        code = TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
+        _fail([f"interrupted; what came until then is in {shown(folder)}/"], code)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     show(report, console)
     raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)
 

@@ -37,6 +37,10 @@ Progress = Callable[[str, float, float], None]
 _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
 
 
+class TerminatedError(KeyboardInterrupt):
+    """Somebody ended the command by SIGTERM; it closes as after Ctrl-C."""
+
+
 class BrokenRunError(RuntimeError):
     """The run could not be finished; the folder says so too."""
 
@@ -66,8 +70,9 @@ def run(request: Request, progress: Progress) -> Report:
     with (request.folder / "log" / "run.log").open("w", encoding="utf-8") as log:
         try:
             return _run(request, progress, log)
-        except KeyboardInterrupt:
-            set_status(request.folder, "broken: interrupted from the keyboard")
+        except KeyboardInterrupt as error:
+            by = "by SIGTERM" if isinstance(error, TerminatedError) else "from the keyboard"
+            set_status(request.folder, f"broken: interrupted {by}")
             raise
         except BrokenRunError as error:
             print(f"broken: {error}", file=log)

@@ -1,0 +1,72 @@
+"""What is told while a run is on its way."""
+
+import io
+import socket
+import threading
+
+import pytest
+from rich.console import Console
+
+from scenarios import progress
+from scenarios.ports import PortError, check_port
+
+
+def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:
+    """A log has one line per case and no control characters."""
+    out = io.StringIO()
+
+    with progress.progress(Console(file=out), ("I", "II")) as tell:
+        for case in ("I", "II"):
+            for t in (0.0, 0.0, 0.5, 1.0, 1.0):
+                tell(case, t, 1.0)
+
+    lines = out.getvalue().splitlines()
+    assert [line.partition(" simulated in ")[0] for line in lines] == ["case I: 1 s", "case II: 1 s"]
+    assert "\x1b" not in out.getvalue()
+
+
+def test_on_a_terminal_bars_come_and_go() -> None:
+    """The bars leave nothing behind that the report would stand below."""
+    out = io.StringIO()
+
+    with progress.progress(Console(file=out, force_terminal=True, width=120), ("I",)) as tell:
+        tell("I", 0.0, 1.0)
+        tell("I", 1.0, 1.0)
+
+    assert "case I" in out.getvalue()
+    assert "\x1b[2K" in out.getvalue()
+
+
+def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who waits for the first compilation is told that it is one."""
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    explained = threading.Event()
+
+    with progress._explained(explained.set) as tell:
+        tell("I", 0.0, 1.0)
+        assert explained.wait(timeout=10.0)
+
+
+def test_a_start_that_is_quick_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The explanation is called off when time has moved."""
+    monkeypatch.setattr(progress, "PATIENCE", 3600.0)
+    explained = threading.Event()
+    before = threading.active_count()
+
+    with progress._explained(explained.set) as tell:
+        tell("I", 0.0, 1.0)
+        tell("I", 0.0, 1.0)
+        assert threading.active_count() == before + 1
+        tell("I", 0.02, 1.0)
+
+    assert not explained.is_set()
+
+
+def test_a_port_in_use_is_told() -> None:
+    """Port 0 can always be used; one in use is told with what to do."""
+    check_port(0)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(PortError, match=r"processes.port: port \d+ .* write 0 to take a free one"):
+            check_port(taken.getsockname()[1])
