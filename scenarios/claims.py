@@ -6,6 +6,7 @@ Tolerances of single numbers are in `paper_tables`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -80,6 +81,9 @@ def _verdict(claim: Claim, results: Results, start: Start) -> Verdict:
     missing = [case for case in claim.cases if case not in results]
     if missing:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
+    absent = [event for event in EVENTS if any(event not in results[case] for case in claim.cases)]
+    if absent:
+        return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
     holds, found = claim.judge(results, start)
     if not holds and claim.known_miss:
         return Verdict(claim=claim, status="MISS", found=found)
@@ -141,16 +145,21 @@ def _IV_shares_vars(results: Results, start: Start) -> tuple[bool, str]:
 
 
 def _IV_5_times_below_II_and_III(results: Results, start: Start) -> tuple[bool, str]:
-    ratios = [results[case][event].MQSI / results["IV"][event].MQSI for case in ("II", "III") for event in EVENTS]
+    pairs = [(results[case][event].MQSI, results["IV"][event].MQSI) for case in ("II", "III") for event in EVENTS]
+    ratios = [_ratio(*pair) for pair in pairs]
     return min(ratios) >= 5.0, f"least ratio {min(ratios):.1f}"
 
 
 def _IV_5_times_better_than_I(quantity: Quantity) -> Callable[[Results, Start], tuple[bool, str]]:
     def compare(results: Results, start: Start) -> tuple[bool, str]:
-        ratios = [getattr(results["I"][event], quantity) / getattr(results["IV"][event], quantity) for event in EVENTS]
+        ratios = [_ratio(*(getattr(results[case][event], quantity) for case in ("I", "IV"))) for event in EVENTS]
         return min(ratios) > 5.0, _by_event(f"{ratio:.1f} times" for ratio in ratios)
 
     return compare
+
+
+def _ratio(before: float, after: float) -> float:
+    return before / after if after else math.inf
 
 
 def _by_event(values: Iterable[str]) -> str:

@@ -58,7 +58,7 @@ def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ..
     >>> [(window.label, window.end) for window in windows([("event1", 1.0), ("event2", 4.0)], 7.0)]
     [('event1', 4.0), ('event2', 7.0)]
     """
-    ends = [*(t for _, t in events[1:]), end]
+    ends = [*(t for _, t in events), end][1:]
     return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
 
 

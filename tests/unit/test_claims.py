@@ -87,6 +87,22 @@ def test_a_claim_about_a_case_that_was_left_out_is_not_judged() -> None:
     assert verdicts["only_IV_restores"].found == "needs case I, II, III"
 
 
+def test_a_claim_about_an_event_that_is_not_there_is_not_judged() -> None:
+    """A copy of the experiment with other events is not compared with the paper's."""
+    results = {case: {"event1": events["event1"], "storm": events["event2"]} for case, events in paper().items()}
+
+    assert {verdict.status for verdict in judge(results, START)} == {"NOT RUN"}
+    assert verdict("IV_within_1_s", results).found == "needs event2"
+
+
+def test_nothing_left_to_better_is_better_by_any_factor() -> None:
+    """An MQSI of exactly 0 in case IV passes what asks for a factor."""
+    results = changed("IV", "event1", MQSI=0.0)
+
+    assert verdict("IV_5_times_below_II_and_III", results).status == "PASS"
+    assert verdict("IV_MQSI_5_times_better_than_I", results).status == "PASS"
+
+
 def test_every_tolerance_has_its_reason() -> None:
     """No number is compared, or left uncompared, without a word on why."""
     assert all(column.reason for column in COLUMNS)

@@ -180,6 +180,18 @@ def test_a_runs_copy_of_its_scenario_gives_the_same_bytes(elsewhere: Path) -> No
     assert Path("a/I/history.csv").read_bytes() == Path("b/I/history.csv").read_bytes()
 
 
+def test_a_scenario_without_events_runs_and_measures_nothing(elsewhere: Path) -> None:
+    """No event, no window: the history is there, and the measures are none."""
+    (elsewhere / "calm.toml").write_text('[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n')
+
+    code, text = invoke("run", "calm.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code == 0, text
+    found = json.loads((elsewhere / "here" / "metrics.json").read_text())
+    assert found["cases"]["calm"].keys() == {"history_sha256"}
+    assert len((elsewhere / "here" / "calm" / "history.csv").read_text().splitlines()) == 12
+
+
 def test_a_failed_claim_is_exit_code_1(elsewhere: Path) -> None:
     """Who departs from the paper and still asks for its verdict, gets it."""
     text = ISLANDING.replace("k_p = 0.0007", "k_p = 0.1")
