@@ -76,7 +76,8 @@ class AgentSide:
             self.keys.dismissal(config.name, instance): (PLANT, self._on_control),
             self.keys.measurement(config.name): (PLANT, self._on_measurement),
         }
-        self._plant_seen = False
+        self.plant_seen = False
+        """Whether the plant's token was ever there."""
         self._plant_incarnation = 0
         self._known: dict[Peer, bool] = {}
         """Peers whose nameplate is known; True once they have proven to hear our subscription."""
@@ -112,9 +113,26 @@ class AgentSide:
         return tuple(self._routes)
 
     @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return self.keys.ready(self._name), self.keys.state(self._name)
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+        return self.keys.any_alive
+
+    @property
     def over(self) -> bool:
         """Whether the driver should close."""
         return bool(self.stopped or self.failed)
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages without which the next tick cannot be computed."""
+        if self._tick is None or not self._ready_sent:
+            return 1
+        return max(1, len(self._waiting) + (self._measurement is None))
 
     @property
     def until(self) -> float | None:
@@ -130,9 +148,13 @@ class AgentSide:
         actions, self._actions = self._actions, []
         return actions
 
+    def work(self, now: float) -> bool:
+        """Nothing: an agent computes as soon as a message makes it possible."""
+        return False
+
     def missing(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
-        if not self._plant_seen:
+        if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
         if self._prepare is None:
             return (Awaited("Prepare", PLANT),)
@@ -154,7 +176,7 @@ class AgentSide:
         """Note that a token appeared."""
         match self.keys.parts(key):
             case ("alive", "plant"):
-                self._plant_seen = True
+                self.plant_seen = True
                 # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
                 self._patience.rest()
             case ("alive", "agent", name, instance) if name != self._name:

@@ -46,7 +46,7 @@ class PlantLike(Protocol):
         ...
 
     def advance(self) -> None:
-        """Go one control period on."""
+        """Go one control period on; RuntimeError if there is no solution."""
         ...
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:

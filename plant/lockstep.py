@@ -66,6 +66,8 @@ class PlantSide:
         self.phase: Phase = "gathering"
         self.outcome = ""
         """Why the run broke; empty while it goes well."""
+        self.cause: RuntimeError | None = None
+        """What the plant raised, if that broke the run."""
         self.reproducible = True
         self.tick = 0
         """k: the plant stands at k T_c."""
@@ -101,12 +103,27 @@ class PlantSide:
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return self.keys.any_state, self.keys.any_ready
+        return *self._state_keys, *self._ready_keys
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+        return self.keys.any_alive
 
     @property
     def over(self) -> bool:
         """Whether the driver should close."""
         return self.phase == "over"
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages without which the plant cannot go on."""
+        return max(1, len(self._waiting))
 
     @property
     def until(self) -> float | None:
@@ -252,7 +269,7 @@ class PlantSide:
             return False
         if self.phase == "ticking":
             self._finish_tick(now)
-        if self.tick < self._ticks:
+        if self.tick < self._ticks and not self.outcome:
             if self._roster_changed:
                 self._prepare(now)
             else:
@@ -321,7 +338,12 @@ class PlantSide:
             if state is not None:
                 self._plant.hold(name, state.P_set, state.V_set)
         self._states = {}
-        self._plant.advance()
+        try:
+            self._plant.advance()
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(str(error), now)
+            return
         self.tick += 1
         self._rows += self._plant.take_rows()
         self._events += self._plant.take_events()

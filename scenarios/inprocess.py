@@ -43,8 +43,6 @@ class Bus:
         The agents' cores, in the order in which they start.
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
-    broken : type[Exception]
-        What the plant raises when it has no solution.
     """
 
     def __init__(
@@ -52,10 +50,9 @@ class Bus:
         plant: PlantSide,
         agents: Iterable[AgentSide],
         on_telemetry: Callable[[Telemetry], None],
-        broken: type[Exception],
     ) -> None:
         self._plant, self._agents = plant, list(agents)
-        self._on_telemetry, self._broken = on_telemetry, broken
+        self._on_telemetry = on_telemetry
         self._subscribers: defaultdict[str, list[PlantSide | AgentSide]] = defaultdict(list)
         self._nameplates: dict[str, bytes] = {}
         self._queue: deque[_Delivery] = deque()
@@ -74,16 +71,9 @@ class Bus:
                 to.received(key, payload, 0.0)
                 self._do(to, to.take_actions())
             self._end_the_stopped()
-            if not (self._work() or plant.over or self._queue):
+            if not (plant.over or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing())
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
-
-    def _work(self) -> bool:
-        try:
-            return self._plant.work(0.0)
-        except self._broken as error:
-            self._plant.abort(str(error), 0.0)
-            return True
 
     def _start(self, agent: AgentSide) -> None:
         """Let an agent and everybody before it see each other."""
@@ -156,8 +146,6 @@ def run_inprocess(
     Outcome
         How it ended. A plant without solution is an outcome; a bad feeder or name is an exception, before the start.
     """
-    from plant.dynamics import PlantError  # numba and scipy: only for who runs a plant
-
     began = perf_counter()
     started = began
     events: list[PlantEvent] = []
@@ -170,12 +158,12 @@ def run_inprocess(
         on_telemetry(telemetry)
 
     if plant is None:
-        from plant.build import build_plant
+        from plant.build import build_plant  # numba and scipy: only for who runs a plant
 
         plant = build_plant(plant_config)
     side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant)
     agents = [AgentSide(config, f"p{i}") for i, config in enumerate(agent_configs)]
-    Bus(side, agents, note, PlantError).run()
+    Bus(side, agents, note).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

@@ -14,7 +14,7 @@ import msgspec
 from wire.messages import AnyMessage, Message
 
 LIMIT = 64_000
-"""Longest message in bytes. Zenoh's lowlatency transport carries less than 64 kB in one piece."""
+"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
 
 KINDS = {
     "oversized": "longer than a message may be",
@@ -102,6 +102,11 @@ class Rejects:
                 "More of this kind are only counted. See docs/protocol.md"
             )
         self.counts[kind] += 1
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether there are log lines to take."""
+        return bool(self._lines)
 
     def take_lines(self) -> tuple[str, ...]:
         """Log lines since last taken."""

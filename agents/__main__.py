@@ -1,0 +1,12 @@
+"""One agent: ``python -m agents < agent.json``. Exit statuses: see `wire.process`."""
+
+from __future__ import annotations
+
+import sys
+
+from agents.config import AgentConfig
+from agents.runtime import run_agent
+from wire.process import main
+
+if __name__ == "__main__":
+    sys.exit(main("agents", "the agent of one inverter", AgentConfig, run_agent))

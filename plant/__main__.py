@@ -1,0 +1,12 @@
+"""The plant: ``python -m plant < plant.json``. Exit statuses: see `wire.process`."""
+
+from __future__ import annotations
+
+import sys
+
+from plant.config import PlantConfig
+from plant.runtime import run_plant
+from wire.process import main
+
+if __name__ == "__main__":
+    sys.exit(main("plant", "the feeder and its inverters", PlantConfig, run_plant))

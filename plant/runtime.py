@@ -1,0 +1,84 @@
+"""The plant as a process: `plant.lockstep` on a Zenoh session."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import sys
+from collections.abc import Callable
+
+from plant.config import PlantConfig
+from plant.interface import PlantLike
+from plant.lockstep import PlantSide
+from wire.drive import StoppedError, drive, perform
+from wire.process import ConfigurationError
+from wire.session import Session
+
+LISTENING, COMPILING, READY = "listening", "compiling", "ready"
+"""Words on standard output, one a line: the rendezvous is there; the step is being compiled, which takes up to a minute
+at the very first start; agents are awaited."""
+
+
+def build(config: PlantConfig) -> PlantLike:
+    """Build the configuration's plant."""
+    from plant.build import build_plant  # numba and scipy take a second: only once the rendezvous is there
+
+    return build_plant(config)
+
+
+def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], PlantLike] = build) -> str:
+    """Run the plant until the end of the scenario.
+
+    The session is opened first, as it is the rendezvous: the agents find each other while the plant is built.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant, its agents and its times.
+    builder : Callable[[PlantConfig], PlantLike], optional
+        Makes the plant; tests have smaller ones.
+
+    Returns
+    -------
+    str
+        Why the run broke; empty after a good end.
+
+    Raises
+    ------
+    ConfigurationError, SessionError
+        If the configuration cannot work.
+    """
+    log = logging.getLogger("plant")
+    session = Session("plant", listen=config.listen, connect=config.connect)
+    try:
+        tell(LISTENING)
+        try:
+            tell(COMPILING)
+            side = PlantSide(config, builder(config))
+        except ValueError as error:
+            raise ConfigurationError(str(error)) from error
+        except RuntimeError as error:
+            return f"plant: cannot start: {error}"
+        for key in side.publications:
+            session.prepare(key)
+        gc.freeze()  # what was built stays: later collections need not look at it
+        tell(READY)
+        try:
+            drive(side, session, log)
+        except StoppedError as stop:
+            side.abort(f"the plant was asked to leave: {stop}", 0.0)
+            perform(side.take_actions(), session)
+            raise
+    finally:
+        session.close()
+    if side.cause is not None:
+        log.error("the plant broke", exc_info=side.cause)
+    if side.rejects.counts:
+        log.warning("plant: dropped messages by kind: %s", dict(side.rejects.counts))
+    return side.outcome
+
+
+def tell(word: str) -> None:
+    """Tell whoever started the process how far it is."""
+    sys.stdout.write(word + "\n")
+    sys.stdout.flush()

@@ -1,0 +1,169 @@
+"""Child processes: started with a configuration on standard input, watched, and always ended.
+
+Each child is its own process group, so Ctrl-C reaches the parent only, which then ends them in order. If the parent
+dies without a chance to do that, their standard input ends, and they leave (`wire.process`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+
+import msgspec
+
+from wire.process import LEASH
+
+LAST_LINES = 12
+"""Lines of a log that are shown when its process died."""
+
+GRACE = 2.0
+"""Time (s) that children have to leave once they are asked to."""
+
+
+class Child:
+    """One started process.
+
+    Parameters
+    ----------
+    name : str
+        Name of the inverter, or "plant".
+    command : list[str]
+        What to run, without the interpreter.
+    config : msgspec.Struct
+        Configuration, sent as one line of JSON.
+    log : Path
+        File for what it prints.
+    on_exit : Callable[[Child], None]
+        Called from another thread when it has ended.
+    on_word : Callable[[str], None], optional
+        Called from another thread with every line of its standard output.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        command: list[str],
+        config: msgspec.Struct,
+        log: Path,
+        on_exit: Callable[[Child], None],
+        on_word: Callable[[str], None] | None = None,
+    ) -> None:
+        self.name, self.log = name, log
+        # -P: a folder named like one of our packages, where the user stands, must not be imported instead
+        with log.open("wb") as stderr:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", *command, LEASH],
+                stdin=subprocess.PIPE,
+                stdout=stderr if on_word is None else subprocess.PIPE,
+                stderr=stderr,
+                start_new_session=True,
+            )
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # it died at once; its exit is reported
+            self._process.stdin.write(msgspec.json.encode(config) + b"\n")
+            self._process.stdin.flush()
+        self._watcher = threading.Thread(target=self._watch, args=(on_exit, on_word), daemon=True)
+        self._watcher.start()
+
+    def _watch(self, on_exit: Callable[[Child], None], on_word: Callable[[str], None] | None) -> None:
+        if on_word is not None and self._process.stdout is not None:
+            for line in self._process.stdout:
+                on_word(line.decode(errors="replace").strip())
+        self._process.wait()
+        on_exit(self)
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def status(self) -> int | None:
+        """Exit status, negative for a signal; None while it runs."""
+        return self._process.poll()
+
+    def signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        self._process.send_signal(number)
+
+    def join(self, until: float) -> bool:
+        """Wait for its end until a time (s, monotonic); whether it has ended."""
+        self._watcher.join(max(0.0, until - monotonic()))
+        return not self._watcher.is_alive()
+
+    def release(self) -> None:
+        """Close the pipes; a child that still ran would leave."""
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
+
+    def report(self, when: str) -> str:
+        """Sentence on how it ended, its last lines, and where the whole log lies."""
+        status = self.status
+        if status is None:
+            how = "still runs"
+        elif status < 0:
+            how = f"was killed by {signal.Signals(-status).name}"
+        else:
+            how = f"exited with status {status}"
+        lines = self.log.read_text(errors="replace").splitlines()[-LAST_LINES:]
+        last = "".join(f"\n    {line}" for line in lines) or " none."
+        return f"{self.name} {how} {when}. Its last lines:{last}\nWhole log: {self.log}"
+
+
+class Children:
+    """All children of a run; leaving the context ends every one of them."""
+
+    def __init__(self) -> None:
+        self._children: dict[str, Child] = {}
+
+    def __enter__(self) -> Children:
+        """Nothing to do yet."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End all, whatever the reason."""
+        self.end()
+
+    def __getitem__(self, name: str) -> Child:
+        return self._children[name]
+
+    def __iter__(self) -> Iterator[Child]:
+        return iter(self._children.values())
+
+    def add(self, child: Child) -> None:
+        """Take charge of a child."""
+        self._children[child.name] = child
+
+    def running(self) -> list[Child]:
+        """Those that have not ended."""
+        return [child for child in self._children.values() if child.status is None]
+
+    def wait(self, seconds: float) -> None:
+        """Let them leave by themselves."""
+        until = monotonic() + seconds
+        for child in self.running():
+            child.join(until)
+
+    def end(self) -> None:
+        """End all: ask, wait a short while, then kill. By process id, never by name."""
+        try:
+            for child in self.running():
+                child.signal(signal.SIGTERM)
+            self.wait(GRACE)
+        finally:  # a second Ctrl-C shortens the wait and nothing else
+            for child in self.running():
+                child.signal(signal.SIGKILL)
+            self.wait(GRACE)
+            for child in self._children.values():
+                child.release()

@@ -1,0 +1,251 @@
+"""Driver with processes: starts the plant and one process per agent, watches them, and ends them, whatever happens.
+
+The fleet decides nothing about the run. It records the plant's telemetry like any other peer could, and notices deaths.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from time import monotonic
+
+import msgspec
+
+from agents.config import AgentConfig
+from plant.config import PlantConfig
+from plant.runtime import READY
+from scenarios.children import Child, Children
+from scenarios.outcome import Outcome
+from wire.codec import RejectedError, Rejects, decode
+from wire.keys import Keys
+from wire.messages import PLANT, PlantEvent, Telemetry
+from wire.session import Session, SessionError
+
+RECORDER = "fleet"
+"""Name of the fleet's recorder in its run."""
+
+BUILD_DEADLINE = 600.0
+"""Longest time (s) until the plant must stand; compiling the step at the very first start takes up to a minute."""
+
+LEAVING = 2.5
+"""Time (s) that processes have to close at the end by themselves."""
+
+AFTERMATH = 0.3
+"""The same when the run broke: who died of it is noticed in this time, the others are ended."""
+
+_EXIT, _WORD = "exit/", "word/"
+
+
+def run_processes(
+    plant_config: PlantConfig,
+    agent_configs: Iterable[AgentConfig],
+    log_dir: Path,
+    on_telemetry: Callable[[Telemetry], None],
+    *,
+    start_order: Sequence[str] | None = None,
+    on_status: Callable[[str], None] | None = None,
+    on_start: Callable[[Children], None] | None = None,
+    plant_command: Sequence[str] = ("-m", "plant"),
+) -> Outcome:
+    """Run a scenario with a plant process and one process per agent.
+
+    Parameters
+    ----------
+    plant_config : PlantConfig
+        The plant. Its `listen` is used if it names a port other than 0, else a free port is chosen.
+    agent_configs : Iterable[AgentConfig]
+        The agents; where they connect is filled in.
+    log_dir : Path
+        Folder for `plant.log`, `inv1.log`, ...; made if it does not exist.
+    on_telemetry : Callable[[Telemetry], None]
+        Called with every telemetry message as it comes; the first at t = 0.
+    start_order : Sequence[str], optional
+        Names in the order of their start; the plant, named "plant", first unless said otherwise.
+    on_status : Callable[[str], None], optional
+        Called with "listening", "compiling", "ready" as the plant comes up.
+    on_start : Callable[[Children], None], optional
+        Called once all processes are started; the tests' way to hurt them.
+    plant_command : Sequence[str], optional
+        How the interpreter is told to run the plant; tests have smaller ones.
+
+    Returns
+    -------
+    Outcome
+        How it ended.
+
+    Raises
+    ------
+    SessionError
+        If the port is in use or Zenoh is missing; nothing has been started then.
+    """
+    agents = {config.name: config for config in agent_configs}
+    endpoint = _endpoint(plant_config.listen)
+    plant_config = msgspec.structs.replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
+    order = list(start_order) if start_order is not None else [PLANT, *agents]
+    if sorted(order) != sorted([PLANT, *agents]):
+        raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
+    log_dir.mkdir(parents=True, exist_ok=True)
+    keys = Keys(plant_config.run)
+    session = Session(RECORDER, connect=(endpoint,), gossip=False)
+    try:
+        watch = _Watch(session, plant_config, on_telemetry, on_status or (lambda word: None))
+        session.subscribe(keys.telemetry)
+        session.hold_token(keys.alive_recorder(RECORDER))
+        with Children() as children:
+            for name in order:
+                children.add(_start(name, plant_config, agents, endpoint, log_dir, plant_command, session))
+            if on_start is not None:
+                on_start(children)
+            watch.until_the_end(children)
+            session.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
+            children.wait(AFTERMATH if watch.broke else LEAVING)
+            watch.note_failures(children)
+        return watch.outcome()
+    finally:
+        session.close()
+
+
+def _start(
+    name: str,
+    plant_config: PlantConfig,
+    agents: dict[str, AgentConfig],
+    endpoint: str,
+    log_dir: Path,
+    plant_command: Sequence[str],
+    session: Session,
+) -> Child:
+    def on_exit(child: Child) -> None:
+        session.inbox.put(("word", _EXIT + child.name, b""))
+
+    def on_word(word: str) -> None:
+        session.inbox.put(("word", _WORD + word, b""))
+
+    log = log_dir / f"{name}.log"
+    if name == PLANT:
+        return Child(name, list(plant_command), plant_config, log, on_exit, on_word)
+    config = msgspec.structs.replace(agents[name], connect=(endpoint,))
+    return Child(name, ["-m", "agents"], config, log, on_exit)
+
+
+def _endpoint(listen: tuple[str, ...]) -> str:
+    """Endpoint of the rendezvous: the given one, if it is free, or a free one of this host."""
+    endpoint = listen[0] if listen else "tcp/127.0.0.1:0"
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tcp" or not host or not port.isascii() or not port.isdigit():
+        raise SessionError(
+            f'listen: "{endpoint}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one'
+        )
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # else a run that just ended is in the way
+        try:
+            probe.bind((host.strip("[]"), int(port)))
+            probe.listen()
+        except OSError as error:
+            raise SessionError(
+                f"listen: cannot use {endpoint}: {error.strerror or error}; choose another port, or 0 for a free one"
+            ) from None
+        return f"{protocol}/{host}:{probe.getsockname()[1]}"
+
+
+class _Watch:
+    """What the fleet has seen of the run so far."""
+
+    def __init__(
+        self,
+        session: Session,
+        config: PlantConfig,
+        on_telemetry: Callable[[Telemetry], None],
+        on_status: Callable[[str], None],
+    ) -> None:
+        self.broke = ""
+        self._inbox, self._T_c = session.inbox, config.T_c
+        self._patience = 3.0 * config.deadline + 5.0
+        """Longer than that of plant and agents: they know better what is wrong."""
+        self._on_telemetry, self._on_status = on_telemetry, on_status
+        self._rejects = Rejects(RECORDER)
+        self._began = self._started = self._ended_at = monotonic()
+        self._standing = False
+        self._last: Telemetry | None = None
+        self._t, self._ticks = 0.0, 0
+        self._ended = False
+        self._events: list[PlantEvent] = []
+        self._notes: dict[str, str] = {}
+
+    def until_the_end(self, children: Children) -> None:
+        """Take in everything until the last telemetry, or until the run cannot go on."""
+        since = self._began
+        while not self._ended:
+            patience = self._patience if self._standing else BUILD_DEADLINE
+            events = self._inbox.take(1, patience)
+            if events:
+                since = monotonic()
+            elif monotonic() - since >= patience:
+                report = children[PLANT].report(self._when)
+                self._break(f"nothing has happened for {patience:g} s, so the run was ended. {report}")
+            for kind, key, payload in events:
+                if kind == "message":
+                    self._take(key, payload)
+                elif key.startswith(_EXIT):
+                    self._note_exit(children[key.removeprefix(_EXIT)])
+                else:
+                    self._standing = self._standing or key == _WORD + READY
+                    self._on_status(key.removeprefix(_WORD))
+
+    def _take(self, key: str, payload: bytes) -> None:
+        try:
+            telemetry = decode(payload)
+            if not isinstance(telemetry, Telemetry):
+                raise RejectedError("unexpected", f"a {type(telemetry).__name__} instead of Telemetry")
+        except RejectedError as rejected:
+            self._rejects.add(rejected.kind, key, rejected.text)
+            return
+        if self._last is None:
+            self._started = monotonic()
+        self._last = telemetry
+        self._t = telemetry.t
+        self._ticks = round(telemetry.t / self._T_c)
+        self._events += telemetry.events
+        self._on_telemetry(telemetry)
+        if telemetry.final:
+            self._break(telemetry.outcome)
+
+    def _note_exit(self, child: Child) -> None:
+        if self._ended:
+            return
+        report = child.report(self._when)
+        if child.name == PLANT or self._last is None:
+            self._break(report)
+        elif child.status != 0:  # with 0 it was asked to leave, perhaps by the Stop that our telemetry goes with
+            self._notes[child.name] = report
+
+    def _break(self, reason: str) -> None:
+        """Note the end of the run; it is a good one if there is no reason."""
+        self.broke, self._ended, self._ended_at = reason, True, monotonic()
+
+    @property
+    def _when(self) -> str:
+        return "before t = 0" if self._last is None else f"after t = {self._t:g} s"
+
+    def note_failures(self, children: Children) -> None:
+        """Note who ended badly, or has not ended though the run has."""
+        for child in children:
+            told = child.name in self._notes or child.name == PLANT
+            if child.status != 0 and not told and not (self.broke and child.status is None):
+                self._notes[child.name] = child.report(self._when)
+
+    def outcome(self) -> Outcome:
+        """How the run ended, when all processes have."""
+        now = monotonic()
+        started = now if self._last is None else self._started
+        return Outcome(
+            broke=self.broke,
+            reproducible=self._last is not None and self._last.reproducible and not self.broke,
+            events=tuple(self._events),
+            notes=(*self._notes.values(), *self._rejects.take_lines()),
+            ticks=self._ticks,
+            start_s=started - self._began,
+            run_s=self._ended_at - started,
+        )

@@ -1,0 +1,103 @@
+"""A plant that can be solved by hand: linear droop, one frequency per island, no network.
+
+For the tests of everything around the plant: it starts at once and needs no numpy. Run as a script it is a plant
+process, like ``python -m plant``. From t = 0.1 s on it is an island.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import NamedTuple
+
+from plant.config import PlantConfig
+from plant.runtime import run_plant
+from wire.messages import PlantEvent
+from wire.process import main
+
+M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
+"""Droop (pu), nominal frequency (Hz) and voltage (V), rating (W), load per inverter in the island (pu)."""
+
+ISLANDING = 0.1
+"""Time (s) at which the grid is lost."""
+
+
+class Reading(NamedTuple):
+    """What the sensors of one inverter read."""
+
+    P: float
+    Q: float
+    V: float
+    f: float
+    P_set: float
+    V_set: float
+    grid_connected: bool
+    island: str
+
+
+class ToyPlant:
+    """Equal inverters on one bus: e = m_p (mean P_set - load), p = P_set - e/m_p, q = 20 (V_set - mean V_set), pu."""
+
+    def __init__(self, config: PlantConfig) -> None:
+        self.inverters = tuple(f"inv{i}" for i in range(1, int(config.settings.feeder.removeprefix("toy")) + 1))
+        self._config = config
+        self._P_set = dict.fromkeys(self.inverters, config.settings.P_set0)
+        self._V_set = {name: 1.0 + 0.001 * i for i, name in enumerate(self.inverters)}
+        self._tick = 0
+        self._rows: list[tuple[float, ...]] = [self._row()]
+        self._events: list[PlantEvent] = []
+
+    def measure(self) -> dict[str, Reading]:
+        """Solve the droops."""
+        n = len(self.inverters)
+        mean = sum(self._P_set.values()) / n
+        V_mean = sum(self._V_set.values()) / n
+        islanded = self._t >= ISLANDING
+        surplus = mean - LOAD if islanded else 0.0
+        return {
+            name: Reading(
+                P=(self._P_set[name] - surplus) * P_RATED,
+                Q=20.0 * (self._V_set[name] - V_mean) * P_RATED,
+                V=V_mean * V_NOM,
+                f=F_NOM * (1.0 + M_P * surplus),
+                P_set=self._P_set[name] * P_RATED,
+                V_set=self._V_set[name] * V_NOM,
+                grid_connected=not islanded,
+                island=self.inverters[0] if islanded else "grid",
+            )
+            for name in self.inverters
+        }
+
+    def hold(self, name: str, P_set: float, V_set: float) -> None:
+        """Take set-points (W, V)."""
+        self._P_set[name], self._V_set[name] = P_set / P_RATED, V_set / V_NOM
+
+    def advance(self) -> None:
+        """Go one control period on; started with P_set0 above 1 pu it has no solution as an island."""
+        if self._config.settings.P_set0 > 1.0 and self._t >= ISLANDING:
+            raise RuntimeError(f"no solution at t = {self._t:g} s: P_set0 is {self._config.settings.P_set0:g} pu")
+        self._tick += 1
+        if abs(self._t - ISLANDING) < 1e-9:
+            self._events.append(PlantEvent(t=self._t, kind="switch", subject="toy", text="the grid is lost"))
+        self._rows.append(self._row())
+
+    def take_rows(self) -> tuple[tuple[float, ...], ...]:
+        """Rows since last taken."""
+        rows, self._rows = tuple(self._rows), []
+        return rows
+
+    def take_events(self) -> tuple[PlantEvent, ...]:
+        """Events since last taken."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    @property
+    def _t(self) -> float:
+        return round(self._tick * self._config.T_c, 9)
+
+    def _row(self) -> tuple[float, ...]:
+        readings = self.measure().values()
+        return (self._t, *(x for r in readings for x in (r.f, r.P, r.Q, r.V, r.P_set, r.V_set)))
+
+
+if __name__ == "__main__":
+    sys.exit(main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant)))

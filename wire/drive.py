@@ -1,0 +1,142 @@
+"""The loop of every process in simulated time: a sans-IO core in front, a Zenoh session behind."""
+
+from __future__ import annotations
+
+import logging
+from time import monotonic
+from typing import Protocol
+
+from wire.actions import Action, Fetch, Publish
+from wire.codec import Rejects
+from wire.session import Session
+
+
+class Core(Protocol):
+    """What `agents.lockstep.AgentSide` and `plant.lockstep.PlantSide` have in common."""
+
+    rejects: Rejects
+
+    @property
+    def token(self) -> str:
+        """Key of the own token."""
+        ...
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to."""
+        ...
+
+    @property
+    def watched(self) -> str:
+        """Tokens to watch."""
+        ...
+
+    @property
+    def over(self) -> bool:
+        """Whether to close."""
+        ...
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages without which it cannot go on."""
+        ...
+
+    @property
+    def until(self) -> float | None:
+        """When the deadline passes (s)."""
+        ...
+
+    def start(self, now: float) -> None:
+        """Begin."""
+        ...
+
+    def take_actions(self) -> list[Action]:
+        """What is to be done."""
+        ...
+
+    def appeared(self, key: str, now: float) -> None:
+        """Note a token."""
+        ...
+
+    def vanished(self, key: str, now: float) -> None:
+        """Note a lost token."""
+        ...
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message."""
+        ...
+
+    def work(self, now: float) -> bool:
+        """Do a piece of work, if there is one."""
+        ...
+
+    def expire(self, now: float) -> None:
+        """Act on a passed deadline."""
+        ...
+
+
+class StoppedError(Exception):
+    """Another part of the process, or a signal, wants it to end."""
+
+
+def perform(actions: list[Action], session: Session) -> None:
+    """Do what a core asks for, in its order."""
+    for action in actions:
+        if isinstance(action, Publish):
+            session.publish(action.key, action.payload)
+        elif isinstance(action, Fetch):
+            session.fetch(action.key)
+        else:
+            session.subscribe(action.key)
+
+
+def drive(core: Core, session: Session, log: logging.Logger) -> None:
+    """Serve a core until it is over.
+
+    The token comes last of all that is declared: who sees it may count on the rest.
+
+    Parameters
+    ----------
+    core : Core
+        What decides.
+    session : Session
+        What carries; the caller has made it answer whatever the core must answer.
+    log : logging.Logger
+        Where rejects are told, one line per kind.
+
+    Raises
+    ------
+    StoppedError
+        If a word to stop comes into the inbox.
+    """
+    for key in core.subscriptions:
+        session.subscribe(key)
+    session.watch(core.watched)
+    session.hold_token(core.token)
+    take = session.inbox.take
+    now = monotonic()
+    core.start(now)
+    while True:
+        perform(core.take_actions(), session)
+        if core.over:
+            break
+        if core.work(now):
+            now = monotonic()
+            continue
+        until = core.until
+        events = take(core.wanted, None if until is None else max(0.0, until - now))
+        now = monotonic()
+        if not events:
+            core.expire(now)
+        for kind, key, payload in events:
+            if kind == "message":
+                core.received(key, payload, now)
+            elif kind == "appeared":
+                core.appeared(key, now)
+            elif kind == "vanished":
+                core.vanished(key, now)
+            else:
+                raise StoppedError(key)
+        if core.rejects.has_lines:
+            for line in core.rejects.take_lines():
+                log.warning("%s", line)

@@ -1,0 +1,108 @@
+"""What the processes of a run have in common: their start by a line of JSON, their log, their end.
+
+Exit statuses: 0 the run ended, or the process was asked to leave; 1 an error of our own, with a traceback in the log;
+2 a configuration that cannot work; 3 the run broke, or this process could not go on.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import TypeVar
+
+import msgspec
+
+from wire.drive import StoppedError
+from wire.session import SessionError
+
+OK, BAD_CONFIG, BROKE = 0, 2, 3
+
+_GRACE = 5.0
+"""Time (s) that a process has for a proper end once its parent is gone."""
+
+LEASH = "--leash"
+"""Option: end when standard input ends, that is, when the parent is gone."""
+
+_USAGE = """usage: python -m {module} [{leash}] < CONFIG.json
+
+Runs {what}. The configuration is one JSON object on standard input; see {module}/config.py.
+With {leash} it must be on one line, and the process ends when standard input does.
+"""
+
+C = TypeVar("C")
+
+
+class ConfigurationError(ValueError):
+    """A configuration that cannot work; the message says what would be right."""
+
+
+def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:
+    """Read the configuration, run, and say how it went.
+
+    Parameters
+    ----------
+    module : str
+        Name under which it is run, for the usage message.
+    what : str
+        What it runs, for the usage message.
+    config_type : type
+        Type of the configuration.
+    run : Callable[[C], str]
+        Runs and returns why it broke, or nothing.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
+    options = sys.argv[1:]
+    if options not in ([], [LEASH]):
+        sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH))
+        return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
+    log = logging.getLogger(module)
+    signal.signal(signal.SIGTERM, _stop)
+    try:
+        text = _read_line() if options else sys.stdin.buffer.read()
+        config = msgspec.json.decode(text, type=config_type)
+        if options:
+            threading.Thread(target=_end_with_parent, daemon=True).start()
+        broke = run(config)
+    except (StoppedError, KeyboardInterrupt) as stop:
+        log.info("asked to leave: %s", stop)
+        return OK
+    except (ConfigurationError, SessionError, msgspec.DecodeError) as error:
+        log.error("configuration: %s", error)
+        return BAD_CONFIG
+    if broke:
+        log.error("%s", broke)
+        return BROKE
+    return OK
+
+
+def _stop(signum: int, frame: FrameType | None) -> None:
+    raise StoppedError(signal.Signals(signum).name)
+
+
+def _read_line() -> bytes:
+    """First line of standard input, unbuffered: the rest is for the thread that waits for its end."""
+    line = bytearray()
+    while not line.endswith(b"\n"):
+        piece = os.read(0, 65536)
+        if not piece:
+            break
+        line += piece
+    return bytes(line)
+
+
+def _end_with_parent() -> None:
+    while os.read(0, 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+    threading.Event().wait(_GRACE)
+    os._exit(BROKE)

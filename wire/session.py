@@ -1,0 +1,192 @@
+"""A Zenoh session, set up for lock-step; the only module that knows Zenoh.
+
+Zenoh's threads only enqueue: what comes in stands in `Session.inbox`, and one thread, the owner's, takes it out.
+What each setting is for was measured (`docs/protocol.md`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from wire.inbox import Inbox, Kind
+
+if TYPE_CHECKING:
+    import zenoh
+
+_RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
+"""Few threads: one that receives and one pool for all else. Receiving in that pool too is faster by a tenth, but then a
+flood of messages can stall it."""
+
+LEASE = 60_000
+"""Time (ms) after which a silent link counts as dead. Long, because it must not decide: the death of a process closes
+its links at once, and one that lives but does nothing is for the deadlines of the lock-step."""
+
+_QUERY_TIMEOUT = 600.0
+"""Time (s) after which a query is forgotten; deadlines are kept by who asked."""
+
+
+class SessionError(ValueError):
+    """No session could be had; the message says why and what to do."""
+
+
+class Session:
+    """A peer of a run.
+
+    Parameters
+    ----------
+    who : str
+        Name of the process, for error messages.
+    listen : tuple[str, ...], optional
+        Endpoints to listen on, e.g. ("tcp/127.0.0.1:7447",). Without any, nobody can connect to this peer.
+    connect : tuple[str, ...], optional
+        Endpoints to connect to, tried again until they answer.
+    gossip : bool, optional
+        Whether to be told of the other peers by those connected to, and to connect to them in turn.
+
+    Raises
+    ------
+    SessionError
+        If Zenoh is not installed or an endpoint cannot be listened on.
+    """
+
+    def __init__(
+        self, who: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...] = (), gossip: bool = True
+    ) -> None:
+        os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
+        try:
+            import zenoh
+        except ImportError as error:
+            raise SessionError(
+                f"{who}: the package eclipse-zenoh is missing or broken ({error}); "
+                "install gridpeers with its dependencies, or use --driver inprocess"
+            ) from None
+        if "RUST_LOG" in os.environ:  # RUST_LOG=zenoh=debug shows what Zenoh does, in the process's log
+            zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
+        self.inbox = Inbox()
+        self._zenoh = zenoh
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._declared: list[Any] = []
+        try:
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_config(listen, connect, gossip))))
+        except zenoh.ZError as error:
+            raise SessionError(_explain(who, listen, str(error))) from None
+        self.id = str(self._session.zid())
+        """Unique id of this session: the instance of who holds it."""
+
+    def subscribe(self, key: str) -> None:
+        """Have messages on a key, without wildcards, put into the inbox."""
+        enqueue = self.inbox.put
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            enqueue(("message", key, sample.payload.to_bytes()))
+
+        handler = self._direct(on_sample)
+        remote = self._zenoh.Locality.REMOTE
+        self._declared.append(self._session.declare_subscriber(key, handler, allowed_origin=remote))
+
+    def answer(self, key: str, payload: bytes) -> None:
+        """Answer every query on a key with the same bytes."""
+
+        def on_query(query: zenoh.Query) -> None:
+            with query:
+                query.reply(key, payload)
+
+        handler = self._direct(on_query)
+        self._declared.append(self._session.declare_queryable(key, handler, complete=True))
+
+    def fetch(self, key: str) -> None:
+        """Query a key; an answer comes into the inbox like a message."""
+        enqueue = self.inbox.put
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                enqueue(("message", key, reply.ok.payload.to_bytes()))
+
+        consolidation = self._zenoh.ConsolidationMode.NONE
+        self._session.get(key, self._direct(on_reply), consolidation=consolidation, timeout=_QUERY_TIMEOUT)
+
+    def watch(self, key: str) -> None:
+        """Have tokens that appear and vanish put into the inbox, those already there included."""
+        enqueue, gone = self.inbox.put, self._zenoh.SampleKind.DELETE
+
+        def on_token(sample: zenoh.Sample) -> None:
+            kind: Kind = "vanished" if sample.kind == gone else "appeared"
+            enqueue((kind, str(sample.key_expr), b""))
+
+        handler = self._direct(on_token)
+        self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))
+
+    def hold_token(self, key: str) -> None:
+        """Be seen as alive under a key, until the session or the process ends."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Publish bytes on a key; blocks rather than drops."""
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            self.prepare(key)
+            publisher = self._publishers[key]
+        publisher.put(payload)
+
+    def prepare(self, key: str) -> None:
+        """Declare the publisher of a key, once."""
+        if key not in self._publishers:
+            self._publishers[key] = self._session.declare_publisher(
+                key,
+                congestion_control=self._zenoh.CongestionControl.BLOCK,
+                allowed_destination=self._zenoh.Locality.REMOTE,
+            )
+
+    def peers(self) -> int:
+        """Number of peers connected now."""
+        return len(self._session.info.peers_zid())
+
+    def close(self) -> None:
+        """Take back the tokens and leave."""
+        # close() may raise when a peer has just gone; there is nothing left to do about it
+        with contextlib.suppress(self._zenoh.ZError):
+            self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
+
+    def _direct(self, callback: Callable[[Any], None]) -> Any:
+        """Have a callback run in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
+        return self._zenoh.handlers.Callback(callback, indirect=False)
+
+
+def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool) -> dict[str, Any]:
+    return {
+        "mode": "peer",
+        "listen": {"endpoints": list(listen)},
+        "open": {"return_conditions": {"connect_scouted": False, "declares": False}},
+        "connect": {
+            "endpoints": list(connect),
+            "timeout_ms": -1,
+            "exit_on_failure": False,
+            "retry": {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5},
+        },
+        "scouting": {
+            "multicast": {"enabled": False},
+            # of two peers that hear of each other the one with the greater id connects: no double links
+            "gossip": {
+                "enabled": gossip,
+                "autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
+            },
+        },
+        "transport": {
+            # Not lowlatency, though it saves a fifth of a tick: while links are being made, a declaration could wait
+            # for a link to become writable and hold the lock that all Zenoh threads wait for (4 starts in 100 hung).
+            # Without QoS everything on a link keeps its order, on which discovery relies.
+            "unicast": {"lowlatency": False, "qos": {"enabled": False}},
+            "link": {"tx": {"lease": LEASE, "keep_alive": 4}},
+        },
+    }
+
+
+def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
+    endpoints = ", ".join(listen)
+    if "in use" in error:
+        return f"{who}: cannot listen on {endpoints}: the port is in use; choose another, or 0 for any free one"
+    return f"{who}: cannot open a Zenoh session (listening on {endpoints or 'nothing'}): {error}"
