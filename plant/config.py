@@ -82,8 +82,8 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     T_vf: float = 0.05
     """Filter of measured V (s)."""
     T_qf: float = 0.1
-    """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with four
-    GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
+    """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with
+    four GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
     db_UF: float = 0.0
     """Dead band below nominal frequency (Hz)."""
     db_OF: float = 0.0
