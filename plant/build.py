@@ -19,4 +19,5 @@ def build_plant(config: PlantConfig) -> Plant:
         If there is no operating point.
     """
     settings = config.settings
-    return Plant(Network(read_feeder(settings.feeder, settings.load_set)), settings, config.T_c, config.record_step)
+    network = Network(read_feeder(settings.feeder, settings.load_set), spares=settings.spares)
+    return Plant(network, settings, config.T_c, config.record_step)

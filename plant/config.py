@@ -129,6 +129,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     gfl: GflParameters = GflParameters()
     events: tuple[SwitchEvent, ...] = ()
     """Switches operated on schedule."""
+    spares: tuple[str, ...] = ()
+    """Spare inverters that are there, switched off at the start."""
 
 
 class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

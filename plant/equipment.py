@@ -161,6 +161,8 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     """P-f droop (pu frequency per pu power)."""
     m_q: float
     """Q-V droop (pu voltage per pu reactive power)."""
+    spare: bool = False
+    """Whether it stands by, switched off, until an agent comes for it."""
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):
@@ -182,3 +184,5 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     inverters: tuple[InverterRow, ...]
     source: Source | None
     """The substation, or None in a feeder that only inverters feed."""
+    spares: tuple[InverterRow, ...] = ()
+    """Inverters that are switched off until an agent comes for them; no part of a run with a fixed roster."""

@@ -136,6 +136,7 @@ class Plant:
                 for unit in network.inverters
             ),
             settings.h,
+            connected=[not unit.spare for unit in network.inverters],
         )
         n = len(self.inverters)
         self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))

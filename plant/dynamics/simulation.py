@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,6 +53,8 @@ class Dynamics:
         One per row of `circuit.terminals`.
     h
         Step (s).
+    connected
+        Which inverters are switched on at the start; all by default.
 
     Notes
     -----
@@ -59,7 +62,9 @@ class Dynamics:
     pu) may be written between runs.
     """
 
-    def __init__(self, circuit: Circuit, inverters: tuple[Inverter, ...], h: float) -> None:
+    def __init__(
+        self, circuit: Circuit, inverters: tuple[Inverter, ...], h: float, connected: Sequence[bool] | None = None
+    ) -> None:
         self.inverters, self.h = inverters, h
         n = len(inverters)
         self.forming = np.array([unit.kind == "GFM" for unit in inverters], dtype=bool)
@@ -72,7 +77,7 @@ class Dynamics:
         self.y_f[self.gfm_at], self.y_f[self.gfl_at] = self.gfm["y_f"], self.gfl["y_f"]
         self.S_b = np.array([unit.S_b for unit in inverters])
         self.V_b = np.array([unit.V_b for unit in inverters])
-        self.connected = np.ones(n, bool)
+        self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
         """Inverters switched on; they deliver only in a live island."""
         self.set_points = np.zeros((n, 3))
         self.J = np.zeros((n, 3), complex)

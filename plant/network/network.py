@@ -40,6 +40,9 @@ class Network:
     line_charging : bool, optional
         Whether the lines' shunt capacitance is taken in. The published solution of the standard feeder has it.
 
+    spares : iterable of str, optional
+        Names of the feeder's spare inverters that are there; ValueError if there is no such spare.
+
     Attributes
     ----------
     nodes : tuple of (bus, phase)
@@ -57,13 +60,13 @@ class Network:
     source_voltage : complex128[3] or complex128[0]
         Its voltages (V).
     inverters : tuple of InverterRow
-        In the table's order.
+        In the table's order, spares last.
     Y_branches, Y_capacitors, Y_loads : csc_array, complex, n x n
         Parts of the admittance matrix (S) before merging: lines and transformers; capacitor banks;
         constant-impedance loads.
     """
 
-    def __init__(self, feeder: Feeder, *, line_charging: bool = True) -> None:
+    def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
         self.feeder = feeder
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
@@ -75,7 +78,7 @@ class Network:
         )
         self.switches = {switch.name: switch for switch in feeder.switches}
         self.closed0 = frozenset(switch.name for switch in feeder.switches if switch.closed)
-        self.inverters: tuple[InverterRow, ...] = feeder.inverters
+        self.inverters: tuple[InverterRow, ...] = feeder.inverters + _chosen(feeder, tuple(spares))
         source = feeder.source
         self.source_nodes: NDArray[np.int64] = np.array(
             [self.index(source.bus, phase) for phase in PHASES] if source else [], dtype=np.int64
@@ -249,3 +252,12 @@ class Network:
             a_from=np.ones(len(n_from)),
             a_to=np.where(to < 0, 0.0, 1.0),
         )
+
+
+def _chosen(feeder: Feeder, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
+    """Give the spare inverters of these names, in the table's order."""
+    known = {row.name: row for row in feeder.spares}
+    for name in spares:
+        if name not in known:
+            raise ValueError(f'spare "{name}": no such spare inverter in "{feeder.name}"; there are {list(known)}')
+    return tuple(row for name, row in known.items() if name in spares)

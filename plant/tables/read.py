@@ -117,7 +117,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         capacitors=capacitors,
         regulators=regulators,
         transformers=transformers,
-        inverters=inverters,
+        inverters=tuple(row for row in inverters if not row.spare),
+        spares=tuple(row for row in inverters if row.spare),
         source=source,
     )
     if not mistakes:

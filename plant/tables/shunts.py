@@ -60,7 +60,7 @@ def read_capacitors(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple
 
 
 def read_inverters(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[InverterRow, ...]:
-    """Read inverters.csv: nameplates and places."""
+    """Read inverters.csv: nameplates and places. The column `spare` ("yes" or empty) may be missing."""
     columns = ("name", "kind", "bus", "microgrid", "P_rated_kW", "m_p_pu", "m_q_pu")
     inverters: dict[str, InverterRow] = {}
     at: dict[str, str] = {}
@@ -70,6 +70,9 @@ def read_inverters(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[
         bus = buses.find(row)
         P_rated = row.number("P_rated_kW", above=0.0) * 1000.0
         m_p, m_q = row.number("m_p_pu", above=0.0), row.number("m_q_pu", above=0.0)
+        spare = row.text("spare", default="")
+        if spare not in ("", "yes"):
+            row.mistake(f'spare "{spare}": must be "yes" or empty')
         if name in inverters:
             row.mistake(f'inverter "{name}": there is one of this name already; names must differ')
         if bus is None:
@@ -90,6 +93,7 @@ def read_inverters(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[
                 V_nom=bus.V_nom,
                 m_p=m_p,
                 m_q=m_q,
+                spare=spare == "yes",
             ),
         )
     return tuple(inverters.values())

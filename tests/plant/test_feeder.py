@@ -223,3 +223,31 @@ def test_a_switch_can_be_operated_by_hand() -> None:
 
     assert p.measure()["inv1"].island == "inv1"
     assert p.measure()["inv4"].island == "inv4"
+
+
+def test_a_spare_is_off_until_it_is_connected() -> None:
+    """A spare inverter changes nothing while it is off, and shares the load once it is on and told its set-points."""
+    events = opened(0.1, "13-152")
+    bare = plant(*events)
+    feeder = read_feeder("microgrid123", "main")
+    spared = Plant(Network(feeder, spares=["inv10"]), PlantSettings(events=events, spares=("inv10",)), T_C, T_C)
+
+    run(bare, 2.0)
+    run(spared, 2.0)
+    off = spared.measure()
+    spared.connect("inv10", on=True)
+    spared.hold("inv10", 200e3, off["inv9"].V_set)
+    run(spared, 4.0)
+
+    assert "inv10" not in bare.measure()
+    assert off["inv10"].P == 0.0
+    for name, reading in bare.measure().items():
+        assert pytest.approx(off[name].P, rel=1e-9) == reading.P
+    assert spared.measure()["inv10"].P > 150e3
+    assert spared.measure()["inv1"].f > off["inv1"].f + 0.01
+
+
+def test_an_unknown_spare_is_refused_by_name() -> None:
+    """A spare that the feeder does not have is named, with those there are."""
+    with pytest.raises(ValueError, match=r'spare "inv11": no such spare inverter .* \[\x27inv10\x27\]'):
+        Network(read_feeder("microgrid123", "main"), spares=["inv11"])

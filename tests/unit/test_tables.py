@@ -160,6 +160,7 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("capacitors.csv", 3, {"Q_b_kvar": "50"}, 'bus "88" has no phase B; it has A'),
     ("capacitors.csv", 3, {"Q_a_kvar": "-50"}, "Q_a_kvar must not be less than 0 kvar, got -50 kvar"),
     ("capacitors.csv", 3, {"V_rated_kV_LN": "0"}, "V_rated_kV_LN must be greater than 0 kV, got 0 kV"),
+    ("inverters.csv", 11, {"spare": "no"}, 'spare "no": must be "yes" or empty'),
     ("inverters.csv", 3, {"bus": "160"}, 'bus "160" has inverter "inv1" already; only one can stand on a bus'),
     ("inverters.csv", 3, {"bus": "94"}, 'bus "94" has no phase B, C; it has A'),
     ("inverters.csv", 3, {"name": "inv1"}, 'inverter "inv1": there is one of this name already; names must differ'),
