@@ -7,7 +7,8 @@ A driver (`agents.runtime` over Zenoh, `scenarios.inprocess` on a bus) does, fro
     for action in side.take_actions(): ...                  do it, in this order
     side.expire(now)                                        when `side.until` has passed
 
-until `side.over`. `now` is the driver's clock (s) and serves deadlines only: nothing that is computed depends on it.
+until `side.over`, the last actions included. `now` is the driver's clock (s) and serves deadlines only: nothing that is
+computed depends on it.
 
 **Finding each other.** Nothing tells an agent who exists. For every token of another agent it fetches the nameplate.
 Whom the rule makes its in-neighbour it listens to, then fetches the nameplate once more: subscription and query take
@@ -73,7 +74,7 @@ class AgentSide:
         self._actions: list[Action] = []
         self._routes: dict[str, tuple[str, Callable[[AnyMessage, float], None]]] = {
             self.keys.control: (PLANT, self._on_control),
-            self.keys.dismissal(config.name, instance): (PLANT, self._on_control),
+            self.keys.dismissal(config.name, instance): (PLANT, self._on_dismissal),
             self.keys.measurement(config.name): (PLANT, self._on_measurement),
         }
         self.plant_seen = False
@@ -231,6 +232,11 @@ class AgentSide:
             self._on_prepare(message, now)
         else:
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
+
+    def _on_dismissal(self, message: AnyMessage, now: float) -> None:
+        if not isinstance(message, Stop):
+            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Stop")
+        self.failed = message.reason
 
     def _on_prepare(self, message: Prepare, now: float) -> None:
         if len(message.instances) != len(message.roster):

@@ -8,7 +8,7 @@ A driver (`plant.runtime` over Zenoh, `scenarios.inprocess` on a bus) does, from
     for action in side.take_actions(): ...                  do it, in this order
     side.expire(now)                                        when `side.until` has passed
 
-until `side.over`. `now` is the driver's clock (s) and serves deadlines only.
+until `side.over`, the last actions included. `now` is the driver's clock (s) and serves deadlines only.
 
 **Phases.** *gathering*: until every agent of the configuration has a token and a nameplate, and every recorder a token.
 *preparing*: `Prepare` with the roster is out, until every agent on it is `Ready`. *ticking*: Measurement(k) is out,

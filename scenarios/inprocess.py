@@ -74,6 +74,7 @@ class Bus:
             if not (plant.over or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing())
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
+        self._do(plant, plant.take_actions())
 
     def _start(self, agent: AgentSide) -> None:
         """Let an agent and everybody before it see each other."""

@@ -68,8 +68,6 @@ class Keys:
         self.telemetry = f"{self._root}/telemetry"
         self.alive_plant = f"{self._root}/alive/plant"
         self.any_alive = f"{self._root}/alive/**"
-        self.any_state = f"{self._root}/state/*"
-        self.any_ready = f"{self._root}/ready/*"
 
     def measurement(self, inverter: str) -> str:
         """Sensor readings of an inverter, and the grant of a tick."""

@@ -1,0 +1,121 @@
+"""A network for the cores in which every link keeps its order and nothing else is sure: who is faster is drawn.
+
+That is what Zenoh promises, so what holds here for every drawing must hold there.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable
+from functools import partial
+
+from agents.config import AgentConfig
+from agents.lockstep import AgentSide
+from plant.config import PlantConfig
+from plant.lockstep import PlantSide
+from tests.toy.toy_plant import ToyPlant
+from wire.actions import Fetch, Publish
+from wire.codec import decode
+from wire.messages import PlantEvent, Telemetry
+
+Side = PlantSide | AgentSide
+
+
+class Links:
+    """Plant and agents, joined by links. Everybody is known by its token.
+
+    Parameters
+    ----------
+    plant_config : PlantConfig
+        The toy plant's.
+    agent_configs : Iterable[AgentConfig]
+        The agents.
+    rng : random.Random
+        Draws the link that delivers next.
+    """
+
+    def __init__(self, plant_config: PlantConfig, agent_configs: Iterable[AgentConfig], rng: random.Random) -> None:
+        self.plant = PlantSide(plant_config, ToyPlant(plant_config))
+        self.agents = [AgentSide(config, f"p{i}") for i, config in enumerate(agent_configs)]
+        self.telemetry: list[Telemetry] = []
+        self._rng = rng
+        self._living: dict[str, Side] = {side.token: side for side in (self.plant, *self.agents)}
+        self._links: defaultdict[tuple[str, str], deque[Callable[[], None]]] = defaultdict(deque)
+        self._subscribed: set[tuple[str, str, str]] = set()
+        """Sender, receiver and key of the subscriptions that have arrived at the sender."""
+        for side in self._living.values():
+            side.start(0.0)
+            for other in self._living.values():
+                if other is not side:
+                    self._subscribed |= {(other.token, side.token, key) for key in side.subscriptions}
+                    self._send(side.token, other.token, partial(other.appeared, side.token, 0.0))
+
+    @property
+    def rows(self) -> list[tuple[float, ...]]:
+        """All recorded rows."""
+        return [row for message in self.telemetry for row in message.rows]
+
+    @property
+    def events(self) -> list[PlantEvent]:
+        """All events."""
+        return [event for message in self.telemetry for event in message.events]
+
+    def agent(self, name: str) -> AgentSide:
+        """The first agent of a name."""
+        return next(agent for agent in self.agents if self.plant.keys.parts(agent.token)[2] == name)
+
+    def kill(self, name: str) -> None:
+        """Kill an agent: what it has sent arrives, then its token vanishes, everywhere at another time."""
+        self._leave(self.agent(name))
+
+    def run(self, until_tick: int | None = None) -> None:
+        """Step until the plant is over, or stands at a tick."""
+        while not self.plant.over and (until_tick is None or self.plant.tick < until_tick):
+            assert self.step(), f"stalled in phase {self.plant.phase} at tick {self.plant.tick}: {self.plant.missing()}"
+
+    def step(self) -> bool:
+        """Deliver one thing, or let the plant work; False if nothing is left to do."""
+        for agent in [agent for agent in self.agents if agent.over]:
+            self._leave(agent)
+        waiting = [link for link, deliveries in self._links.items() if deliveries and link[1] in self._living]
+        if waiting and self._rng.random() < 0.95:
+            self._links[self._rng.choice(waiting)].popleft()()
+        elif not self.plant.work(0.0) and not waiting:
+            return False
+        for token, side in self._living.items():
+            for action in side.take_actions():
+                if isinstance(action, Publish):
+                    self._publish(token, action.key, action.payload)
+                elif isinstance(action, Fetch):
+                    self._to_all(token, lambda to, a=action, b=token: partial(self._answer, to, b, a.key))
+                else:
+                    self._to_all(token, lambda to, a=action, b=token: partial(self._subscribed.add, (to, b, a.key)))
+        return True
+
+    def _leave(self, agent: AgentSide) -> None:
+        del self._living[agent.token]
+        self.agents.remove(agent)
+        self._to_all(agent.token, lambda to: partial(self._living[to].vanished, agent.token, 0.0))
+
+    def _to_all(self, sender: str, delivery: Callable[[str], Callable[[], None]]) -> None:
+        for to in self._living:
+            if to != sender:
+                self._send(sender, to, delivery(to))
+
+    def _send(self, sender: str, to: str, delivery: Callable[[], None]) -> None:
+        self._links[sender, to].append(delivery)
+
+    def _answer(self, token: str, asker: str, key: str) -> None:
+        side = self._living[token]
+        if isinstance(side, AgentSide) and side.nameplate[0] == key and asker in self._living:
+            self._send(token, asker, partial(self._living[asker].received, *side.nameplate, 0.0))
+
+    def _publish(self, sender: str, key: str, payload: bytes) -> None:
+        if key == self.plant.keys.telemetry:
+            telemetry = decode(payload)
+            assert isinstance(telemetry, Telemetry)
+            self.telemetry.append(telemetry)
+        for to, side in self._living.items():
+            if (sender, to, key) in self._subscribed:
+                self._send(sender, to, partial(side.received, key, payload, 0.0))

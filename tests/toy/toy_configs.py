@@ -1,0 +1,54 @@
+"""Configurations of a short run of the toy plant."""
+
+from __future__ import annotations
+
+from agents.config import AgentConfig, Control
+from plant.config import PlantConfig, PlantSettings
+from tests.toy.toy_plant import F_NOM, M_P, P_RATED, V_NOM
+
+ALL_FULL = Control(secondary="all", graph="full")
+"""Case IV."""
+
+
+def agent_config(name: str, control: Control = ALL_FULL, *, deadline: float = 10.0, run: str = "toy") -> AgentConfig:
+    """One agent; every third, from inv1 on, is a GFM, and three make a microgrid."""
+    number = int(name.removeprefix("inv")) - 1
+    return AgentConfig(
+        run=run,
+        name=name,
+        kind="GFL" if number % 3 else "GFM",
+        microgrid=f"mg{number // 3 + 1}",
+        P_rated=P_RATED,
+        V_nom=V_NOM,
+        f_nom=F_NOM,
+        m_p=M_P,
+        m_q=0.05,
+        T_c=0.02,
+        control=control,
+        deadline=deadline,
+        connect=(),
+    )
+
+
+def toy_configs(
+    n: int = 9,
+    control: Control = ALL_FULL,
+    *,
+    end: float = 0.4,
+    deadline: float = 10.0,
+    P_set0: float = 0.5,
+    run: str = "toy",
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Plant of n inverters, and their agents."""
+    names = tuple(f"inv{i + 1}" for i in range(n))
+    plant = PlantConfig(
+        run=run,
+        settings=PlantSettings(feeder=f"toy{n}", P_set0=P_set0),
+        agents=names,
+        T_c=0.02,
+        end=end,
+        record_step=0.02,
+        deadline=deadline,
+        listen=(),
+    )
+    return plant, tuple(agent_config(name, control, deadline=deadline, run=run) for name in names)

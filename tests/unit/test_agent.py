@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.config import Control
+from agents.law import P_set_step, V_set_step
+from tests.toy.toy_configs import ALL_FULL, agent_config
+from wire.messages import Measurement, Nameplate, State
+
+ROSTER = ("inv1", "inv2", "inv3")
+
+
+def measurement(k: int = 0, **changes: Any) -> Measurement:
+    """What inv1 measures in an island at 59.7 Hz."""
+    values: dict[str, Any] = {
+        "sender": "plant",
+        "incarnation": 1,
+        "seq": k,
+        "t": 0.02 * k,
+        "to": "inv1",
+        "P": 90e3,
+        "Q": 20e3,
+        "V": 271.46,
+        "f": 59.7,
+        "P_set": 50e3,
+        "V_set": 277.0,
+        "grid_connected": False,
+        "island": "inv1",
+        "roster": ROSTER,
+    }
+    return Measurement(**values | changes)
+
+
+def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, incarnation: int = 1) -> State:
+    """What a neighbour decided."""
+    return State(sender=sender, incarnation=incarnation, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
+
+
+def plate(name: str, *, incarnation: int = 1, P_rated: float = 100e3) -> Nameplate:
+    """Nameplate of one of the toy's inverters."""
+    return replace(Agent(agent_config(name)).nameplate, incarnation=incarnation, P_rated=P_rated)
+
+
+def met(control: Control = ALL_FULL, name: str = "inv1") -> Agent:
+    """An agent that has seen everybody's nameplate."""
+    agent = Agent(agent_config(name, control))
+    for other in ROSTER:
+        if other != name:
+            agent.meet(plate(other))
+    return agent
+
+
+def test_a_tick_is_the_law_in_per_unit() -> None:
+    """SI on the wire, per unit inside: set-points are those of the law, times the own bases."""
+    agent = met()
+    agent.meet(plate("inv3", P_rated=50e3))
+    agent.hear(state("inv2", P_set=60e3, Q=10e3))
+    agent.hear(state("inv3", P_set=40e3, Q=20e3))
+
+    decided = agent.tick(measurement(1), agent.in_neighbours(ROSTER))
+
+    gains = ALL_FULL.gains
+    P = P_set_step(0.5, 0.01 * (0.6 + 0.8) / 2, 2.0, -0.3 / 60.0, leader=True, m_p=0.01, gains=gains, T=0.02)
+    V = V_set_step(1.0, 0.05 * 0.2, 0.05 * (0.1 + 0.4) / 2, 2.0, 0.98, leader=True, gains=gains, T=0.02)
+    assert decided.P_set == pytest.approx(P * 100e3, rel=1e-12)
+    assert decided.V_set == pytest.approx(V * 277.0, rel=1e-12)
+    assert (decided.sender, decided.seq, decided.t, decided.Q) == ("inv1", 1, 0.02, 20e3)
+
+
+def test_on_hold_an_agent_follows_the_plant() -> None:
+    """While grid-connected the set-points are the plant's, so the law starts from them without a bump."""
+    agent = met(Control(secondary="all", graph="none"))
+    held = agent.tick(measurement(0, grid_connected=True, P_set=64.7e3, V_set=280.0))
+
+    first = agent.tick(measurement(1, P_set=1.0, V_set=1.0, f=60.0, V=277.0, Q=0.0))
+
+    assert (held.P_set, held.V_set) == (64.7e3, 280.0)
+    assert (first.P_set, first.V_set) == (pytest.approx(64.7e3), pytest.approx(280.0))
+
+
+def test_set_points_accumulate_in_the_island() -> None:
+    """In an island the next step starts from the own last set-points and not from what the plant reports."""
+    agent = met()
+    first = agent.tick(measurement(0))
+    second = agent.tick(measurement(1, P_set=0.0, V_set=0.0))
+
+    assert second.P_set > first.P_set > 50e3
+
+
+@pytest.mark.parametrize(("secondary", "name", "moves"), [
+    ("none", "inv1", False), ("GFM", "inv1", True), ("GFM", "inv2", False), ("all", "inv1", True),
+])  # fmt: skip
+def test_only_who_takes_part_moves(secondary: Any, name: str, moves: bool) -> None:
+    """Cases I to IV: the others keep the set-points that the plant holds (inv1 is a GFM, inv2 a GFL)."""
+    agent = met(Control(secondary=secondary, graph="full"), name)
+
+    decided = agent.tick(measurement(0))
+
+    assert ((decided.P_set, decided.V_set) != (50e3, 277.0)) == moves
+
+
+def test_a_neighbour_never_heard_from_is_left_out() -> None:
+    """Silence does not pull: with one of two neighbours heard, d is 1."""
+    silent, alone = met(), met()
+    for agent in (silent, alone):
+        agent.hear(state("inv2"))
+
+    assert silent.tick(measurement(0), ("inv2", "inv3")) == alone.tick(measurement(0), ("inv2",))
+
+
+def test_the_last_value_heard_counts() -> None:
+    """A neighbour that has fallen silent keeps its last value until it is taken out of the neighbours."""
+    agent, other = met(), met()
+    agent.hear(state("inv2", 4, P_set=90e3))
+    other.hear(state("inv2", 9, P_set=90e3))
+
+    assert agent.tick(measurement(10), ("inv2",)) == other.tick(measurement(10), ("inv2",))
+
+
+def test_ghosts_and_stale_states_are_ignored() -> None:
+    """An earlier life, a repeated or older tick, and strangers change nothing."""
+    agent = met()
+    agent.meet(plate("inv2", incarnation=2))
+    agent.hear(state("inv2", 5, incarnation=2))
+    before = agent.tick(measurement(6), ("inv2", "inv3"))
+
+    verdicts = [
+        agent.hear(state("inv2", 6, P_set=0.0, incarnation=1)),
+        agent.hear(state("inv2", 5, P_set=0.0, incarnation=2)),
+        agent.hear(state("inv2", 4, P_set=0.0, incarnation=2)),
+        agent.hear(state("inv9", 6, P_set=0.0)),
+        agent.hear(state("inv1", 6, P_set=0.0)),
+        agent.hear(state("inv2", 6, P_set=0.0, incarnation=3)),
+    ]
+    other = met()
+    other.hear(state("inv2", 5))
+    other.tick(measurement(6), ("inv2", "inv3"))
+
+    assert verdicts == ["ghost", "stale", "stale", "foreign", "foreign", "foreign"]
+    assert before.P_set > 0.0
+    assert agent.tick(measurement(7), ("inv2",)) == other.tick(measurement(7), ("inv2",))
+
+
+def test_the_latest_life_of_a_name_wins() -> None:
+    """After a restart the new nameplate counts, the ghost's is refused, and its last state is forgotten."""
+    agent, fresh = met(), met()
+    agent.hear(state("inv2", 7))
+
+    assert agent.meet(plate("inv2", incarnation=2))
+    assert not agent.meet(plate("inv2", incarnation=1))
+    assert agent.tick(measurement(8), ("inv2",)) == fresh.tick(measurement(8), ("inv2",))
+    assert agent.hear(state("inv2", 3, incarnation=2)) == ""
+
+
+def test_unknown_names_on_the_roster_are_no_neighbours() -> None:
+    """Whose nameplate has not been seen cannot be judged by the rule."""
+    assert met().in_neighbours((*ROSTER, "inv7")) == ("inv2", "inv3")

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wire.keys import Keys, check_name, describe
+from wire.messages import MESSAGES
+
+zenoh = pytest.importorskip("zenoh")
+
+
+@pytest.mark.parametrize("bad", ["", "a/b", "a*", "a b", "$x", "what?", "#1", "@x", "ä", "x" * 65])
+def test_names_that_zenoh_would_refuse_or_hide_are_refused(bad: str) -> None:
+    """The error names the field, the value and what would be right."""
+    with pytest.raises(ValueError, match=r"run: .* cannot be part of a Zenoh key; use 1 to 64 letters"):
+        Keys(bad)
+
+
+@given(st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True))
+def test_every_name_that_is_accepted_makes_a_key(name: str) -> None:
+    """Zenoh takes what we take."""
+    check_name("run", name)
+
+    zenoh.KeyExpr(Keys(name).state(name))
+
+
+def test_wildcards_cover_their_keys() -> None:
+    """Whoever watches `any_alive` sees every token, and nothing else."""
+    keys = Keys("demo")
+    tokens = (keys.alive_plant, keys.alive_agent("inv1", "a1"), keys.alive_recorder("fleet"))
+    pattern = zenoh.KeyExpr(keys.any_alive)
+
+    assert all(pattern.intersects(zenoh.KeyExpr(token)) for token in tokens)
+    assert not pattern.intersects(zenoh.KeyExpr(keys.state("inv1")))
+    assert not pattern.intersects(zenoh.KeyExpr(Keys("other").alive_plant))
+
+
+def test_parts_are_those_of_the_own_run_only() -> None:
+    """A key of another run, even of one whose name begins alike, has no parts."""
+    assert Keys("demo").parts(Keys("demo").state("inv1")) == ("state", "inv1")
+    assert Keys("demo").parts(Keys("demo2").state("inv1")) == ()
+
+
+def test_the_documentation_names_every_message_and_key() -> None:
+    """`gridpeers doc keys` has a row for each message type and no key twice."""
+    rows = describe()
+    messages = {name for row in rows for name in row.message.split(", ") if name != "-"}
+    expressions = [row.expression for row in rows]
+
+    assert messages == {message.__name__ for message in MESSAGES}
+    assert len(set(expressions)) == len(expressions)
+    assert all(expression.startswith("gridpeers/<run>/") for expression in expressions)
+    assert "gridpeers/<run>/alive/agent/<inverter>/<instance>" in expressions

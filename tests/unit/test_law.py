@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from agents.config import Gains
+from agents.law import P_set_step, V_set_step, towards
+
+Matrix = NDArray[np.float64]
+
+UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9, V_set_min=-1e9, V_set_max=1e9)
+M_P = 0.01
+KAPPA = M_P / UNBOUNDED.k_p
+PERIODS = st.floats(-3.0, 1.0).map(lambda x: 10.0**x)
+"""From 1 ms to 10 s."""
+
+
+@st.composite
+def graphs(draw: st.DrawFn, most: int = 30) -> Matrix:
+    """Adjacency of a connected graph: shapes that are known for trouble, or a random tree with random further links."""
+    n = draw(st.integers(2, most))
+    shape = draw(st.sampled_from(["path", "ring", "star", "full", "bipartite", "random"]))
+    i, j = np.indices((n, n))
+    if shape == "path":
+        return np.asarray(abs(i - j) == 1, float)
+    if shape == "ring":
+        return np.asarray(((i - j) % n == 1) | ((j - i) % n == 1), float)
+    if shape == "star":
+        return np.asarray((i == 0) ^ (j == 0), float)
+    if shape == "full":
+        return 1.0 - np.eye(n)
+    if shape == "bipartite":
+        left = draw(st.integers(1, n - 1))
+        return np.asarray((i < left) ^ (j < left), float)
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    A = np.triu(rng.random((n, n)) < rng.random(), 1).astype(float)
+    for k in range(1, n):
+        A[rng.integers(k), k] = 1.0
+    return A + A.T
+
+
+@st.composite
+def fleets(draw: st.DrawFn, spread: float = 10.0) -> tuple[Matrix, NDArray[np.bool_], Matrix]:
+    """A connected graph, its leaders (one at least) and everybody's rating, up to `spread` apart."""
+    A = draw(graphs())
+    n = len(A)
+    leader = np.zeros(n, bool)
+    leader[draw(st.lists(st.integers(0, n - 1), min_size=1, max_size=n, unique=True))] = True
+    rating = np.array(draw(st.lists(st.floats(1.0, spread), min_size=n, max_size=n)))
+    return A, leader, rating
+
+
+def step_all(y: Matrix, A: Matrix, leader: NDArray[np.bool_], e: Matrix, T: float, gains: Gains = UNBOUNDED) -> Matrix:
+    """One period of the law for everybody, through the law itself; y = m_p P_set."""
+    d = A.sum(axis=1)
+    y_bar = A @ y / np.maximum(d, 1.0)
+    stepped = [
+        P_set_step(y[i] / M_P, y_bar[i], d[i], e[i], leader=bool(leader[i]), m_p=M_P, gains=gains, T=T)
+        for i in range(len(y))
+    ]
+    return M_P * np.array(stepped)
+
+
+def as_matrix(A: Matrix, leader: NDArray[np.bool_], w: Matrix, T: float) -> Matrix:
+    """The map y -> y of one period, found by stepping the unit vectors, with the plant e = w y."""
+    unit = np.eye(len(A))
+    return np.array([step_all(y, A, leader, np.full(len(A), w @ y), T) for y in unit]).T
+
+
+@settings(deadline=None, max_examples=150)
+@given(fleets(), PERIODS)
+def test_frequency_and_sharing_are_stable_at_any_period_on_any_connected_graph(
+    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float
+) -> None:
+    """With one leader or more every mode of P_set decays, for 1 ms <= T <= 10 s, up to 30 agents."""
+    A, leader, rating = fleet
+
+    M = as_matrix(A, leader, rating / rating.sum(), T)
+
+    assert np.abs(np.linalg.eigvals(M)).max() < 1.0
+
+
+@settings(deadline=None, max_examples=150)
+@given(fleets(spread=3.0), PERIODS, st.integers(0, 2**32 - 1))
+def test_voltage_and_vars_are_stable_at_any_period_on_any_connected_graph(
+    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float, seed: int
+) -> None:
+    """With the plant v = H V_set, z = (1 - H) V_set of a random network every mode of V_set decays."""
+    A, leader, rating = fleet
+    n, rng = len(A), np.random.default_rng(seed)
+    lines = np.triu(rng.random((n, n)) * (rng.random((n, n)) < 0.3), 1)
+    lines[np.arange(n - 1), np.arange(1, n)] += 0.1
+    lines += lines.T
+    shunts = 10.0 ** rng.uniform(-1.0, 1.0) * np.diag(rng.random(n) + 0.1)
+    X = np.linalg.inv((np.diag(lines.sum(axis=1)) - lines) * 10.0 ** rng.uniform(0.0, 2.0) + shunts)
+    K = X @ np.diag(rating) / 0.05
+    H = np.linalg.solve(np.eye(n) + K, K)
+    d = A.sum(axis=1)
+
+    def step(V_set: Matrix) -> Matrix:
+        v, z = 1.0 + H @ V_set, (np.eye(n) - H) @ V_set
+        z_bar = A @ z / d
+        return np.array(
+            [
+                V_set_step(V_set[i], z[i], z_bar[i], d[i], v[i], leader=bool(leader[i]), gains=UNBOUNDED, T=T)
+                for i in range(n)
+            ]
+        )
+
+    M = np.array([step(unit) for unit in np.eye(n)]).T
+
+    assert np.abs(np.linalg.eigvals(M)).max() < 1.0
+
+
+@settings(deadline=None, max_examples=50)
+@given(fleets(), st.integers(0, 2**32 - 1))
+def test_a_short_period_gives_the_papers_derivative(fleet: tuple[Matrix, NDArray[np.bool_], Matrix], seed: int) -> None:
+    """For T -> 0 a step is -kappa T (L y + g e), equations (12) and (13)."""
+    A, leader, _ = fleet
+    rng = np.random.default_rng(seed)
+    y, e = rng.normal(size=len(A)), rng.normal(size=len(A))
+    T = 1e-9
+    L = np.diag(A.sum(axis=1)) - A
+
+    rate = (step_all(y, A, leader, e, T) - y) / T
+
+    assert rate == pytest.approx(-KAPPA * (L @ y + leader * e), rel=1e-5, abs=1e-4)
+
+
+def test_a_short_period_gives_the_papers_derivative_of_the_voltage_too() -> None:
+    """For T -> 0 a step is -T/k_q (alpha (v - 1) + beta d (z - z_bar)), (15), and a follower's has no alpha, (14)."""
+    T, z, z_bar, d, v = 1e-9, 0.03, 0.01, 8.0, 0.98
+    gains = Gains(k_q=0.5, alpha=5.0, beta_GFM=2.0, beta_GFL=1.5)
+
+    leader = (V_set_step(1.0, z, z_bar, d, v, leader=True, gains=gains, T=T) - 1.0) / T
+    follower = (V_set_step(1.0, z, z_bar, d, v, leader=False, gains=gains, T=T) - 1.0) / T
+
+    assert leader == pytest.approx(-(5.0 * (v - 1.0) + 2.0 * d * (z - z_bar)) / 0.5, rel=1e-6)
+    assert follower == pytest.approx(-(1.5 * d * (z - z_bar)) / 0.5, rel=1e-6)
+
+
+@settings(deadline=None, max_examples=50)
+@given(fleets(), PERIODS)
+def test_the_equilibrium_is_the_papers(fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float) -> None:
+    """Nothing moves exactly when all m_p P_set agree and the frequency is nominal, and nowhere else."""
+    A, leader, rating = fleet
+    w = rating / rating.sum()
+    agreed = np.full(len(A), 0.004)
+
+    assert step_all(agreed, A, leader, np.zeros(len(A)), T) == pytest.approx(agreed, abs=1e-15)
+    assert np.linalg.matrix_rank(np.eye(len(A)) - as_matrix(A, leader, w, T), tol=1e-12) == len(A)
+
+
+@given(st.floats(0.1, 100.0), st.floats(0.0, 40.0), PERIODS)
+def test_nobody_goes_more_than_half_of_the_way(rate: float, d: float, T: float) -> None:
+    """However long the period and however many the neighbours, they come to meet."""
+    assert 0.0 <= towards(rate, d, T) <= 0.5
+
+
+def test_a_pair_moves_as_in_continuous_time() -> None:
+    """Two linked followers approach each other by exp(-2 kappa T) exactly."""
+    A, T = np.array([[0.0, 1.0], [1.0, 0.0]]), 0.3
+    y = step_all(np.array([0.002, 0.008]), A, np.zeros(2, bool), np.zeros(2), T)
+
+    assert y == pytest.approx(0.005 + np.array([-0.003, 0.003]) * np.exp(-2.0 * KAPPA * T), rel=1e-12)
+
+
+def test_euler_would_diverge_where_this_does_not() -> None:
+    """Nine fully meshed agents at 20 ms: explicit Euler has a mode beyond -1, the law none."""
+    A = 1.0 - np.eye(9)
+    leader = np.arange(9) % 3 == 0
+    w = np.full(9, 1.0 / 9.0)
+    euler = np.eye(9) - KAPPA * 0.02 * (np.diag(A.sum(axis=1)) - A + np.outer(leader, w))
+
+    assert np.abs(np.linalg.eigvals(euler)).max() > 1.5
+    assert np.abs(np.linalg.eigvals(as_matrix(A, leader, w, 0.02))).max() < 0.95
+
+
+def test_many_neighbours_do_not_slow_the_frequency_down() -> None:
+    """The frequency mode of nine meshed agents decays at nearly kappa n_L/N, as in continuous time."""
+    A, T = 1.0 - np.eye(9), 0.02
+    leader = np.arange(9) % 3 == 0
+    slowest = np.abs(np.linalg.eigvals(as_matrix(A, leader, np.full(9, 1.0 / 9.0), T))).max()
+
+    assert -np.log(slowest) / T == pytest.approx(KAPPA * 3.0 / 9.0, rel=0.15)
+
+
+@given(st.floats(-10.0, 10.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.booleans())
+def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: float, leader: bool) -> None:
+    """Whatever comes in, P_set and V_set do not wind up."""
+    gains = Gains(P_set_min=0.1, P_set_max=0.9, V_set_min=0.95, V_set_max=1.05)
+
+    P = P_set_step(P_set, y_bar, 3.0, e, leader=leader, m_p=0.01, gains=gains, T=0.02)
+    V = V_set_step(P_set, y_bar, e, 3.0, 1.0 + e, leader=leader, gains=gains, T=0.02)
+
+    assert 0.1 <= P <= 0.9
+    assert 0.95 <= V <= 1.05

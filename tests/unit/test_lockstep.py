@@ -1,0 +1,348 @@
+from __future__ import annotations
+
+import random
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.config import Control, GraphRule
+from agents.lockstep import AgentSide
+from plant.lockstep import PlantSide
+from scenarios.inprocess import run_inprocess
+from tests.toy.links import Links
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_plant import ToyPlant
+from wire.codec import LIMIT, encode
+from wire.messages import Measurement, Prepare, Ready, State, Stop, Telemetry
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def links(seed: int = 0, n: int = 4, graph: GraphRule = "full", end: float = 0.4) -> Links:
+    """A short run of a small toy; the seed draws who is faster."""
+    plant, agents = toy_configs(n, Control(secondary="all", graph=graph), end=end)
+    return Links(plant, agents, random.Random(seed))
+
+
+def reference(n: int = 4, graph: GraphRule = "full", end: float = 0.4) -> list[tuple[float, ...]]:
+    """Rows of the in-process driver."""
+    plant, agents = toy_configs(n, Control(secondary="all", graph=graph), end=end)
+    rows: list[tuple[float, ...]] = []
+    run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(plant))
+    return rows
+
+
+def test_a_run_goes_to_its_end() -> None:
+    """One row for each tick and t = 0, in order, and the frequency is restored after the islanding."""
+    rows = reference(n=9, end=3.0)
+
+    assert [row[0] for row in rows] == [round(0.02 * k, 9) for k in range(151)]
+    assert min(row[1] for row in rows) < 59.9
+    assert rows[-1][1] == pytest.approx(60.0, abs=1e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
+def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
+    """Whatever the order in which links deliver, the rows are the same to the last bit, and nothing stalls."""
+    run = links(seed, graph=graph, end=0.2)
+    run.run()
+
+    assert run.rows == reference(graph=graph, end=0.2)
+    assert run.plant.outcome == ""
+    assert run.plant.reproducible
+    assert not run.plant.rejects.counts
+
+
+@settings(deadline=None, max_examples=60)
+@given(SEEDS, st.integers(0, 19), st.sampled_from(["full", "ring", "clustered"]))
+def test_the_run_survives_any_death_at_any_moment(seed: int, steps: int, graph: GraphRule) -> None:
+    """An agent that dies once ticks have begun is taken off the roster, which is said; the others go on to the end."""
+    run = links(seed, n=5, graph=graph, end=0.2)
+    while not run.telemetry:
+        assert run.step()
+    for _ in range(7 * steps):
+        run.step()
+    run.kill("inv3")
+    run.run()
+    deaths = [event for event in run.events if event.kind == "roster"]
+
+    assert run.plant.outcome == ""
+    assert run.rows[-1][0] == 0.2
+    if deaths:  # else it had left at the end already
+        assert not run.plant.reproducible
+        assert [event.subject for event in deaths] == ["inv3"]
+        assert f"inv3 died at t = {deaths[0].t:g} s; its inverter stays on primary droop" in deaths[0].text
+
+
+def test_the_dead_are_not_listened_to() -> None:
+    """The others restore the frequency and agree without inv2; its inverter keeps its last set-points."""
+    run = links(n=4, end=4.0)
+    run.run(until_tick=8)
+    run.kill("inv2")
+    run.run()
+    f = run.rows[-1][1::6]
+    P_set = run.rows[-1][5::6]
+
+    assert f == pytest.approx([60.0] * 4, abs=1e-3)
+    assert P_set[0] == pytest.approx(P_set[2], rel=1e-3)
+    assert P_set[0] == pytest.approx(P_set[3], rel=1e-3)
+    assert P_set[1] == run.rows[12][11]
+
+
+def test_a_run_without_any_agent_left_goes_on() -> None:
+    """When all agents have died the plant runs to its end on primary droop."""
+    run = links(n=2)
+    run.run(until_tick=3)
+    run.kill("inv1")
+    run.kill("inv2")
+    run.run()
+
+    assert run.plant.outcome == ""
+    assert run.rows[-1][0] == 0.4
+
+
+def test_who_dies_before_the_start_breaks_the_run() -> None:
+    """A run that begins without one of its agents would be another run."""
+    run = links(n=3)
+    while run.plant.phase == "gathering":
+        run.step()
+    run.kill("inv2")
+    run.run()
+
+    assert run.plant.outcome == "inv2 died before the run began"
+    assert run.telemetry[-1].final
+    assert run.telemetry[-1].outcome == run.plant.outcome
+    assert not run.agents
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS)
+def test_a_second_agent_of_a_name_is_refused(seed: int) -> None:
+    """Of two processes that claim a name one takes part; the other is told so by name, and the rows are the same."""
+    plant, agents = toy_configs(3, end=0.2)
+    run = Links(plant, (*agents, agent_config("inv2")), random.Random(seed))
+    claimants = [agent for agent in run.agents if "/inv2/" in agent.token]
+    run.run()
+    refused = [agent for agent in claimants if agent.failed]
+
+    assert len(refused) == 1
+    assert refused[0].failed.startswith("inv2: another agent of this name takes part in the run already")
+    assert run.rows == reference(n=3, end=0.2)
+    assert not any(agent.failed for agent in run.agents)
+
+
+def test_an_agent_of_an_unknown_name_is_refused() -> None:
+    """An agent without an inverter is told which names the plant waits for."""
+    plant, agents = toy_configs(2, end=0.1)
+    run = Links(plant, (*agents, agent_config("inv7")), random.Random(1))
+    stranger = run.agent("inv7")
+    run.run()
+
+    assert stranger.failed == "inv7: the plant waits for no agent of this name, only for inv1, inv2"
+    assert run.plant.outcome == ""
+
+
+@settings(deadline=None, max_examples=20)
+@given(SEEDS)
+def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
+    """Whatever bytes arrive on whatever key, nothing is raised, it is counted, and the rows are the same."""
+    run, rng = links(seed, n=3, end=0.1), random.Random(seed)
+    ghost = Stop(sender="plant", incarnation=0, seq=0, t=0.0, reason="a ghost")
+    forged = State(sender="inv2", incarnation=1, seq=0, t=0.0, P_set=0.0, V_set=0.0, Q=0.0)
+    late = Ready(sender="inv1", incarnation=1, seq=99, t=0.0)
+    payloads = [rng.randbytes(40), b"", b"x" * 70_000, encode(ghost), encode(late)]
+    while not run.plant.over:
+        run.step()
+        for side in (run.plant, *run.agents):
+            usable = payloads if run.telemetry else payloads[:3]
+            for key in (*side.subscriptions, run.plant.keys.state("inv1"), "gridpeers/other/control", "nonsense"):
+                side.received(key, rng.choice(usable), 0.0)
+            side.received(run.plant.keys.state("inv1"), encode(forged), 0.0)
+
+    assert run.rows == reference(n=3, end=0.1)
+    assert run.plant.rejects.counts["garbled"] > 0
+    assert run.plant.rejects.counts["foreign"] > 0
+    assert len(run.plant.rejects.take_lines()) == len(run.plant.rejects.counts)
+
+
+def test_a_plant_without_solution_breaks_the_run_for_all() -> None:
+    """What the plant says reaches the recorder, and the agents leave."""
+    plant, agents = toy_configs(2, P_set0=1.5)
+    run = Links(plant, agents, random.Random(0))
+    run.run()
+
+    assert run.plant.outcome == "no solution at t = 0.1 s: P_set0 is 1.5 pu"
+    assert run.telemetry[-1].outcome == run.plant.outcome
+    assert run.rows[-1][0] == 0.1
+    assert not run.agents
+
+
+def started(n: int = 2) -> tuple[PlantSide, AgentSide]:
+    """A plant that has sent Measurement(0), and one of its agents that has not heard of it yet."""
+    run = links(n=n)
+    agent = run.agent("inv1")
+    while run.plant.phase != "ticking":
+        run.step()
+    return run.plant, agent
+
+
+def test_the_plants_deadline_names_who_is_missing() -> None:
+    """Who, what, the last tick and the last sign of life."""
+    plant, _ = started()
+    state = State(sender="inv1", incarnation=1, seq=0, t=0.0, P_set=5e4, V_set=277.0, Q=0.0)
+    plant.received(plant.keys.state("inv1"), encode(state), 3.0)
+
+    plant.expire(9.9)
+    assert plant.outcome == ""
+    plant.expire(10.5)
+
+    assert plant.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.5 s ago"
+    assert plant.phase == "closing"
+
+
+def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
+    """Agents that never came, and recorders, are named."""
+    config, _ = toy_configs(2)
+    plant = PlantSide(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
+    plant.start(100.0)
+    plant.appeared(plant.keys.alive_agent("inv2", "a"), 101.0)
+
+    plant.expire(110.0)
+
+    assert plant.outcome == (
+        "plant: no token from inv1 within 10 s; nothing was ever heard from inv1. "
+        "no nameplate from inv2 within 10 s; nothing was ever heard from inv2. "
+        "no token from fleet within 10 s; nothing was ever heard from fleet"
+    )
+
+
+def test_an_agent_without_a_plant_says_so() -> None:
+    """It waits twice the deadline, so that a plant would complain first."""
+    agent = AgentSide(agent_config("inv1"), "a")
+    agent.start(0.0)
+    agent.expire(19.9)
+    assert not agent.over
+    agent.expire(20.0)
+
+    assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
+
+
+def test_a_plant_that_still_compiles_is_waited_for() -> None:
+    """Once its token is seen there is no deadline until it calls; its death ends the wait."""
+    agent = AgentSide(agent_config("inv1"), "a")
+    agent.start(0.0)
+    agent.appeared(agent.keys.alive_plant, 1.0)
+
+    assert agent.until is None
+    agent.vanished(agent.keys.alive_plant, 2.0)
+    assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"
+
+
+def two_agents() -> tuple[AgentSide, list[bytes]]:
+    """inv1 with inv2 as its neighbour, at tick 1 and waiting; and the plant's measurements of ticks 0 to 2."""
+    agent, keys = AgentSide(agent_config("inv1"), "a"), AgentSide(agent_config("inv1"), "a").keys
+    other = AgentSide(agent_config("inv2"), "b")
+    agent.start(0.0)
+    agent.appeared(keys.alive_plant, 0.0)
+    agent.appeared(other.token, 0.0)
+    agent.received(*other.nameplate, 0.0)
+    agent.received(*other.nameplate, 0.0)
+    prepare = Prepare(sender="plant", incarnation=1, seq=0, t=0.0, roster=("inv1", "inv2"), instances=("a", "b"))
+    agent.received(keys.control, encode(prepare), 0.0)
+    grants = [
+        encode(
+            Measurement(
+                sender="plant", incarnation=1, seq=k, t=0.02 * k, to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
+                P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", "inv2"),
+            )
+        )
+        for k in range(3)
+    ]  # fmt: skip
+    agent.received(keys.measurement("inv1"), grants[0], 1.0)
+    agent.take_actions()
+    return agent, grants
+
+
+def neighbour_state(k: int, P_set: float = 9e4) -> bytes:
+    """State of inv2 at tick k."""
+    return encode(State(sender="inv2", incarnation=1, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=0.0))
+
+
+def test_an_agent_waits_for_its_neighbours_state_of_the_tick_before() -> None:
+    """The measurement alone is not enough, and the deadline names the neighbour."""
+    agent, grants = two_agents()
+    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
+
+    assert agent.take_actions() == []
+    agent.expire(22.0)
+    assert agent.failed == "inv1: no State(0) from inv2 within 20 s; last heard of inv2: tick 0, 22.0 s ago"
+
+
+def test_a_state_that_comes_too_early_is_kept_back() -> None:
+    """State(1) of a faster neighbour is not used at tick 1, and is at tick 2."""
+    decided = []
+    for early in (True, False):
+        agent, grants = two_agents()
+        first, second = (0, 1) if early else (1, 0)
+        order: list[tuple[str, bytes]] = [(agent.keys.state("inv2"), neighbour_state(k)) for k in (0, 1)]
+        grant = (agent.keys.measurement("inv1"), grants[1])
+        for message in (order[first], order[second], grant) if early else (order[0], grant, order[1]):
+            agent.received(*message, 2.0)
+        agent.received(agent.keys.measurement("inv1"), grants[2], 3.0)
+        decided.append([action[1] for action in agent.take_actions()])
+        assert second != first
+
+    assert len(decided[0]) == 2
+    assert decided[0] == decided[1]
+
+
+def test_a_dead_neighbours_last_value_counts_once_more() -> None:
+    """The wait ends with the token; what was last heard is used."""
+    agent, grants = two_agents()
+    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
+    agent.vanished(agent.keys.alive_agent("inv2", "b"), 2.1)
+
+    assert len(agent.take_actions()) == 1
+    assert not agent.failed
+
+
+def test_the_token_of_another_instance_does_not_end_a_wait() -> None:
+    """A refused namesake that leaves is not the neighbour that is awaited."""
+    agent, grants = two_agents()
+    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
+    agent.vanished(agent.keys.alive_agent("inv2", "impostor"), 2.1)
+
+    assert agent.take_actions() == []
+
+
+def test_telemetry_comes_at_once_and_then_in_batches() -> None:
+    """The first row comes before the first tick, then ten ticks at a time, and the last message says that it is."""
+    run = links(end=0.5)
+    run.run()
+
+    assert [len(message.rows) for message in run.telemetry] == [1, 10, 10, 5]
+    assert [message.final for message in run.telemetry] == [False, False, False, True]
+    assert [message.seq for message in run.telemetry] == [0, 1, 2, 3]
+
+
+def test_large_telemetry_is_split() -> None:
+    """However many the inverters, no message is larger than the wire allows."""
+    config, _ = toy_configs(200, end=0.2)
+    telemetry: list[Telemetry] = []
+    alone = msgspec.structs.replace(config, agents=())
+    run_inprocess(alone, (), telemetry.append, plant=ToyPlant(config))
+
+    assert sum(len(message.rows) for message in telemetry) == 11
+    assert max(len(encode(message)) for message in telemetry) < LIMIT
+    assert len(telemetry) > 3
+
+
+def test_the_plant_refuses_agents_without_inverters() -> None:
+    """A configuration that names an unknown inverter says which there are."""
+    config, _ = toy_configs(2)
+
+    with pytest.raises(ValueError, match='agents: no inverter "inv3"; inverters are inv1, inv2'):
+        PlantSide(msgspec.structs.replace(config, agents=("inv1", "inv3")), ToyPlant(config))
