@@ -6,18 +6,25 @@ Ctrl-C, 143 by SIGTERM.
 
 from __future__ import annotations
 
-import sys
+import os
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
-if TYPE_CHECKING:
-    from plant.equipment import Feeder
-    from scenarios.spec import Scenario
-
-PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
+from scenarios.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    INTERRUPTED,
+    PASSED,
+    TERMINATED,
+    chosen,
+    fail,
+    load,
+    require,
+)
 
 app = typer.Typer(
     add_completion=False,
@@ -47,10 +54,13 @@ class Topic(StrEnum):
 
 def main() -> None:
     """Run the command line; no bad input ends in a traceback."""
+    # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
+    # It must be said before numpy is imported; the processes that are started inherit it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
     except KeyboardInterrupt:
-        _fail(["interrupted; everything that was started has ended"], INTERRUPTED)
+        fail(["interrupted; everything that was started has ended"], INTERRUPTED)
 
 
 @app.command()
@@ -78,9 +88,9 @@ def run(
     import signal
     from datetime import datetime
 
-    spec, feeder = _load(scenario)
-    spec = _chosen(spec, case, seed)
-    _require({"numba": "the plant"} | ({"zenoh": "the processes"} if driver is DriverName.processes else {}))
+    spec, feeder = load(scenario)
+    spec = chosen(spec, case, seed)
+    require({"numba": "the plant"} | ({"zenoh": "the processes"} if driver is DriverName.processes else {}))
 
     from rich.console import Console
 
@@ -96,7 +106,7 @@ def run(
             check_port(spec.processes.port)
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     except (FolderError, PortError) as error:
-        _fail([str(error)], BAD_INPUT)
+        fail([str(error)], BAD_INPUT)
 
     def terminate(*_: object) -> NoReturn:
         raise TerminatedError
@@ -108,10 +118,10 @@ def run(
         with progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)
     except BrokenRunError as error:
-        _fail([f"the run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
+        fail([f"the run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
     except KeyboardInterrupt as error:
         code = TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
-        _fail([f"interrupted; what came until then is in {shown(folder)}/"], code)
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], code)
     finally:
         signal.signal(signal.SIGTERM, before)
     show(report, console)
@@ -127,7 +137,7 @@ def list_() -> None:
     from scenarios.spec import catalogue
 
     for name in catalogue():
-        spec, _ = _load(name)
+        spec, _ = load(name)
         typer.echo(f"{name:16} {spec.title}. Cases: {', '.join(spec.cases)}")
 
 
@@ -141,7 +151,7 @@ def check(
 
     Example:  gridpeers check my-islanding.toml
     """
-    spec, feeder = _load(file)
+    spec, feeder = load(file)
     typer.echo(
         f"{file}: can be run: {len(spec.cases)} case(s) {', '.join(spec.cases)}; {len(spec.events)} event(s); "
         f"{spec.time.end_s:g} s; {len(feeder.inverters)} inverters on {len(feeder.buses)} buses"
@@ -157,47 +167,3 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
     from scenarios.reference import page
 
     typer.echo(page(topic.value), nl=False)
-
-
-def _load(name: str) -> tuple[Scenario, Feeder]:
-    from scenarios.spec import ScenarioError, load_scenario
-
-    try:
-        return load_scenario(name)
-    except ScenarioError as error:
-        count = len(error.mistakes)
-        head = [] if count == 1 else [f"{count} mistakes:"]
-        _fail([*head, *error.mistakes], BAD_INPUT)
-
-
-def _chosen(spec: Scenario, case: str, seed: int | None) -> Scenario:
-    """The scenario with the cases and the seed of the command line."""
-    import msgspec
-
-    from scenarios.spec import suggestion
-
-    if case:
-        names = list(dict.fromkeys(name.strip() for name in case.split(",") if name.strip()))
-        unknown = [name for name in names if name not in spec.cases]
-        if unknown or not names:
-            wrong = unknown or [case]
-            _fail([f'--case: no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in wrong], BAD_INPUT)
-        spec = msgspec.structs.replace(spec, cases={name: spec.cases[name] for name in spec.cases if name in names})
-    return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
-
-
-def _require(modules: dict[str, str]) -> None:
-    """End with a clear line when a package that the run needs is not installed."""
-    from importlib.util import find_spec
-
-    packages = {"zenoh": "eclipse-zenoh"}
-    missing = [name for name in modules if find_spec(name) is None]
-    if missing:
-        lines = [f"{packages.get(name, name)} is not installed; {modules[name]} need(s) it" for name in missing]
-        _fail([*lines, "install gridpeers with its dependencies: pip install -e ."], BAD_INPUT)
-
-
-def _fail(lines: list[str], code: int) -> NoReturn:
-    for line in lines:
-        print(f"gridpeers: {line}", file=sys.stderr)
-    raise SystemExit(code)

@@ -1,0 +1,87 @@
+"""What there is to see of a run at one moment, whoever shows it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from itertools import groupby
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One inverter and its agent. What is not known (yet) is None."""
+
+    name: str
+    kind: str = ""
+    """GFM or GFL."""
+    island: str = ""
+    """Name of its island: "grid", or the first inverter in it; "" if nobody has said."""
+    f: float | None = None
+    """Hz."""
+    P: float | None = None
+    """kW."""
+    P_set: float | None = None
+    """kW."""
+    P_share: float | None = None
+    """P by its rating (pu)."""
+    Q: float | None = None
+    """kvar."""
+    V: float | None = None
+    """pu of its nominal voltage."""
+    V_set: float | None = None
+    """pu of its nominal voltage."""
+    ages: dict[str, float] = field(default_factory=dict)
+    """Its neighbours, and how old (s) what it heard of each is."""
+    received: int | None = None
+    """Messages that came in."""
+    sent: int | None = None
+    """Messages that went out."""
+    lost: int | None = None
+    """Messages that were sent to it and never came."""
+    rejected: int | None = None
+    """Messages that came in and could not be used."""
+    note: str = ""
+    """What a person should know: "no agent", "waits for ...", "silent for 3 s"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """A run at one moment."""
+
+    run: str
+    t: float | None = None
+    """Run time (s)."""
+    pace: str = ""
+    """How well the plant keeps real time, in a few words."""
+    lines: tuple[Line, ...] = ()
+    """In the order of the inverters."""
+    events: tuple[tuple[float, str], ...] = ()
+    """Time (s) and text of what happened, the latest last."""
+
+
+def short(names: tuple[str, ...] | list[str]) -> str:
+    """Names of one stem and running numbers in few characters; "-" for none.
+
+    Examples
+    --------
+    >>> short(["inv1", "inv3", "inv4", "inv5", "north"])
+    'inv1,3-5 north'
+    >>> short([])
+    '-'
+    """
+    parts = [re.fullmatch(r"(.*?)(\d*)", name, re.DOTALL) for name in names]
+    split = [(match[1], match[2]) for match in parts if match is not None]
+    words = []
+    for stem, group in groupby(split, key=lambda part: (part[0], bool(part[1]))):
+        if not stem[1]:
+            words += [name for name, _ in group]
+            continue
+        numbers = sorted(int(number) for _, number in group)
+        runs = [
+            [number for _, number in run]
+            for _, run in groupby(enumerate(numbers), key=lambda place: place[1] - place[0])
+        ]
+        words.append(
+            stem[0] + ",".join(f"{run[0]}-{run[-1]}" if len(run) > 2 else ",".join(map(str, run)) for run in runs)
+        )
+    return " ".join(words) or "-"

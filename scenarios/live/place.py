@@ -1,0 +1,156 @@
+"""Where a run by hand is: its name, and the Zenoh endpoints where its processes meet."""
+
+from __future__ import annotations
+
+import re
+import socket
+from dataclasses import dataclass
+
+from wire.keys import check_name
+
+RUN = "gridpeers"
+"""Name of a run that nobody has named."""
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+"""Where the plant listens and the others connect, unless told otherwise; 7447 is Zenoh's own port."""
+
+_FORM = re.compile(
+    r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
+)
+_PROTOCOLS = ("tcp", "tls", "quic", "udp")
+_LOOPBACKS = ("127.", "localhost", "[::1]")
+
+
+class UsageError(ValueError):
+    """Something that was typed cannot be used; the message says what would be right."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A run and where to find it."""
+
+    run: str
+    """Name of the run, part of every key."""
+    connect: tuple[str, ...]
+    """Endpoints to connect to; one that answers is enough."""
+
+    def __str__(self) -> str:
+        """As it stands in messages.
+
+        Examples
+        --------
+        >>> print(Place(run="demo", connect=("tcp/127.0.0.1:7447",)))
+        run demo at tcp/127.0.0.1:7447
+        """
+        return f"run {self.run} at {', '.join(self.connect)}"
+
+
+def place(run: str, connect: list[str] | None) -> Place:
+    """Check what the options `--run` and `--connect` say.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    connect : list[str] or None
+        Endpoints; none stands for `ENDPOINT`.
+
+    Raises
+    ------
+    UsageError
+        If a name or an endpoint cannot be used.
+    """
+    return Place(run=check_run(run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT]))
+
+
+def check_run(run: str) -> str:
+    """Return the name of a run, if it can be a part of a Zenoh key.
+
+    Examples
+    --------
+    >>> check_run("lab-2")
+    'lab-2'
+    """
+    try:
+        check_name("--run", run)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    return run
+
+
+def check_endpoint(option: str, text: str) -> str:
+    """Return an endpoint if it has the form of one.
+
+    Parameters
+    ----------
+    option : str
+        Where it was typed. For "--listen" port 0 stands for any free one.
+    text : str
+        E.g. "tcp/192.168.1.10:7447".
+
+    Raises
+    ------
+    UsageError
+        If Zenoh could make nothing of it.
+
+    Examples
+    --------
+    >>> check_endpoint("--connect", "tcp/lab.example:7447")
+    'tcp/lab.example:7447'
+    """
+    match = _FORM.fullmatch(text)
+    if match is None:
+        host = re.fullmatch(r"(?:\w+/)?([\w.-]+)(?::(\d+))?", text)
+        example = f"tcp/{host[1]}:{host[2] or 7447}" if host else ENDPOINT
+        raise UsageError(f'{option}: "{text}" is no endpoint; write PROTOCOL/HOST:PORT, e.g. {example}')
+    if match["protocol"] not in _PROTOCOLS:
+        raise UsageError(f'{option}: {text}: no protocol "{match["protocol"]}"; protocols are {", ".join(_PROTOCOLS)}')
+    port, lowest = int(match["port"]), 0 if option == "--listen" else 1
+    if not lowest <= port <= 65535:
+        raise UsageError(f"{option}: {text}: a port is a number from {lowest} to 65535, got {port}")
+    return text
+
+
+def claim(option: str, text: str) -> str:
+    """Return an endpoint that this process will be able to listen on; a free port is chosen for port 0.
+
+    Raises
+    ------
+    UsageError
+        If the port is in use, or the address is not one of this machine.
+    """
+    match = _FORM.fullmatch(check_endpoint(option, text))
+    assert match is not None
+    if match["protocol"] not in ("tcp", "tls"):
+        return text
+    host, port = match["host"], int(match["port"])
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host.strip("[]"), port))
+            probe.listen()
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise UsageError(
+                f"{option}: {text} cannot be listened on: {reason}; end what uses it (gridpeers down "
+                "ends a run there), or choose another port, here by --listen and for the others by --connect"
+            ) from None
+        return f"{match['protocol']}/{host}:{probe.getsockname()[1]}{match['rest'] or ''}"
+
+
+def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
+    """Where a process must listen so that those it will be told of can connect to it.
+
+    Examples
+    --------
+    >>> return_path(("tcp/127.0.0.1:7447",)), return_path(("tcp/192.168.1.10:7447",))
+    (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
+    """
+    for text in connect:
+        match = _FORM.fullmatch(text)
+        assert match is not None
+        if not match["host"].startswith(_LOOPBACKS):
+            return ("tcp/[::]:0",) if match["host"].startswith("[") else ("tcp/0.0.0.0:0",)
+    return ("tcp/127.0.0.1:0",)

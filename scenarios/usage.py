@@ -1,0 +1,58 @@
+"""What all commands have in common: exit codes, a scenario by its name, and the one way to end with an error."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from plant.equipment import Feeder
+    from scenarios.spec import Scenario
+
+PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
+
+
+def load(name: str) -> tuple[Scenario, Feeder]:
+    """Read and check a scenario and its feeder, or end with every mistake in them."""
+    from scenarios.spec import ScenarioError, load_scenario
+
+    try:
+        return load_scenario(name)
+    except ScenarioError as error:
+        count = len(error.mistakes)
+        head = [] if count == 1 else [f"{count} mistakes:"]
+        fail([*head, *error.mistakes], BAD_INPUT)
+
+
+def chosen(spec: Scenario, case: str, seed: int | None) -> Scenario:
+    """The scenario with the cases and the seed of the command line."""
+    import msgspec
+
+    from scenarios.spec import suggestion
+
+    if case:
+        names = list(dict.fromkeys(name.strip() for name in case.split(",") if name.strip()))
+        unknown = [name for name in names if name not in spec.cases]
+        if unknown or not names:
+            wrong = unknown or [case]
+            fail([f'--case: no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in wrong], BAD_INPUT)
+        spec = msgspec.structs.replace(spec, cases={name: spec.cases[name] for name in spec.cases if name in names})
+    return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
+
+
+def require(modules: dict[str, str]) -> None:
+    """End with a clear line when a package that the run needs is not installed."""
+    from importlib.util import find_spec
+
+    packages = {"zenoh": "eclipse-zenoh"}
+    missing = [name for name in modules if find_spec(name) is None]
+    if missing:
+        lines = [f"{packages.get(name, name)} is not installed; {modules[name]} need(s) it" for name in missing]
+        fail([*lines, "install gridpeers with its dependencies: pip install -e ."], BAD_INPUT)
+
+
+def fail(lines: list[str], code: int) -> NoReturn:
+    """End the command with lines on standard error."""
+    for line in lines:
+        print(f"gridpeers: {line}", file=sys.stderr)
+    raise SystemExit(code)

@@ -1,0 +1,88 @@
+"""Run names and endpoints of the commands for runs by hand."""
+
+import socket
+
+import pytest
+
+from scenarios.live.place import UsageError, check_endpoint, claim, place, return_path
+
+
+def test_without_options_there_is_one_run_on_this_machine() -> None:
+    """No option is needed for one plant on a laptop."""
+    here = place("gridpeers", None)
+
+    assert (here.run, here.connect) == ("gridpeers", ("tcp/127.0.0.1:7447",))
+
+
+@pytest.mark.parametrize("run", ["a/b", "", "a*", "$", "run 1", "x" * 65, "@run", "é"])
+def test_a_run_name_that_zenoh_does_not_allow_is_refused(run: str) -> None:
+    """The line names the option, the name and what is allowed."""
+    with pytest.raises(UsageError, match=r"--run: .* cannot be part of a Zenoh key; use 1 to 64 letters"):
+        place(run, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("192.168.1.10", "write PROTOCOL/HOST:PORT, e.g. tcp/192.168.1.10:7447"),
+        ("lab:7450", "e.g. tcp/lab:7450"),
+        ("", "e.g. tcp/127.0.0.1:7447"),
+        ("http/lab:7447", 'no protocol "http"; protocols are tcp, tls, quic, udp'),
+        ("tcp/lab:0", "a port is a number from 1 to 65535, got 0"),
+        ("tcp/lab:70000", "a port is a number from 1 to 65535, got 70000"),
+        ("tcp/a b:7447", "is no endpoint"),
+    ],
+)
+def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) -> None:
+    """The mistake, the value, and the form that is right."""
+    with pytest.raises(UsageError) as told:
+        place("lab", [text])
+
+    assert str(told.value).startswith("--connect: ")
+    assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tls/lab.example:1", "tcp/lab:7447#iface=eth0"]
+)
+def test_endpoints_of_zenoh_are_taken_as_they_are(text: str) -> None:
+    """Names, both kinds of addresses, and Zenoh's own suffixes."""
+    assert check_endpoint("--connect", text) == text
+
+
+def test_a_port_in_use_is_told_before_anything_starts() -> None:
+    """The endpoint, the reason and the two ways out."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+
+        with pytest.raises(
+            UsageError, match=f"--listen: {text} cannot be listened on: address already in use; end what"
+        ):
+            claim("--listen", text)
+
+
+def test_port_0_becomes_a_free_port() -> None:
+    """The endpoint to be told to others has a number."""
+    assert int(claim("--listen", "tcp/127.0.0.1:0").rpartition(":")[2]) > 0
+
+
+def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
+    """192.0.2.0/24 belongs to nobody."""
+    with pytest.raises(UsageError, match="cannot be listened on"):
+        claim("--listen", "tcp/192.0.2.1:7447")
+
+
+@pytest.mark.parametrize(
+    ("connect", "listen"),
+    [
+        (("tcp/127.0.0.1:7447",), "tcp/127.0.0.1:0"),
+        (("tcp/localhost:7447", "tcp/[::1]:7447"), "tcp/127.0.0.1:0"),
+        (("tcp/127.0.0.1:7447", "tcp/10.0.0.1:7447"), "tcp/0.0.0.0:0"),
+        (("tcp/[fd00::1]:7447",), "tcp/[::]:0"),
+    ],
+)
+def test_who_connects_to_another_host_can_be_reached_from_there(connect: tuple[str, ...], listen: str) -> None:
+    """On the loopback as long as everything is on it, on every address otherwise."""
+    assert return_path(connect) == (listen,)
