@@ -11,7 +11,6 @@ import json
 import subprocess
 import sys
 from collections import Counter
-from queue import Empty
 from time import monotonic, perf_counter
 
 from scenarios.fleet import _endpoint
@@ -49,8 +48,9 @@ class Peer:
             name, listen=(endpoint if hub else "tcp/127.0.0.1:0",), connect=() if hub else (endpoint,)
         )
         self.seen: Counter[str] = Counter()
-        self.session.subscribe(f"{ROOT}/hello/*")
-        self.session.subscribe(f"{ROOT}/state/*")
+        for other in self.others:
+            self.session.subscribe(f"{ROOT}/hello/{other}")
+            self.session.subscribe(f"{ROOT}/state/{other}")
         if not hub:
             self.session.subscribe(f"{ROOT}/grant/{name}")
 
@@ -65,22 +65,20 @@ class Peer:
                 return
             until = monotonic() + HELLO_PERIOD
             while (left := until - monotonic()) > 0:
-                try:
-                    _, key, payload = self.session.inbox.get(timeout=left)
-                except Empty:
-                    break
-                who = key.rpartition("/")[2]
-                if "/hello/" not in key:
-                    self.seen[key] += 1
-                    continue
-                heard.add(who)
-                if payload == b"1":
-                    complete.add(who)
+                for _, key, payload in self.session.inbox.take(1, left):
+                    who = key.rpartition("/")[2]
+                    if "/hello/" not in key:
+                        self.seen[key] += 1
+                        continue
+                    heard.add(who)
+                    if payload == b"1":
+                        complete.add(who)
 
-    def wait(self, key: str, count: int) -> None:
-        """Return when so many messages have come on a key."""
-        while self.seen[key] < count:
-            self.seen[self.session.inbox.get(timeout=30.0).key] += 1
+    def wait(self, wanted: dict[str, int]) -> None:
+        """Return when so many messages have come on each key; sleep until as many are there as are missing."""
+        while missing := sum(max(0, count - self.seen[key]) for key, count in wanted.items()):
+            for _, key, _ in self.session.inbox.take(missing, 30.0):
+                self.seen[key] += 1
 
 
 def run(endpoint: str, rounds: int, names: list[str], name: str) -> None:
@@ -94,12 +92,9 @@ def run(endpoint: str, rounds: int, names: list[str], name: str) -> None:
         if name == "hub":
             for grant in grants:
                 peer.session.publish(grant, b"")
-            for state in states:
-                peer.wait(state, k + 1)
+            peer.wait(dict.fromkeys(states, k + 1))
         else:
-            peer.wait(f"{ROOT}/grant/{name}", k + 1)
-            for state in states:
-                peer.wait(state, k)
+            peer.wait(dict.fromkeys(states, k) | {f"{ROOT}/grant/{name}": k + 1})
             peer.session.publish(f"{ROOT}/state/{name}", b"")
     if name == "hub":
         print(perf_counter() - began)
