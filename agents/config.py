@@ -74,10 +74,16 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Control period (s)."""
     control: Control
     deadline: float
-    """Longest wait for any message (s)."""
+    """Longest wait for any message (s). Wall-clock: for the plant's first sign of life; 0 is for ever."""
     connect: tuple[str, ...]
     """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)
     """Where other agents can connect; port 0 is any free one."""
     incarnation: int = 1
     """Which life of this agent."""
+    clock: Literal["simulated", "wall"] = "simulated"
+    """Lock-step with the plant, or real time."""
+    speed: float = 1.0
+    """Wall-clock: run time per wall time (s/s), > 0."""
+    max_age: float = 0.25
+    """Wall-clock: a neighbour's state, or a measurement, older than this (s of run time) is not used."""

@@ -143,8 +143,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Agents the plant waits for before tick 0."""
     T_c: float
     """Control period (s), a multiple of h."""
-    end: float
-    """Duration of the run (s), a multiple of T_c."""
+    end: float | None
+    """Duration of the run (s), a multiple of T_c; None, in wall-clock time only: until somebody ends it."""
     record_step: float
     """Distance of the recorded rows (s): a multiple of h that divides T_c."""
     deadline: float
@@ -157,3 +157,13 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Recorders of the telemetry that the plant waits for before tick 0."""
     incarnation: int = 1
     """Which life of this plant."""
+    clock: Literal["simulated", "wall"] = "simulated"
+    """Lock-step with the agents, or real time."""
+    speed: float = 1.0
+    """Wall-clock: run time per wall time (s/s), > 0."""
+    wait_for_agents: float = 10.0
+    """Wall-clock: how long (s) the plant waits for its agents before it starts without those that are missing."""
+    strict: bool = False
+    """Wall-clock: whether the run breaks when it cannot keep pace."""
+    handout: dict[str, str] = {}
+    """Wall-clock: of each inverter the JSON that an agent started by hand is given to start with."""

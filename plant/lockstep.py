@@ -72,6 +72,8 @@ class PlantSide:
         self.tick = 0
         """k: the plant stands at k T_c."""
         self._config, self._plant = config, plant
+        if config.end is None:
+            raise ValueError("end: a run in simulated time must have one; give a multiple of T_c in s")
         self._ticks = ticks_until(config.end, config.T_c)
         self._patience = Patience(PLANT, config.deadline)
         self._actions: list[Action] = []

@@ -14,6 +14,10 @@ _CHUNK = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 """What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
 
 
+LATEST_ONLY = ("measurement", "state", "status")
+"""Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
+
+
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
     """One kind of key, for the protocol's documentation."""
 
@@ -66,6 +70,7 @@ class Keys:
         self._root = f"gridpeers/{run}"
         self.control = f"{self._root}/control"
         self.telemetry = f"{self._root}/telemetry"
+        self.command = f"{self._root}/command"
         self.alive_plant = f"{self._root}/alive/plant"
         self.any_alive = f"{self._root}/alive/**"
 
@@ -80,6 +85,22 @@ class Keys:
     def ready(self, inverter: str) -> str:
         """An agent hears its neighbours on a roster."""
         return f"{self._root}/ready/{inverter}"
+
+    def leave(self, inverter: str) -> str:
+        """The agent of an inverter leaves properly."""
+        return f"{self._root}/leave/{inverter}"
+
+    def status(self, inverter: str) -> str:
+        """How the agent of an inverter fares."""
+        return f"{self._root}/status/{inverter}"
+
+    def config(self, inverter: str) -> str:
+        """What the agent of an inverter is started with; answered on request."""
+        return f"{self._root}/config/{inverter}"
+
+    def answer(self, asker: str) -> str:
+        """What became of somebody's commands."""
+        return f"{self._root}/answer/{asker}"
 
     def dismissal(self, inverter: str, instance: str) -> str:
         """Word to one instance that it cannot take part."""
@@ -115,7 +136,7 @@ def describe() -> tuple[KeySpec, ...]:
 
     def row(key: str, kind: str, message: str, sender: str, listener: str, when: str) -> KeySpec:
         expression = key.replace("RUN", "<run>").replace("INV", "<inverter>").replace("INSTANCE", "<instance>")
-        expression = expression.replace("NAME", "<recorder>")
+        expression = expression.replace("NAME", "<recorder>").replace("ASKER", "<id>")
         return KeySpec(expression=expression, kind=kind, message=message, sender=sender, listener=listener, when=when)
 
     agent, instance = "INV", "INSTANCE"
@@ -139,7 +160,7 @@ def describe() -> tuple[KeySpec, ...]:
         row(keys.control, "publication", "Prepare, Stop", "plant", "agents", "before the first tick; at the end"),
         row(
             keys.dismissal(agent, instance), "publication", "Stop", "plant", "the one instance",
-            "when its name is taken or is no inverter of the feeder",
+            "when its name is taken or is no inverter of the feeder; wall-clock: when somebody stops it",
         ),
         row(
             keys.ready(agent), "publication", "Ready", "agent", "plant",
@@ -152,6 +173,26 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(
             keys.telemetry, "publication", "Telemetry", "plant", "recorders",
-            "at tick 0, every tenth tick, and at the end",
+            "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
+        ),
+        row(
+            keys.leave(agent), "publication", "Leave", "agent", "plant",
+            "wall-clock: when it leaves properly; the plant then takes its inverter off the network",
+        ),
+        row(
+            keys.status(agent), "publication", "AgentStatus", "agent", "watchers",
+            "wall-clock: every 0.5 s of wall time",
+        ),
+        row(
+            keys.config(agent), "queryable", "-", "plant", "an agent started by hand",
+            "wall-clock: asked once the plant's token is there; its AgentConfig as JSON",
+        ),
+        row(
+            keys.command, "publication", "Command", "command line", "plant",
+            "wall-clock: once the plant's token is there",
+        ),
+        row(
+            keys.answer("ASKER"), "publication", "Answer", "plant", "the command line that asked",
+            "wall-clock: one for every command",
         ),
     )  # fmt: skip

@@ -17,6 +17,9 @@ PLANT = "plant"
 Name = Annotated[str, msgspec.Meta(max_length=64)]
 """A name on the wire: never longer than 64 characters."""
 
+Text = Annotated[str, msgspec.Meta(max_length=200)]
+"""What a person typed: never longer than a line."""
+
 Number = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
 """A finite number: NaN and the infinities fail these bounds, and the message with them."""
 
@@ -90,6 +93,9 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     """Voltage set-point (V)."""
     Q: Number
     """Reactive power measured at tick k (var)."""
+    island: Name = ""
+    """Island the inverter stood in at that measurement: who stands in another one leaves this state out of its sums.
+    Empty if it is not known."""
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -106,10 +112,67 @@ class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
 
 
 class Stop(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """The run is over and agents close; or, sent to one agent, it cannot take part (plant -> agents)."""
+    """The run is over and agents close; or, sent to one agent, it cannot take part or shall leave (plant -> agents)."""
 
     reason: str
     """Why, for the log: "end of the scenario", or what went wrong."""
+    refused: bool = False
+    """Whether the agent never took part, as another has its name or no inverter has."""
+
+
+class Leave(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """An agent leaves properly: the plant takes its inverter off the network (agent -> plant, wall-clock time)."""
+
+
+class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """A person wants something of the plant (command line -> plant, wall-clock time)."""
+
+    verb: Literal["open", "close", "stop", "down", "status"]
+    """Open or close a switch; have an agent leave; end the run; tell how it stands."""
+    argument: Text = ""
+    """Name of the switch or of the agent; empty for the others."""
+    reply_to: Name
+    """Unique id of who asks: last part of the key of the `Answer`."""
+
+
+class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """What became of a command; `seq` is the command's (plant -> command line)."""
+
+    ok: bool
+    """Whether it was done."""
+    text: str
+    """One sentence for a person; the answer to "status" is one JSON object."""
+
+
+class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """How an agent fares (agent -> who watches, wall-clock time); `t` is its last measurement's."""
+
+    phase: Literal["seeking", "waiting", "running"]
+    """No plant is there; the plant is there but no fresh measurement; ticking."""
+    waits_for: str
+    """What it waits for, for a person; empty while it runs."""
+    island: Name
+    """Island it stands in: "grid", the first inverter in it, or empty if that is not known."""
+    neighbours: tuple[Name, ...]
+    """Whom the run's rule tells it to listen to among those present."""
+    ages: tuple[Number, ...]
+    """Of each neighbour the age of its last state (s of run time, on the own clock); -1 if none was heard."""
+    used: tuple[Name, ...]
+    """The neighbours in its sums now: heard, present, young enough and in the same island."""
+    received: Count
+    """Messages that came in and were used, since its start."""
+    sent: Count
+    """States sent since its start."""
+    rejected: Count
+    """Messages dropped since its start."""
+    lost: Count
+    """Messages that never came, by gaps in the numbers of who sent them, since its start."""
+    ticks: Count
+    """Ticks done since its start."""
+    missed: Count
+    """Ticks skipped since its start, as their time was over."""
+    lateness: Number
+    """Longest delay of a tick behind its time since the last status (s of wall time)."""
 
 
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -123,6 +186,25 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """The switch, island or agent concerned."""
     text: str
     """One sentence for a person."""
+
+
+class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How well the plant keeps real time: delays of its steps behind their due times, in s of wall time."""
+
+    steps: Count
+    """Steps since the start."""
+    late: Count
+    """Steps more than one control period (of wall time) late."""
+    p50: Number
+    """Median delay (s)."""
+    p95: Number
+    """95 % of the steps were not later than this (s)."""
+    p99: Number
+    """99 % of the steps were not later than this (s)."""
+    worst: Number
+    """Longest delay (s)."""
+    slipped: Number
+    """By how much the schedule was put off in all, as it could not be caught up with (s)."""
 
 
 class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -142,11 +224,15 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     outcome: str
     """Empty while running and after a clean end; else why the run broke."""
     reproducible: bool
-    """False once something unscripted (a dead agent) has entered the run."""
+    """False once something unscripted (a dead agent) has entered the run; always false in wall-clock time."""
+    pacing: Pacing | None = None
+    """How well the plant keeps real time; only in wall-clock time."""
 
 
-AnyMessage = Nameplate | Measurement | State | Prepare | Ready | Stop | Telemetry
+AnyMessage = (
+    Nameplate | Measurement | State | Prepare | Ready | Stop | Leave | Command | Answer | AgentStatus | Telemetry
+)
 """Everything that can arrive."""
 
-MESSAGES = (Nameplate, Measurement, State, Prepare, Ready, Stop, Telemetry)
+MESSAGES = (Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, Command, Answer, AgentStatus, Telemetry)
 """The types of `AnyMessage`, for documentation that is made from the code."""

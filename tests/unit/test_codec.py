@@ -31,7 +31,12 @@ def test_every_message_survives_the_wire(kind: type[msgspec.Struct]) -> None:
         more = {"rows": ((0.0, 60.0),), "events": events, "incarnation": 2, "seq": 7}
         flags = {"grid_connected": True, "final": False, "reproducible": True}
         words = {"sender": "inv1", "to": "inv1", "island": "grid", "microgrid": "mg1", "reason": "end", "outcome": ""}
-        return (examples | more | flags | words).get(field.name, 0.1 + 0.2)
+        flags |= {"refused": True, "ok": False}
+        words |= {"verb": "open", "argument": "sw1_2", "reply_to": "a1", "text": "done", "phase": "running"}
+        words |= {"waits_for": "", "pacing": None}
+        lists = {"neighbours": ("inv2", "inv3"), "ages": (0.01, -1.0), "used": ("inv2",)}
+        counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 9)
+        return (examples | more | flags | words | lists | counts).get(field.name, 0.1 + 0.2)
 
     message = kind(**{field.name: fill(field) for field in msgspec.structs.fields(kind)})
 
