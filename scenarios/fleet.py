@@ -162,8 +162,8 @@ class _Watch:
     ) -> None:
         self.broke = ""
         self._inbox, self._T_c = session.inbox, config.T_c
-        self._patience = 3.0 * config.deadline + 5.0
-        """Longer than that of plant and agents: they know better what is wrong."""
+        self._patience = 1.5 * config.deadline + 1.0
+        """Longer than the plant's: it knows better what is wrong, unless it is what is wrong."""
         self._on_telemetry, self._on_status = on_telemetry, on_status
         self._rejects = Rejects(RECORDER)
         self._began = self._started = self._ended_at = monotonic()
@@ -184,7 +184,7 @@ class _Watch:
                 since = monotonic()
             elif monotonic() - since >= patience:
                 report = children[PLANT].report(self._when)
-                self._break(f"nothing has happened for {patience:g} s, so the run was ended. {report}")
+                self._break(f"nothing was heard of the plant for {patience:g} s, so the run was ended: {report}")
             for kind, key, payload in events:
                 if kind == "message":
                     self._take(key, payload)
@@ -215,10 +215,12 @@ class _Watch:
     def _note_exit(self, child: Child) -> None:
         if self._ended:
             return
+        if child.name != PLANT and child.status == 0:
+            return  # it was asked to leave, perhaps by a Stop that is faster than the telemetry which goes with it
         report = child.report(self._when)
         if child.name == PLANT or self._last is None:
             self._break(report)
-        elif child.status != 0:  # with 0 it was asked to leave, perhaps by the Stop that our telemetry goes with
+        else:
             self._notes[child.name] = report
 
     def _break(self, reason: str) -> None:

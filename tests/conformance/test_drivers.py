@@ -1,0 +1,130 @@
+"""The same bodies with one process and with many: if both pass, the network code decides nothing."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from agents.config import AgentConfig, Control, GraphRule
+from plant.config import PlantConfig, SwitchEvent
+from scenarios.inprocess import run_inprocess
+from scenarios.outcome import Outcome
+from scenarios.spec import load_scenario
+from scenarios.spec.configs import configs
+from tests.toy.runs import FleetRun, Rows, first_difference
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_plant import ToyPlant
+
+
+@dataclass
+class Ran:
+    """What a driver gave."""
+
+    outcome: Outcome
+    rows: Rows = field(default_factory=list)
+
+
+Driver = Callable[[PlantConfig, tuple[AgentConfig, ...]], Ran]
+
+
+def in_one_process(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
+    """Run the toy, or the feeder if the configuration names one, by `scenarios.inprocess`."""
+    rows: Rows = []
+    toy = ToyPlant(plant) if plant.settings.feeder.startswith("toy") else None
+    return Ran(run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows), plant=toy), rows)
+
+
+@pytest.fixture(params=["inprocess", "processes"])
+def driver(request: pytest.FixtureRequest, tmp_path: Path) -> Driver:
+    """Each of the two drivers."""
+
+    def with_processes(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
+        run = FleetRun(plant, agents, tmp_path)
+        return Ran(run(), run.rows)
+
+    return in_one_process if request.param == "inprocess" else with_processes
+
+
+def test_a_run_ends_well(driver: Driver) -> None:
+    """The last tick is reported, nothing is dropped, and islanding is an event."""
+    ran = driver(*toy_configs(4))
+
+    assert ran.outcome.broke == ""
+    assert ran.outcome.reproducible
+    assert ran.outcome.ticks == 20
+    assert ran.outcome.notes == ()
+    assert [(event.kind, event.t) for event in ran.outcome.events] == [("switch", 0.1)]
+    assert [row[0] for row in ran.rows] == [round(0.02 * k, 9) for k in range(21)]
+
+
+@pytest.mark.parametrize("graph", ["none", "clustered", "ring"])
+def test_every_graph_gives_the_same_rows(driver: Driver, graph: GraphRule) -> None:
+    """Discovery finds the same neighbours as a bus that knows everybody."""
+    plant, agents = toy_configs(6, Control(secondary="all", graph=graph))
+
+    assert first_difference(in_one_process(plant, agents).rows, driver(plant, agents).rows) == ""
+
+
+def test_listed_links_give_the_same_rows(driver: Driver) -> None:
+    """An agent without any link takes part all the same."""
+    control = Control(secondary="all", graph="links", links=(("inv1", "inv2"), ("inv2", "inv3")))
+    plant, agents = toy_configs(4, control)
+
+    assert first_difference(in_one_process(plant, agents).rows, driver(plant, agents).rows) == ""
+
+
+def test_a_plant_without_solution_breaks_the_run(driver: Driver) -> None:
+    """The outcome is what the plant said, and what came until then is there."""
+    ran = driver(*toy_configs(2, P_set0=1.5))
+
+    assert ran.outcome.broke == "no solution at t = 0.1 s: P_set0 is 1.5 pu"
+    assert not ran.outcome.reproducible
+    assert ran.rows[-1][0] == 0.1
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_neither_start_order_nor_hash_seed_matter(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes started in any order, the plant last or in between, and with any PYTHONHASHSEED, give the same rows."""
+    plant, agents = toy_configs(9)
+    order = ["plant", *(agent.name for agent in agents)]
+    random.Random(seed).shuffle(order)
+    monkeypatch.setenv("PYTHONHASHSEED", str(seed))
+    run = FleetRun(plant, agents, tmp_path)
+    outcome = run(start_order=order)
+
+    assert outcome.broke == "", f"order {order}"
+    assert first_difference(in_one_process(plant, agents).rows, run.rows) == "", f"order {order}"
+
+
+def test_the_feeder_gives_the_same_rows_to_the_last_bit(tmp_path: Path) -> None:
+    """Case IV on the paper's feeder, islanded at 0.1 s and with its load lost at 0.24 s, nine agents."""
+    plant, agents = configs(*load_scenario("islanding"), "IV")
+    events = (
+        SwitchEvent(t=0.1, switch="13-152", action="open"),
+        SwitchEvent(t=0.24, switch="60-160", action="open"),
+    )
+    plant = msgspec.structs.replace(plant, end=0.4, settings=msgspec.structs.replace(plant.settings, events=events))
+    expected = in_one_process(plant, agents)
+    run = FleetRun(plant, agents, tmp_path)
+    outcome = run(plant_command=("-m", "plant"), start_order=["inv9", *(f"inv{i}" for i in range(1, 9)), "plant"])
+
+    assert outcome.broke == ""
+    assert first_difference(expected.rows, run.rows) == ""
+    assert outcome.events == expected.outcome.events
+
+
+def test_a_difference_is_shown_where_it_begins() -> None:
+    """The first row, its time, and each column that differs."""
+    a = [(0.0, 60.0, 1.0, 2.0, 3.0, 4.0, 5.0), (0.1, 60.0, 1.0, 2.0, 3.0, 4.0, 5.0)]
+    b = [a[0], (0.1, 59.0, 1.0, 2.0, 3.0, 4.0, 6.0)]
+
+    assert first_difference(a, b) == (
+        "first difference at t = 0.1 s: inv1 f (Hz): 60.0 != 59.0, inv1 V_set (V): 5.0 != 6.0"
+    )
+    assert first_difference(a, a[:1]) == "2 rows, but 1"
+    assert first_difference(a, a) == ""

@@ -1,0 +1,94 @@
+"""Runs of the drivers as tests want them: rows in a list, children remembered, first differences shown."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from agents.config import AgentConfig
+from plant.config import PlantConfig
+from scenarios.children import Child, Children
+from scenarios.fleet import run_processes
+from scenarios.outcome import Outcome
+from tests.toy import toy_plant
+from wire.messages import Telemetry
+
+TOY = (toy_plant.__file__,)
+"""Command of the toy plant's process."""
+
+Rows = list[tuple[float, ...]]
+COLUMNS = ("f (Hz)", "P (W)", "Q (var)", "V (V)", "P_set (W)", "V_set (V)")
+
+
+class FleetRun:
+    """One run with processes.
+
+    Parameters
+    ----------
+    plant, agents
+        Configurations.
+    log_dir : Path
+        Folder of the logs.
+    """
+
+    def __init__(self, plant: PlantConfig, agents: Sequence[AgentConfig], log_dir: Path) -> None:
+        self.plant, self.agents, self.log_dir = plant, agents, log_dir
+        self.rows: Rows = []
+        self.children: Children | None = None
+        self.pids: list[int] = []
+        self._at: list[tuple[float, Callable[[], None]]] = []
+
+    def at(self, t: float, do: Callable[[], None]) -> None:
+        """Do something as soon as telemetry of t (s) or later is in."""
+        self._at.append((t, do))
+
+    def child(self, name: str) -> Child:
+        """One of the processes."""
+        assert self.children is not None
+        return self.children[name]
+
+    def __call__(self, **more: Any) -> Outcome:
+        """Run; afterwards no process is left."""
+        try:
+            return run_processes(
+                self.plant,
+                self.agents,
+                self.log_dir,
+                self._take,
+                on_start=self._started,
+                **{"plant_command": TOY} | more,
+            )
+        finally:
+            assert [pid for pid in self.pids if exists(pid)] == []
+
+    def _started(self, children: Children) -> None:
+        self.children = children
+        self.pids = [child.pid for child in children]
+
+    def _take(self, telemetry: Telemetry) -> None:
+        self.rows += telemetry.rows
+        due = [do for t, do in self._at if telemetry.t >= t]
+        self._at = [(t, do) for t, do in self._at if telemetry.t < t]
+        for do in due:
+            do()
+
+
+def exists(pid: int) -> bool:
+    """Whether there is a process of this id."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def first_difference(expected: Rows, got: Rows) -> str:
+    """The first row in which two runs differ, column by column; empty if none does."""
+    for a, b in zip(expected, got, strict=False):
+        if a != b:
+            names = ["t (s)", *(f"inv{i + 1} {column}" for i in range(len(a) // 6) for column in COLUMNS)]
+            pairs = [f"{n}: {x!r} != {y!r}" for n, x, y in zip(names, a, b, strict=True) if x != y]
+            return f"first difference at t = {a[0]:g} s: " + ", ".join(pairs[:6])
+    return "" if len(expected) == len(got) else f"{len(expected)} rows, but {len(got)}"
