@@ -18,6 +18,10 @@ LATEST_ONLY = ("measurement", "state", "status")
 """Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
 
 
+ANY_ALIVE_PLANT = "gridpeers/*/alive/plant"
+"""Tokens of the plants of all runs: who is told a wrong run name is told the right ones."""
+
+
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
     """One kind of key, for the protocol's documentation."""
 
@@ -128,6 +132,20 @@ class Keys:
         """
         root = self._root + "/"
         return tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
+
+
+def run_of_plant(key: str) -> str:
+    """Name of the run whose plant has this token; empty for any other key.
+
+    Examples
+    --------
+    >>> run_of_plant("gridpeers/demo/alive/plant")
+    'demo'
+    """
+    match key.split("/"):
+        case ("gridpeers", run, "alive", "plant"):
+            return run
+    return ""
 
 
 def describe() -> tuple[KeySpec, ...]:

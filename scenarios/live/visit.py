@@ -1,0 +1,138 @@
+"""A command's visit to a run: it connects, sees who is there, asks, listens and goes. No run depends on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from time import monotonic
+from types import TracebackType
+
+from scenarios.live.place import Place, return_path
+from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
+from wire.session import Session
+
+VISITOR = "visitor"
+
+REMINDER = 5.0
+"""A wait is said again after so long (s)."""
+
+
+class NobodyError(ValueError):
+    """What was looked for is not there; the message says where it was looked for, how long, and what to do."""
+
+
+class Visit:
+    """A session at a run.
+
+    Parameters
+    ----------
+    where : Place
+        The run and its endpoints.
+    meet_agents : bool, optional
+        Whether to connect to the agents too, to hear what they publish; the plant alone is enough to ask it.
+    """
+
+    def __init__(self, where: Place, *, meet_agents: bool = False) -> None:
+        self.where, self.keys = where, Keys(where.run)
+        listen = return_path(where.connect) if meet_agents else ()
+        self._session = Session(VISITOR, listen=listen, connect=where.connect, gossip=meet_agents)
+        self.plant = False
+        """Whether the plant's token is there."""
+        self.agents: dict[str, set[str]] = {}
+        """Tokens of agents: inverter -> its instances."""
+        self._runs: set[str] = set()
+        self._answers = self.keys.answer(self._session.id)
+        self._session.subscribe(self._answers)
+        self._session.watch(self.keys.any_alive)
+        self._session.watch(ANY_ALIVE_PLANT)
+
+    def __enter__(self) -> Visit:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._session.close()
+
+    @property
+    def id(self) -> str:
+        """Id of the session, in the key of its answers."""
+        return self._session.id
+
+    def listen(self, key: str) -> None:
+        """Have messages on a key come in."""
+        self._session.subscribe(key)
+
+    def fetch(self, key: str) -> None:
+        """Ask a queryable; what it answers comes in as messages on that key."""
+        self._session.fetch(key)
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Publish bytes."""
+        self._session.publish(key, payload)
+
+    def take(self, seconds: float) -> Iterator[tuple[str, bytes]]:
+        """Wait (s) for something to happen; give key and bytes of the messages among it."""
+        for kind, key, payload in self._session.inbox.take(1, max(0.0, seconds)):
+            if kind == "message":
+                yield key, payload
+            elif kind != "word":
+                self._note(key, there=kind == "appeared")
+
+    def _note(self, key: str, *, there: bool) -> None:
+        run = run_of_plant(key)
+        if run:
+            (self._runs.add if there else self._runs.discard)(run)
+        match self.keys.parts(key):
+            case ("alive", "plant"):
+                self.plant = there
+            case ("alive", "agent", name, instance) if there:
+                self.agents.setdefault(name, set()).add(instance)
+            case ("alive", "agent", name, instance):
+                self.agents.get(name, set()).discard(instance)
+
+    def until(self, done: Callable[[], bool], seconds: float) -> bool:
+        """Wait (s) until something holds; whether it does. Messages that come meanwhile are dropped."""
+        end = monotonic() + seconds
+        while not done():
+            left = end - monotonic()
+            if left <= 0.0:
+                return False
+            for _ in self.take(left):
+                pass
+        return True
+
+    def find_plant(self, wait: float, tell: Callable[[str], None] | None = None) -> None:
+        """Wait for the plant of the run.
+
+        Parameters
+        ----------
+        wait : float
+            Longest wait (s).
+        tell : Callable[[str], None], optional
+            Told, every few seconds, for what one waits.
+
+        Raises
+        ------
+        NobodyError
+            If there is none in time.
+        """
+        began = monotonic()
+        while not self.until(lambda: self.plant, min(REMINDER, began + wait - monotonic())):
+            waited = monotonic() - began
+            if waited >= wait:
+                raise NobodyError(self._nobody(wait))
+            if tell is not None:
+                tell(f"no plant yet of {self.where}; {waited:.0f} of {wait:g} s waited")
+
+    def _nobody(self, wait: float) -> str:
+        if not self._session.peers():
+            return (
+                f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
+                "(gridpeers plant SCENARIO), or say by --connect where it is"
+            )
+        others = sorted(self._runs - {self.where.run})
+        there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
+        return (
+            f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
+            f"start one (gridpeers plant SCENARIO --run {self.where.run}), or give another name by --run"
+        )

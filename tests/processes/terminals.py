@@ -1,0 +1,163 @@
+"""Terminals of a test: commands as a user starts them, their output awaited with a deadline, and all of them ended."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+
+DEADLINE = 40.0
+"""Longest wait (s) for any line; on an idle machine all come within 3 s."""
+
+
+def free_endpoint() -> str:
+    """Endpoint at a port of the loopback that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Terminal:
+    """One command in a terminal of its own.
+
+    Parameters
+    ----------
+    words : Sequence[str]
+        The command's words, without `gridpeers`.
+    folder : Path
+        Working directory.
+    prefix : Sequence[str], optional
+        What stands before the command, e.g. to run it in a network namespace.
+    """
+
+    def __init__(self, words: Sequence[str], folder: Path, prefix: Sequence[str] = ()) -> None:
+        self.words = list(words)
+        command = [*prefix, sys.executable, "-P", "-c", "from scenarios.cli import main; main()", *words]
+        self._process = subprocess.Popen(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "160"},
+        )
+        self.lines: list[str] = []
+        self._seen = 0
+        self._news = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def text(self) -> str:
+        """All that it has printed."""
+        return "".join(self.lines)
+
+    def expect(self, pattern: str, deadline: float = DEADLINE) -> re.Match[str]:
+        """Wait for a line that matches, among those not seen by an earlier call."""
+        end = monotonic() + deadline
+        with self._news:
+            while True:
+                while self._seen < len(self.lines):
+                    line = self.lines[self._seen]
+                    self._seen += 1
+                    match = re.search(pattern, line)
+                    if match is not None:
+                        return match
+                over = not self._reader.is_alive()
+                if over or not self._news.wait(end - monotonic()):
+                    why = "it has ended" if over else f"not within {deadline:g} s"
+                    raise AssertionError(f"{self}: no line with {pattern!r}: {why}. It printed:\n{self.text}")
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the process."""
+        self._process.send_signal(number)
+
+    def end(self, deadline: float = DEADLINE) -> int:
+        """Wait for its end; its exit status."""
+        try:
+            status = self._process.wait(deadline)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"{self}: still runs after {deadline:g} s. It printed:\n{self.text}") from None
+        self._reader.join(deadline)
+        return status
+
+    def kill(self) -> None:
+        """End it, whatever state it is in."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGCONT)
+            self._process.send_signal(signal.SIGTERM)
+            try:
+                self._process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait(5.0)
+        self._reader.join(5.0)
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with self._news:
+                self.lines.append(line)
+                self._news.notify_all()
+        with self._news:
+            self._news.notify_all()
+
+    def __str__(self) -> str:
+        return "gridpeers " + " ".join(self.words)
+
+
+class Desk:
+    """All terminals of a test; leaving the context ends every one of them.
+
+    Parameters
+    ----------
+    folder : Path
+        Working directory.
+    options : Sequence[str]
+        Options of every command that takes part in the run.
+    """
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        self._folder, self._options = folder, options
+        self._terminals: list[Terminal] = []
+
+    def __enter__(self) -> Desk:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for terminal in reversed(self._terminals):
+            terminal.kill()
+
+    def open(self, *words: str, prefix: Sequence[str] = ()) -> Terminal:
+        """Start a command in a new terminal, with the options of the desk."""
+        return self.open_bare(*words, *self._options, prefix=prefix)
+
+    def open_bare(self, *words: str, prefix: Sequence[str] = ()) -> Terminal:
+        """Start a command without the options of the desk."""
+        terminal = Terminal(words, self._folder, prefix)
+        self._terminals.append(terminal)
+        return terminal
+
+    def type(self, *words: str) -> tuple[int, str]:
+        """Run a command to its end; its exit status and what it printed."""
+        terminal = self.open(*words)
+        return terminal.end(), terminal.text

@@ -1,0 +1,138 @@
+"""What `status` and `watch` show of given messages."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from agents.config import AgentConfig, Control
+from scenarios.live.look import Line, Look, short
+from scenarios.live.picture import Picture
+from scenarios.live.render import plain, table
+from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+
+def plate(name: str) -> AgentConfig:
+    """An inverter of 500 kW and 2400 V."""
+    return AgentConfig(
+        run="lab", name=name, kind="GFM", microgrid="MG1", P_rated=5e5, V_nom=2400.0, f_nom=60.0, m_p=0.01, m_q=0.05,
+        T_c=0.02, control=Control(secondary="all", graph="full"), deadline=10.0, connect=(),
+    )  # fmt: skip
+
+
+def told(t: float, *events: PlantEvent, late: int = 0) -> Telemetry:
+    """Telemetry of two inverters at a time (s)."""
+    return Telemetry(
+        sender="plant", incarnation=1, seq=0, t=t, inverters=("inv1", "inv2"),
+        rows=((t, 60.01, 3e5, 1e4, 2400.0, 3.1e5, 2412.0, 60.0, 2.5e5, -2e4, 2376.0, 2.5e5, 2400.0),),
+        events=events, final=False, outcome="", reproducible=False,
+        pacing=Pacing(steps=200, late=late, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0),
+    )  # fmt: skip
+
+
+def status(sender: str, neighbours: dict[str, float], used: tuple[str, ...], waits_for: str = "") -> AgentStatus:
+    """How an agent fares that hears neighbours at ages (s)."""
+    return AgentStatus(
+        sender=sender, incarnation=1, seq=5, t=2.0, phase="waiting" if waits_for else "running", waits_for=waits_for,
+        island="grid", neighbours=tuple(neighbours), ages=tuple(neighbours.values()), used=used, received=120, sent=60,
+        rejected=0, lost=2, ticks=60, missed=0, lateness=0.001,
+    )  # fmt: skip
+
+
+def picture() -> Picture:
+    """Two inverters, of which the first has an agent that hears nobody."""
+    seen = Picture("lab")
+    for name in ("inv1", "inv2"):
+        seen.plate(plate(name))
+    seen.telemetry(told(2.0, PlantEvent(t=1.0, kind="switch", subject="13-152", text="13-152 opened")), now=10.0)
+    seen.status(status("inv1", {"inv2": 1.4}, ()), now=10.0)
+    return seen
+
+
+def test_status_is_a_line_per_agent_with_units() -> None:
+    """Run, time, pacing; per agent its numbers, whom it hears, its messages; what happened."""
+    text = plain(picture().look({"inv1"}, now=10.1))
+
+    assert text.splitlines() == [
+        "run lab   t = 2.00 s   pace: 100.00 % of steps in time (p50 0.1 ms, p99 1.0 ms)   islands: grid",
+        "agent  island    f Hz   P kW  P_set kW   P pu  Q kvar    V pu  V_set pu  hears  age s   in  out  lost",
+        "inv1   grid    60.010  300.0     310.0  0.600    10.0  1.0000    1.0050  -          -  120   60     2"
+        "  without inv2",
+        "inv2   -       60.000  250.0     250.0  0.500   -20.0  0.9900    1.0000  -          -    -    -     -"
+        "  no agent",
+        "    1.00 s  13-152 opened",
+    ]
+
+
+def test_a_run_that_has_not_begun_shows_who_waits() -> None:
+    """Agents are listed by their tokens though the plant has told nothing."""
+    seen = Picture("lab")
+    seen.status(status("inv3", {}, (), waits_for="the plant"), now=1.0)
+
+    text = plain(seen.look({"inv3", "inv4"}, now=1.0))
+
+    assert text.startswith("run lab   has not begun")
+    assert text.splitlines()[2].endswith("waits for the plant")
+    assert text.splitlines()[3].endswith("has not told yet")
+
+
+def test_a_frozen_agent_is_silent() -> None:
+    """A token without a status is told with the time since the last one."""
+    (line, _) = picture().look({"inv1"}, now=14.0).lines
+
+    assert line.note == "silent for 4 s"
+    assert line.received is None
+
+
+def test_a_silent_plant_is_told() -> None:
+    """Old numbers are not shown as if they were new."""
+    assert picture().look({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
+
+
+def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
+    """When the run's time goes back, what happened before belongs to another run."""
+    seen = picture()
+    seen.telemetry(told(0.2), now=20.0)
+
+    assert seen.look((), now=20.0).events == ()
+
+
+def test_only_neighbours_in_use_count_as_heard() -> None:
+    """Who is too old, or in another island, is named in the note."""
+    seen = picture()
+    seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
+    line = seen.look({"inv1"}, now=10.0).lines[0]
+
+    assert line.ages == {"inv2": 0.01, "inv3": 0.02}
+    assert line.note == "without inv4"
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [
+        ([], "-"),
+        (["inv2"], "inv2"),
+        (["inv1", "inv2"], "inv1,2"),
+        (["inv1", "inv2", "inv3", "inv10"], "inv1-3,10"),
+        (["a", "b", "inv7"], "a b inv7"),
+    ],
+)
+def test_names_take_little_room(names: list[str], text: str) -> None:
+    """Running numbers are put together."""
+    assert short(names) == text
+
+
+def test_watch_shows_the_same_as_a_table() -> None:
+    """Every number of the text is in the table, with the keys below."""
+    console = Console(width=160, record=True, file=io.StringIO())
+    console.print(table(picture().look({"inv1"}, now=10.0)))
+    text = console.export_text()
+
+    for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "q: quit"):
+        assert word in text
+
+
+def test_a_look_at_nothing_is_one_line() -> None:
+    """No agent, no plant: only the run's name."""
+    assert plain(Look(run="lab")) == "run lab   has not begun\n"
+    assert Line(name="inv1").note == ""
