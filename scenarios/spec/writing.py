@@ -63,5 +63,5 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """Write one value; JSON's strings, numbers, lists and booleans are TOML's too."""
-    return json.dumps(value, ensure_ascii=False)
+    """Write one value; JSON's strings, numbers, lists and booleans are TOML's too, but for one character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

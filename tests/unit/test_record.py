@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.history import History, read_history
@@ -61,6 +61,7 @@ def test_the_hash_is_that_of_the_bytes_however_they_came(tmp_path: Path) -> None
     assert at_once.sha256 == hashlib.sha256((tmp_path / "a" / "history.csv").read_bytes()).hexdigest()
 
 
+@settings(deadline=None)  # each example writes a file
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=6, max_size=6))
 def test_every_number_reads_back_to_the_same_bits(
     tmp_path_factory: pytest.TempPathFactory, numbers: list[float]

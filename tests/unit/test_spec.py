@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from agents.config import Gains
@@ -124,6 +124,8 @@ def test_switches_may_be_named_by_alias_and_opened_and_closed_again(tmp_path: Pa
 finite = st.floats(min_value=1e-3, max_value=100.0)
 
 
+@settings(max_examples=50, deadline=None)  # each example reads a feeder
+@example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='\x7f\x00"\\\n')
 @given(k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20))
 def test_a_runs_copy_means_the_same_as_the_scenario(
     tmp_path_factory: pytest.TempPathFactory, k_p: float, k_q: float, alpha: float, seed: int, title: str
