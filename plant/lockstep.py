@@ -26,11 +26,12 @@ from typing import Literal
 
 from plant.config import PlantConfig
 from plant.interface import PlantLike
+from plant.reporting import Reporter, measurement_of
 from wire.actions import Action, Fetch, Publish
 from wire.clock import ticks_until, time_of
-from wire.codec import LIMIT, RejectedError, Rejects, decode, encode
+from wire.codec import RejectedError, Rejects, decode, encode
 from wire.keys import Keys, check_name
-from wire.messages import PLANT, Measurement, Nameplate, PlantEvent, Prepare, Ready, State, Stop, Telemetry
+from wire.messages import PLANT, Nameplate, PlantEvent, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
 
 Phase = Literal["gathering", "preparing", "ticking", "closing", "over"]
@@ -40,9 +41,6 @@ TELEMETRY_TICKS = 10
 
 CLOSING = 2.0
 """Longest wait for the others to close (s)."""
-
-_NUMBER_BYTES = 9
-"""Bytes of one float in msgpack."""
 
 
 class PlantSide:
@@ -91,9 +89,7 @@ class PlantSide:
         self._state_keys = {self.keys.state(name): name for name in config.agents}
         self._ready_keys = {self.keys.ready(name): name for name in config.agents}
         self._measurement_keys = {name: self.keys.measurement(name) for name in config.agents}
-        self._rows: list[tuple[float, ...]] = []
-        self._events: list[PlantEvent] = []
-        self._telemetry_seq = 0
+        self._reporter = Reporter(config.incarnation, plant)
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -162,8 +158,8 @@ class PlantSide:
         if self.until is not None and now >= self.until:
             if self.phase == "closing":
                 self._be_over()
-            else:
-                self.abort(self._patience.complaint(self.missing(), now), now)
+            elif missing := self.missing():  # else the last that was awaited has just come
+                self.abort(self._patience.complaint(missing, now), now)
 
     def abort(self, reason: str, now: float) -> None:
         """End the run because something went wrong."""
@@ -171,6 +167,10 @@ class PlantSide:
             self.outcome = reason
             self.reproducible = False
             self._close(reason, now)
+
+    def interrupt(self, reason: str, now: float) -> None:
+        """End the run because this process must leave."""
+        self.abort(reason, now)
 
     # ---------------------------------------------------------------- liveliness
 
@@ -185,7 +185,7 @@ class PlantSide:
                 self._tokens.add(key)
                 refusal = self._refusal(name, instance)
                 if refusal:
-                    self._stop(self.keys.dismissal(name, instance), refusal)
+                    self._stop(self.keys.dismissal(name, instance), refusal, refused=True)
                 elif name not in self._instances:
                     self._instances[name] = instance
                     self._actions.append(Fetch(self.keys.nameplate(name, instance)))
@@ -220,7 +220,7 @@ class PlantSide:
             self._roster_changed = True
             self._waiting.discard(name)
             text = f"{name} died at t = {self._t:g} s; its inverter stays on primary droop at its last set-points"
-            self._events.append(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
+            self._reporter.note(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
 
     # ---------------------------------------------------------------- messages
 
@@ -282,8 +282,7 @@ class PlantSide:
         config = self._config
         if self.phase == "gathering" and not self.missing():
             self._roster_changed = True
-            self._rows += self._plant.take_rows()
-            self._events += self._plant.take_events()
+            self._reporter.collect()
             self._prepare(now)
             self._patience.renew(now)
             assert set(self._roster) == set(config.agents)
@@ -313,23 +312,7 @@ class PlantSide:
         readings = self._plant.measure()
         t, tick, roster, incarnation = self._t, self.tick, self._roster, self._config.incarnation
         for name in roster:
-            reading = readings[name]
-            measurement = Measurement(
-                sender=PLANT,
-                incarnation=incarnation,
-                seq=tick,
-                t=t,
-                to=name,
-                P=reading.P,
-                Q=reading.Q,
-                V=reading.V,
-                f=reading.f,
-                P_set=reading.P_set,
-                V_set=reading.V_set,
-                grid_connected=reading.grid_connected,
-                island=reading.island,
-                roster=roster,
-            )
+            measurement = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
             self._actions.append(Publish(self._measurement_keys[name], encode(measurement)))
         if tick == 0:
             self._report(final=False)
@@ -347,8 +330,7 @@ class PlantSide:
             self.abort(str(error), now)
             return
         self.tick += 1
-        self._rows += self._plant.take_rows()
-        self._events += self._plant.take_events()
+        self._reporter.collect()
         if self.tick == self._ticks:
             self._close("end of the scenario", now)
         elif self.tick % TELEMETRY_TICKS == 0:
@@ -361,30 +343,10 @@ class PlantSide:
         return time_of(self.tick, self._config.T_c)
 
     def _report(self, *, final: bool) -> None:
-        """Send rows and events; as many messages as the limit of their size asks for."""
-        inverters = self._plant.inverters
-        bytes_per_row = _NUMBER_BYTES * (1 + 6 * len(inverters)) + 8
-        at_once = max(1, LIMIT // 2 // bytes_per_row)
-        rows, events = self._rows, self._events
-        self._rows, self._events = [], []
-        while True:
-            part, rows = rows[:at_once], rows[at_once:]
-            telemetry = Telemetry(
-                sender=PLANT,
-                incarnation=self._config.incarnation,
-                seq=self._telemetry_seq,
-                t=self._t,
-                inverters=inverters,
-                rows=tuple(part),
-                events=() if rows else tuple(events),
-                final=final and not rows,
-                outcome=self.outcome,
-                reproducible=self.reproducible,
-            )
-            self._telemetry_seq += 1
-            self._actions.append(Publish(self.keys.telemetry, encode(telemetry)))
-            if not rows:
-                return
+        """Send rows and events."""
+        outcome, reproducible = self.outcome, self.reproducible
+        for message in self._reporter.report(self._t, final=final, outcome=outcome, reproducible=reproducible):
+            self._actions.append(Publish(self.keys.telemetry, encode(message)))
 
     def _close(self, reason: str, now: float) -> None:
         self._report(final=True)
@@ -395,8 +357,9 @@ class PlantSide:
         if not self._tokens:
             self._be_over()
 
-    def _stop(self, key: str, reason: str) -> None:
-        stop = Stop(sender=PLANT, incarnation=self._config.incarnation, seq=self.tick, t=self._t, reason=reason)
+    def _stop(self, key: str, reason: str, *, refused: bool = False) -> None:
+        incarnation, t = self._config.incarnation, self._t
+        stop = Stop(sender=PLANT, incarnation=incarnation, seq=self.tick, t=t, reason=reason, refused=refused)
         self._actions.append(Publish(key, encode(stop)))
 
     def _be_over(self) -> None:
