@@ -56,6 +56,8 @@ class Agent:
         self._takes_part = config.control.secondary == "all" or (config.control.secondary == "GFM" and self._leader)
         self._P_set: float | None = None
         self._V_set: float | None = None
+        self._islands: tuple[str, str] = ("", "")
+        """Own island at the last two measurements, the latest first."""
 
     def knows(self, name: str) -> bool:
         """Whether the nameplate of an agent has been seen."""
@@ -73,6 +75,25 @@ class Agent:
             self._heard.pop(nameplate.sender, None)
         self._known[nameplate.sender] = nameplate
         return True
+
+    def forget(self, name: str) -> None:
+        """Forget who somebody is and what it said, as its process is gone."""
+        self._known.pop(name, None)
+        self._heard.pop(name, None)
+
+    def let_go(self) -> None:
+        """Have the next tick start from the set-points that its measurement shows, as the first one does."""
+        self._P_set = self._V_set = None
+        self._islands = ("", "")
+
+    def shares_island(self, name: str) -> bool:
+        """Whether the last state heard of a neighbour is from the own island, as far as is known.
+
+        A state is older than the own measurement. So that nobody leaves out everybody at the tick at which all go from
+        one island to another, the island before counts too.
+        """
+        state = self._heard.get(name)
+        return state is not None and (not state.island or not self._islands[0] or state.island in self._islands)
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
         """Whom this agent listens to among the known agents of a roster, by the run's rule."""
@@ -105,7 +126,8 @@ class Agent:
         measurement : Measurement
             What the own sensors read now; the own values are always fresh.
         neighbours : Sequence[str], optional
-            Whom to listen to. Of each the last state heard counts; one that was never heard is left out of the sums.
+            Whom to listen to. Of each the last state heard counts; one that was never heard, or stands in another
+            island, is left out of the sums.
 
         Returns
         -------
@@ -113,6 +135,7 @@ class Agent:
             The set-points (W, V) and the own var (var).
         """
         config = self.config
+        self._islands = (measurement.island, self._islands[0] or measurement.island)
         if not self._takes_part or measurement.grid_connected or self._P_set is None or self._V_set is None:
             # On hold the set-points follow the plant's, so that the law starts without a bump when the island forms.
             self._P_set, self._V_set = measurement.P_set, measurement.V_set
@@ -136,6 +159,7 @@ class Agent:
             P_set=self._P_set,
             V_set=self._V_set,
             Q=measurement.Q,
+            island=measurement.island,
         )
 
     def _means(self, neighbours: Sequence[str]) -> tuple[float, float, float]:
@@ -144,7 +168,7 @@ class Agent:
         d = 0
         for name in neighbours:
             state = self._heard.get(name)
-            if state is None:
+            if state is None or not self.shares_island(name):
                 continue
             plate = self._known[name]
             y += plate.m_p * (state.P_set / plate.P_rated)

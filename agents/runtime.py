@@ -1,12 +1,16 @@
-"""An agent as a process: `agents.lockstep` on a Zenoh session."""
+"""An agent as a process: `agents.lockstep` or `agents.freerun` on a Zenoh session."""
 
 from __future__ import annotations
 
 import logging
+from time import time_ns
+
+from msgspec.structs import replace
 
 from agents.config import AgentConfig
+from agents.freerun import FreeAgent
 from agents.lockstep import AgentSide
-from wire.drive import drive
+from wire.drive import StoppedError, drive, perform
 from wire.keys import check_name
 from wire.process import ConfigurationError
 from wire.session import Session
@@ -28,7 +32,8 @@ def run_agent(config: AgentConfig) -> str:
     Raises
     ------
     ConfigurationError, SessionError
-        If the configuration cannot work.
+        If the configuration cannot work. In wall-clock time also if the plant refuses the agent, or there is none
+        within the deadline.
     """
     log = logging.getLogger(config.name)
     try:
@@ -36,19 +41,35 @@ def run_agent(config: AgentConfig) -> str:
         check_name("name", config.name)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    session = Session(config.name, listen=config.listen, connect=config.connect)
+    wall = config.clock == "wall"
+    if wall:  # an agent that is started again is told from its ghost by its later start
+        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+    session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
     try:
-        side = AgentSide(config, session.id)
+        try:
+            side = FreeAgent(config, session.id) if wall else AgentSide(config, session.id)
+        except ValueError as error:
+            raise ConfigurationError(str(error)) from None
         session.answer(*side.nameplate)
         for key in side.publications:
             session.prepare(key)
-        drive(side, session, log)
+        try:
+            drive(side, session, log)
+        except (StoppedError, KeyboardInterrupt) as stop:
+            if isinstance(side, FreeAgent):
+                side.leave(f"asked to leave: {stop}")
+                perform(side.take_actions(), session, log)
+            raise
     finally:
         session.close()
     if side.rejects.counts:
         log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
     if not side.failed:
         log.info("%s: %s", config.name, side.stopped)
-    elif not side.plant_seen:
-        return f"{side.failed}; is the plant of run {config.run} running at {', '.join(config.connect)}?"
-    return side.failed
+        return ""
+    failed = side.failed
+    if not side.plant_seen:
+        failed += f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
+    if wall:
+        raise ConfigurationError(failed)
+    return failed

@@ -1,4 +1,4 @@
-"""What the lock-step needs of a plant. `plant.feeder.Plant` has it, and so have the small plants of the tests."""
+"""What the plant's side of a run needs of a plant: `plant.feeder.Plant` has it, and the small plants of the tests."""
 
 from __future__ import annotations
 
@@ -55,4 +55,16 @@ class PlantLike(Protocol):
 
     def take_events(self) -> tuple[PlantEvent, ...]:
         """Events since last taken."""
+        ...
+
+
+class LivePlant(PlantLike, Protocol):
+    """What wall-clock time needs of a plant on top: switches and inverters operated by hand."""
+
+    def switch(self, name: str, action: str) -> None:
+        """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown."""
+        ...
+
+    def connect(self, name: str, on: bool) -> None:
+        """Put an inverter on the network or take it off; nothing happens if it is so already."""
         ...

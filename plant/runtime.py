@@ -1,4 +1,4 @@
-"""The plant as a process: `plant.lockstep` on a Zenoh session."""
+"""The plant as a process: `plant.lockstep` or `plant.freerun` on a Zenoh session."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import gc
 import logging
 import sys
 from collections.abc import Callable
+from time import time_ns
+
+from msgspec.structs import replace
 
 from plant.config import PlantConfig
-from plant.interface import PlantLike
+from plant.freerun import FreePlant
+from plant.interface import LivePlant
 from plant.lockstep import PlantSide
 from wire.drive import StoppedError, drive, perform
 from wire.process import ConfigurationError
@@ -19,14 +23,14 @@ LISTENING, COMPILING, READY = "listening", "compiling", "ready"
 at the very first start; agents are awaited."""
 
 
-def build(config: PlantConfig) -> PlantLike:
+def build(config: PlantConfig) -> LivePlant:
     """Build the configuration's plant."""
     from plant.build import build_plant  # numba and scipy take a second: only once the rendezvous is there
 
     return build_plant(config)
 
 
-def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], PlantLike] = build) -> str:
+def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] = build) -> str:
     """Run the plant until the end of the scenario.
 
     The session is opened first, as it is the rendezvous: the agents find each other while the plant is built.
@@ -35,7 +39,7 @@ def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], PlantLike] =
     ----------
     config : PlantConfig
         The plant, its agents and its times.
-    builder : Callable[[PlantConfig], PlantLike], optional
+    builder : Callable[[PlantConfig], LivePlant], optional
         Makes the plant; tests have smaller ones.
 
     Returns
@@ -49,25 +53,31 @@ def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], PlantLike] =
         If the configuration cannot work.
     """
     log = logging.getLogger("plant")
-    session = Session("plant", listen=config.listen, connect=config.connect)
+    wall = config.clock == "wall"
+    if wall:  # a plant that is started again is told from its ghost by its later start
+        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+    session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock)
     try:
         tell(LISTENING)
         try:
             tell(COMPILING)
-            side = PlantSide(config, builder(config))
+            plant = builder(config)
+            side = FreePlant(config, plant) if wall else PlantSide(config, plant)
         except ValueError as error:
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:
             return f"plant: cannot start: {error}"
         for key in side.publications:
             session.prepare(key)
+        for name, text in config.handout.items():
+            session.answer(side.keys.config(name), text.encode())
         gc.freeze()  # what was built stays: later collections need not look at it
         tell(READY)
         try:
             drive(side, session, log)
-        except StoppedError as stop:
-            side.abort(f"the plant was asked to leave: {stop}", 0.0)
-            perform(side.take_actions(), session)
+        except (StoppedError, KeyboardInterrupt) as stop:
+            side.interrupt(f"the plant was asked to leave: {stop}", 0.0)
+            perform(side.take_actions(), session, log)
             raise
     finally:
         session.close()

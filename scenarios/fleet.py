@@ -48,7 +48,9 @@ def run_processes(
     on_start: Callable[[Children], None] | None = None,
     plant_command: Sequence[str] = ("-m", "plant"),
 ) -> Outcome:
-    """Run a scenario with a plant process and one process per agent.
+    """Run a scenario with a plant process and one process per agent, in simulated or in wall-clock time.
+
+    In wall-clock time the plant ends the run after end / speed, and an agent that dies is only an event.
 
     Parameters
     ----------
@@ -80,6 +82,9 @@ def run_processes(
         If the port is in use or Zenoh is missing; nothing has been started then.
     """
     agents = {config.name: config for config in agent_configs}
+    wall = plant_config.clock == "wall"
+    if wall:  # who waits for the plant waits for its compiler too
+        agents = {name: msgspec.structs.replace(config, deadline=BUILD_DEADLINE) for name, config in agents.items()}
     endpoint = _endpoint(plant_config.listen)
     plant_config = msgspec.structs.replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
     order = list(start_order) if start_order is not None else [PLANT, *agents]
@@ -87,7 +92,7 @@ def run_processes(
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
     keys = Keys(plant_config.run)
-    session = Session(RECORDER, connect=(endpoint,), gossip=False)
+    session = Session(RECORDER, connect=(endpoint,), gossip=False, clock=plant_config.clock)
     try:
         watch = _Watch(session, plant_config, on_telemetry, on_status or (lambda word: None))
         session.subscribe(keys.telemetry)
@@ -162,8 +167,11 @@ class _Watch:
     ) -> None:
         self.broke = ""
         self._inbox, self._T_c = session.inbox, config.T_c
+        self._wall = config.clock == "wall"
         self._patience = 1.5 * config.deadline + 1.0
         """Longer than the plant's: it knows better what is wrong, unless it is what is wrong."""
+        if self._wall:
+            self._patience += config.wait_for_agents + 2.0 * config.T_c / config.speed
         self._on_telemetry, self._on_status = on_telemetry, on_status
         self._rejects = Rejects(RECORDER)
         self._began = self._started = self._ended_at = monotonic()
@@ -218,7 +226,7 @@ class _Watch:
         if child.name != PLANT and child.status == 0:
             return  # it was asked to leave, perhaps by a Stop that is faster than the telemetry which goes with it
         report = child.report(self._when)
-        if child.name == PLANT or self._last is None:
+        if child.name == PLANT or (self._last is None and not self._wall):
             self._break(report)
         else:
             self._notes[child.name] = report
@@ -250,4 +258,5 @@ class _Watch:
             ticks=self._ticks,
             start_s=started - self._began,
             run_s=self._ended_at - started,
+            pacing=None if self._last is None else self._last.pacing,
         )

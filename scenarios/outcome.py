@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wire.messages import PlantEvent
+from wire.messages import Pacing, PlantEvent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,3 +25,5 @@ class Outcome:
     """Wall time (s) until the first row."""
     run_s: float
     """Wall time (s) from the first row to the end."""
+    pacing: Pacing | None = None
+    """How well the plant kept real time; only in wall-clock time."""

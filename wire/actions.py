@@ -24,4 +24,10 @@ class Listen(NamedTuple):
     key: str
 
 
+class Say(NamedTuple):
+    """Write a line to the log, for whoever watches the process."""
+
+    text: str
+
+
 Action = Publish | Fetch | Listen

@@ -1,18 +1,19 @@
-"""The loop of every process in simulated time: a sans-IO core in front, a Zenoh session behind."""
+"""The loop of every process of a run: a sans-IO core in front, a Zenoh session behind."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from time import monotonic
 from typing import Protocol
 
-from wire.actions import Action, Fetch, Publish
+from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import Rejects
 from wire.session import Session
 
 
 class Core(Protocol):
-    """What `agents.lockstep.AgentSide` and `plant.lockstep.PlantSide` have in common."""
+    """What the cores have in common: `agents.lockstep`, `plant.lockstep`, `agents.freerun`, `plant.freerun`."""
 
     rejects: Rejects
 
@@ -38,7 +39,7 @@ class Core(Protocol):
 
     @property
     def wanted(self) -> int:
-        """Number of messages without which it cannot go on."""
+        """Number of messages without which it cannot go on before `until`."""
         ...
 
     @property
@@ -50,7 +51,7 @@ class Core(Protocol):
         """Begin."""
         ...
 
-    def take_actions(self) -> list[Action]:
+    def take_actions(self) -> Sequence[Action | Say]:
         """What is to be done."""
         ...
 
@@ -79,15 +80,21 @@ class StoppedError(Exception):
     """Another part of the process, or a signal, wants it to end."""
 
 
-def perform(actions: list[Action], session: Session) -> None:
+EVERYTHING = 1 << 30
+"""More messages than can be `wanted`: who wants so many is woken by its clock, by tokens and by words only."""
+
+
+def perform(actions: Sequence[Action | Say], session: Session, log: logging.Logger) -> None:
     """Do what a core asks for, in its order."""
     for action in actions:
         if isinstance(action, Publish):
             session.publish(action.key, action.payload)
         elif isinstance(action, Fetch):
             session.fetch(action.key)
-        else:
+        elif isinstance(action, Listen):
             session.subscribe(action.key)
+        else:
+            log.info("%s", action.text)
 
 
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
@@ -117,7 +124,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
     now = monotonic()
     core.start(now)
     while True:
-        perform(core.take_actions(), session)
+        perform(core.take_actions(), session, log)
         if core.over:
             break
         if core.work(now):
@@ -126,8 +133,6 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
         until = core.until
         events = take(core.wanted, None if until is None else max(0.0, until - now))
         now = monotonic()
-        if not events:
-            core.expire(now)
         for kind, key, payload in events:
             if kind == "message":
                 core.received(key, payload, now)
@@ -137,6 +142,9 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
+        until = core.until  # what came in may have put it off
+        if until is not None and now >= until:  # also when the inbox never runs empty
+            core.expire(now)
         if core.rejects.has_lines:
             for line in core.rejects.take_lines():
                 log.warning("%s", line)

@@ -1,4 +1,4 @@
-"""A Zenoh session, set up for lock-step; the only module that knows Zenoh.
+"""A Zenoh session, set up for lock-step or for wall-clock time; the only module that knows Zenoh.
 
 Zenoh's threads only enqueue: what comes in stands in `Session.inbox`, and one thread, the owner's, takes it out.
 What each setting is for was measured (`docs/protocol.md`).
@@ -10,9 +10,10 @@ import contextlib
 import json
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from wire.inbox import Inbox, Kind
+from wire.keys import LATEST_ONLY
 
 if TYPE_CHECKING:
     import zenoh
@@ -22,8 +23,32 @@ _RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app)
 flood of messages can stall it."""
 
 LEASE = 60_000
-"""Time (ms) after which a silent link counts as dead. Long, because it must not decide: the death of a process closes
-its links at once, and one that lives but does nothing is for the deadlines of the lock-step."""
+"""Time (ms) after which a silent link counts as dead, in lock-step. Long, because it must not decide: the death of a
+process closes its links at once, and one that lives but does nothing is for the deadlines of the lock-step."""
+
+WALL_LEASE = 2_000
+"""The same in wall-clock time: after a cut the link must be made anew soon. Control does not wait for it."""
+
+
+class _Profile(NamedTuple):
+    """What differs between the two kinds of time."""
+
+    lease: int
+    """ms."""
+    retry: tuple[int, int, float]
+    """Between tries to connect: first (ms), longest (ms), growth."""
+    timeout: int
+    """For a link to open (ms)."""
+    may_drop: bool
+    """Whether messages of which only the newest matters are dropped when a link is full."""
+
+
+Clock = Literal["simulated", "wall"]
+
+_PROFILES: dict[Clock, _Profile] = {
+    "simulated": _Profile(LEASE, (20, 200, 1.5), 10_000, may_drop=False),
+    "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, may_drop=True),
+}
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which a query is forgotten; deadlines are kept by who asked."""
@@ -46,6 +71,8 @@ class Session:
         Endpoints to connect to, tried again until they answer.
     gossip : bool, optional
         Whether to be told of the other peers by those connected to, and to connect to them in turn.
+    clock : {"simulated", "wall"}, optional
+        Which kind of time the run has.
 
     Raises
     ------
@@ -54,7 +81,13 @@ class Session:
     """
 
     def __init__(
-        self, who: str, *, listen: tuple[str, ...] = (), connect: tuple[str, ...] = (), gossip: bool = True
+        self,
+        who: str,
+        *,
+        listen: tuple[str, ...] = (),
+        connect: tuple[str, ...] = (),
+        gossip: bool = True,
+        clock: Clock = "simulated",
     ) -> None:
         os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
         try:
@@ -68,10 +101,11 @@ class Session:
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
         self.inbox = Inbox()
         self._zenoh = zenoh
+        self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
         try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_config(listen, connect, gossip))))
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_config(listen, connect, gossip, profile))))
         except zenoh.ZError as error:
             raise SessionError(_explain(who, listen, str(error))) from None
         self.id = str(self._session.zid())
@@ -125,7 +159,7 @@ class Session:
         self._declared.append(self._session.liveliness().declare_token(key))
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Publish bytes on a key; blocks rather than drops."""
+        """Publish bytes on a key; blocks rather than drops, but for what is of no use late in wall-clock time."""
         publisher = self._publishers.get(key)
         if publisher is None:
             self.prepare(key)
@@ -135,9 +169,11 @@ class Session:
     def prepare(self, key: str) -> None:
         """Declare the publisher of a key, once."""
         if key not in self._publishers:
+            drop = self._profile.may_drop and key.split("/")[2] in LATEST_ONLY
+            control = self._zenoh.CongestionControl
             self._publishers[key] = self._session.declare_publisher(
                 key,
-                congestion_control=self._zenoh.CongestionControl.BLOCK,
+                congestion_control=control.DROP if drop else control.BLOCK,
                 allowed_destination=self._zenoh.Locality.REMOTE,
             )
 
@@ -156,7 +192,8 @@ class Session:
         return self._zenoh.handlers.Callback(callback, indirect=False)
 
 
-def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool) -> dict[str, Any]:
+def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, profile: _Profile) -> dict[str, Any]:
+    first, longest, growth = profile.retry
     return {
         "mode": "peer",
         "listen": {"endpoints": list(listen)},
@@ -165,7 +202,7 @@ def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool) -> 
             "endpoints": list(connect),
             "timeout_ms": -1,
             "exit_on_failure": False,
-            "retry": {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5},
+            "retry": {"period_init_ms": first, "period_max_ms": longest, "period_increase_factor": growth},
         },
         "scouting": {
             "multicast": {"enabled": False},
@@ -179,8 +216,13 @@ def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool) -> 
             # Not lowlatency, though it saves a fifth of a tick: while links are being made, a declaration could wait
             # for a link to become writable and hold the lock that all Zenoh threads wait for (4 starts in 100 hung).
             # Without QoS everything on a link keeps its order, on which discovery relies.
-            "unicast": {"lowlatency": False, "qos": {"enabled": False}},
-            "link": {"tx": {"lease": LEASE, "keep_alive": 4}},
+            "unicast": {
+                "lowlatency": False,
+                "qos": {"enabled": False},
+                "open_timeout": profile.timeout,
+                "accept_timeout": profile.timeout,
+            },
+            "link": {"tx": {"lease": profile.lease, "keep_alive": 4}},
         },
     }
 

@@ -40,23 +40,26 @@ class ToyPlant:
     def __init__(self, config: PlantConfig) -> None:
         self.inverters = tuple(f"inv{i}" for i in range(1, int(config.settings.feeder.removeprefix("toy")) + 1))
         self._config = config
+        self._members = len(self.inverters) - len(config.settings.spares)
         self._P_set = dict.fromkeys(self.inverters, config.settings.P_set0)
         self._V_set = {name: 1.0 + 0.001 * i for i, name in enumerate(self.inverters)}
+        self._off = set(config.settings.spares)
         self._tick = 0
         self._rows: list[tuple[float, ...]] = [self._row()]
         self._events: list[PlantEvent] = []
 
     def measure(self) -> dict[str, Reading]:
         """Solve the droops."""
-        n = len(self.inverters)
-        mean = sum(self._P_set.values()) / n
-        V_mean = sum(self._V_set.values()) / n
+        on = [name for name in self.inverters if name not in self._off]
+        mean = sum(self._P_set[name] for name in on) / max(1, len(on))
+        V_mean = sum(self._V_set[name] for name in on) / max(1, len(on))
         islanded = self._t >= ISLANDING
-        surplus = mean - LOAD if islanded else 0.0
+        load = LOAD * self._members / max(1, len(on))
+        surplus = mean - load if islanded else 0.0
         return {
             name: Reading(
-                P=(self._P_set[name] - surplus) * P_RATED,
-                Q=20.0 * (self._V_set[name] - V_mean) * P_RATED,
+                P=(self._P_set[name] - surplus) * P_RATED if name in on else 0.0,
+                Q=20.0 * (self._V_set[name] - V_mean) * P_RATED if name in on else 0.0,
                 V=V_mean * V_NOM,
                 f=F_NOM * (1.0 + M_P * surplus),
                 P_set=self._P_set[name] * P_RATED,
@@ -79,6 +82,19 @@ class ToyPlant:
         if abs(self._t - ISLANDING) < 1e-9:
             self._events.append(PlantEvent(t=self._t, kind="switch", subject="toy", text="the grid is lost"))
         self._rows.append(self._row())
+
+    def switch(self, name: str, action: str) -> None:
+        """Operate the only switch there is; it does nothing but tell."""
+        if name != "sw1":
+            raise ValueError(f'no switch "{name}"; switches are sw1')
+        self._events.append(PlantEvent(t=self._t, kind="switch", subject=name, text=f"{name}: {action}"))
+
+    def connect(self, name: str, on: bool) -> None:
+        """Put an inverter on the bus or take it off; off, it takes no part in the droops."""
+        if on == (name in self._off):
+            (self._off.discard if on else self._off.add)(name)
+            text = f"{name} {'connected' if on else 'disconnected'}"
+            self._events.append(PlantEvent(t=self._t, kind="inverter", subject=name, text=text))
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
         """Rows since last taken."""

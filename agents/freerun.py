@@ -1,0 +1,371 @@
+"""The agent's side of wall-clock time, sans-IO: tokens, messages and the time in, actions out.
+
+The driver is that of `agents.lockstep`, and so is the `Agent` inside; but nobody grants a tick. An agent ticks on its
+own timer, with what it heard last:
+
+- its *measurement*, if it is not older than `max_age`; else it holds, and says nothing to its neighbours;
+- the last state of each *neighbour* whose token is there, whose value is not older than `max_age`, and who stands in
+  the same island. The age is that on the own clock; but a state that was long on its way is as old as its run time
+  says, beside that of the own measurement.
+
+Ages are in s of run time. Tokens say who exists, never who works: a frozen process keeps its token for seconds.
+
+**Phases.** *seeking*: there is no plant. *waiting*: the plant is there, but has not sent a measurement of late.
+*running*: it ticks. Whoever comes back to *running* starts from the set-points that its measurement shows: those the
+plant holds for it. An agent that finds itself woken late (frozen, or starved) drops what it knew and waits for news.
+
+**Names.** Of two processes that claim one name the first counts, until its token is gone; then it is forgotten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.config import AgentConfig
+from wire.actions import Action, Fetch, Listen, Publish, Say
+from wire.codec import RejectedError, Rejects, decode, encode
+from wire.keys import Keys
+from wire.messages import PLANT, AgentStatus, AnyMessage, Leave, Measurement, Nameplate, State, Stop
+from wire.timer import Timer
+
+Phase = Literal["seeking", "waiting", "running"]
+
+STATUS_PERIOD = 0.5
+"""Time (s, wall) between two `AgentStatus`."""
+
+WANTED = 1 << 30
+"""Messages wait for the next tick; only tokens and words wake the agent before."""
+
+
+class FreeAgent:
+    """One agent in wall-clock time.
+
+    Parameters
+    ----------
+    config : AgentConfig
+        Who it is and the run's rule.
+    instance : str
+        Which process this is, unique in the run; part of the agent's token.
+    """
+
+    def __init__(self, config: AgentConfig, instance: str) -> None:
+        if config.speed <= 0.0:
+            raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
+        self.keys = Keys(config.run)
+        self.rejects = Rejects(config.name)
+        self.stopped = ""
+        """Why it closes; empty as long as it goes on."""
+        self.failed = ""
+        """Why this agent could never take part; empty unless so."""
+        self.phase: Phase = "seeking"
+        self.plant_seen = False
+        """Whether the plant's token was ever there."""
+        self.missed = 0
+        """Ticks skipped, as their time was over."""
+        self.ticks = self.sent = self.used = self.lost = 0
+        self._config, self._name, self._instance = config, config.name, instance
+        self._agent = Agent(config)
+        self._actions: list[Action | Say] = []
+        self._routes: dict[str, tuple[str, Callable[[AnyMessage, float], None]]] = {
+            self.keys.control: (PLANT, self._on_control),
+            self.keys.dismissal(config.name, instance): (PLANT, self._on_control),
+            self.keys.measurement(config.name): (PLANT, self._on_measurement),
+        }
+        self._plant_there = False
+        self._plant_incarnation = 0
+        self._measurement: Measurement | None = None
+        self._measured_at = 0.0
+        self._claims: dict[str, list[str]] = {}
+        """Tokens that are there: name -> its instances, the one that counts first."""
+        self._met: set[str] = set()
+        """Names whose nameplate is known."""
+        self._neighbours: tuple[str, ...] = ()
+        self._listening: set[str] = set()
+        self._heard: dict[str, tuple[State, float]] = {}
+        """Last state of each agent, and when it came."""
+        self._timer = Timer(config.T_c / config.speed, 0.0)
+        self._status = Timer(STATUS_PERIOD, 0.0)
+        self._give_up: float | None = None
+        self._lateness = 0.0
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def token(self) -> str:
+        """Key of the own liveliness token."""
+        return self.keys.alive_agent(self._name, self._instance)
+
+    @property
+    def nameplate(self) -> tuple[str, bytes]:
+        """Key of the own queryable, and its answer."""
+        return self.keys.nameplate(self._name, self._instance), encode(self._agent.nameplate)
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the token is declared."""
+        return tuple(self._routes)
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return self.keys.state(self._name), self.keys.leave(self._name), self.keys.status(self._name)
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+        return self.keys.any_alive
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return bool(self.stopped or self.failed)
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages to be woken for: messages wait for the tick."""
+        return WANTED
+
+    @property
+    def until(self) -> float:
+        """When the next tick is due (s on the driver's clock)."""
+        return self._timer.due
+
+    def start(self, now: float) -> None:
+        """Begin to tick; there is nothing to do yet."""
+        self._timer = Timer(self._timer.period, now)
+        self._status = Timer(STATUS_PERIOD, now)
+        if self._config.deadline > 0.0:
+            self._give_up = now + self._config.deadline
+        self._say(f"seeks the plant of run {self._config.run}")
+
+    def take_actions(self) -> list[Action | Say]:
+        """What is to be done now, in this order."""
+        actions, self._actions = self._actions, []
+        return actions
+
+    def work(self, now: float) -> bool:
+        """Nothing: an agent works when its tick is due."""
+        return False
+
+    def expire(self, now: float) -> None:
+        """Tick, if it is time."""
+        late = now - self._timer.due
+        if late < 0.0 or self.over:
+            return
+        skipped = self._timer.take(now)
+        if self._give_up is not None and not self.plant_seen and now >= self._give_up:
+            self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
+            return
+        if self.phase == "running":
+            self.missed += skipped
+            self._lateness = max(self._lateness, late)
+            if late * self._config.speed > self._config.max_age:
+                self._hold(f"woken {late:.2f} s late; waits for news")
+        self._tick(now)
+        if now >= self._status.due:
+            self._status.take(now)
+            self._publish_status(now)
+
+    def leave(self, reason: str) -> None:
+        """Leave properly: have the own inverter taken off the network, then close."""
+        if not self.over:
+            self._leave()
+            self.stopped = reason
+
+    def _leave(self) -> None:
+        message = Leave(sender=self._name, incarnation=self._config.incarnation, seq=self.sent, t=self._t)
+        self._actions.append(Publish(self.keys.leave(self._name), encode(message)))
+
+    def _say(self, text: str) -> None:
+        self._actions.append(Say(f"{self._name}: {text}"))
+
+    # ---------------------------------------------------------------- liveliness
+
+    def appeared(self, key: str, now: float) -> None:
+        """Note that a token appeared."""
+        match self.keys.parts(key):
+            case ("alive", "plant"):
+                self._plant_there = self.plant_seen = True
+                if self.phase == "seeking":
+                    self.phase = "waiting"
+                    self._say("the plant is there; waits for its measurement")
+            case ("alive", "agent", name, instance) if name != self._name:
+                instances = self._claims.setdefault(name, [])
+                if instance not in instances:
+                    instances.append(instance)
+                if instances[0] == instance:
+                    self._fetch_nameplate(name, instance)
+
+    def vanished(self, key: str, now: float) -> None:
+        """Note that a token is gone, and with it its holder."""
+        match self.keys.parts(key):
+            case ("alive", "plant"):
+                self._plant_there = False
+                self._hold("the plant is gone; holds, and seeks it again")
+                self.phase = "seeking"
+            case ("alive", "agent", name, instance) if instance in self._claims.get(name, ()):
+                instances = self._claims[name]
+                counted = instances[0] == instance
+                instances.remove(instance)
+                self._routes.pop(self.keys.nameplate(name, instance), None)
+                if counted:
+                    self._forget(name)
+                if counted and instances:
+                    self._fetch_nameplate(name, instances[0])
+                elif not instances:
+                    del self._claims[name]
+
+    def _fetch_nameplate(self, name: str, instance: str) -> None:
+        key = self.keys.nameplate(name, instance)
+        self._routes[key] = (name, lambda message, now: self._on_nameplate(name, message))
+        self._actions.append(Fetch(key))
+
+    def _forget(self, name: str) -> None:
+        self._met.discard(name)
+        self._heard.pop(name, None)
+        self._agent.forget(name)
+        self._meet_neighbours()
+
+    def _hold(self, why: str) -> None:
+        """Stop ticking; what was heard is of no use any more."""
+        if self.phase == "running":
+            self.phase = "waiting"
+            self._say(why)
+        self._measurement = None
+        self._heard.clear()
+        self._agent.let_go()
+
+    # ---------------------------------------------------------------- messages
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message; what cannot be used is counted and dropped."""
+        try:
+            if key not in self._routes:
+                raise RejectedError("foreign", "nothing was asked for on this key")
+            sender, handler = self._routes[key]
+            message = decode(payload)
+            if message.sender != sender:
+                raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
+            handler(message, now)
+            self.used += 1
+        except RejectedError as rejected:
+            self.rejects.add(rejected.kind, key, rejected.text)
+
+    def _on_control(self, message: AnyMessage, now: float) -> None:
+        if not isinstance(message, Stop):
+            raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
+        if message.refused:
+            self.failed = message.reason
+        else:
+            self.leave(message.reason)
+
+    def _on_measurement(self, message: AnyMessage, now: float) -> None:
+        if not isinstance(message, Measurement) or message.to != self._name:
+            raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
+        life = self._plant_incarnation
+        if message.incarnation < life:
+            raise RejectedError("ghost", f"life {message.incarnation} of the plant, now it lives {life}")
+        last = self._measurement
+        if message.incarnation > life:
+            if life:
+                self._hold("the plant has a new life; starts from what it measures")
+            self._plant_incarnation = message.incarnation
+        elif last is not None:
+            if message.seq <= last.seq:
+                raise RejectedError("stale", f"Measurement({message.seq}) after {last.seq}")
+            self.lost += message.seq - last.seq - 1
+        self._measurement, self._measured_at = message, now
+
+    def _on_nameplate(self, name: str, message: AnyMessage) -> None:
+        if not isinstance(message, Nameplate):
+            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Nameplate")
+        if not self._agent.meet(message):
+            raise RejectedError("ghost", f"life {message.incarnation} of {name}, which has a later one")
+        self._met.add(name)
+        self._meet_neighbours()
+
+    def _on_state(self, message: AnyMessage, now: float) -> None:
+        if not isinstance(message, State):
+            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
+        name = message.sender
+        reason = self._agent.hear(message)
+        if reason:
+            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {name}")
+        if name in self._heard:
+            self.lost += message.seq - self._heard[name][0].seq - 1
+        self._heard[name] = message, now
+
+    def _meet_neighbours(self) -> None:
+        """Apply the rule to who is present, and listen to whom it names."""
+        self._neighbours = self._agent.in_neighbours((self._name, *sorted(self._met)))
+        for name in self._neighbours:
+            if name not in self._listening:
+                self._listening.add(name)
+                key = self.keys.state(name)
+                self._routes[key] = (name, self._on_state)
+                self._actions.append(Listen(key))
+
+    # ---------------------------------------------------------------- ticks
+
+    @property
+    def _t(self) -> float:
+        return 0.0 if self._measurement is None else self._measurement.t
+
+    def _age(self, name: str, now: float) -> float:
+        """Age of a neighbour's last state (s of run time); infinite if none was heard."""
+        if name not in self._heard:
+            return float("inf")
+        state, at = self._heard[name]
+        return max((now - at) * self._config.speed, self._t - state.t)
+
+    def _used(self, now: float) -> tuple[str, ...]:
+        limit = self._config.max_age
+        return tuple(name for name in self._neighbours if self._age(name, now) <= limit)
+
+    def _tick(self, now: float) -> None:
+        if not self._plant_there:
+            return  # what the dead plant said last would still look fresh
+        measurement, config = self._measurement, self._config
+        if measurement is None or (now - self._measured_at) * config.speed > config.max_age:
+            self._hold("no measurement of late; holds")
+            return
+        if self.phase != "running":
+            self.phase = "running"
+            self._say(f"joins at t = {measurement.t:g} s, from {measurement.P_set:.0f} W and {measurement.V_set:.1f} V")
+        state = replace(self._agent.tick(measurement, self._used(now)), seq=self.sent)
+        self.ticks += 1
+        self.sent += 1
+        self._actions.append(Publish(self.keys.state(self._name), encode(state)))
+
+    def _publish_status(self, now: float) -> None:
+        awaited = {
+            "seeking": f"the plant of run {self._config.run}",
+            "waiting": f"a measurement of {self._name} from the plant",
+            "running": "",
+        }
+        ages = [self._age(name, now) for name in self._neighbours]
+        status = AgentStatus(
+            sender=self._name,
+            incarnation=self._config.incarnation,
+            seq=self.sent,
+            t=self._t,
+            phase=self.phase,
+            waits_for=awaited[self.phase],
+            island="" if self._measurement is None else self._measurement.island,
+            neighbours=self._neighbours,
+            ages=tuple(age if age < float("inf") else -1.0 for age in ages),
+            used=tuple(name for name in self._used(now) if self._agent.shares_island(name)),
+            received=self.used,
+            sent=self.sent,
+            rejected=sum(self.rejects.counts.values()),
+            lost=self.lost,
+            ticks=self.ticks,
+            missed=self.missed,
+            lateness=self._lateness,
+        )
+        self._lateness = 0.0
+        self._actions.append(Publish(self.keys.status(self._name), encode(status)))

@@ -1,0 +1,89 @@
+"""What the plant tells: measurements to its agents, telemetry to who records. The same in both kinds of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from plant.interface import PlantLike, ReadingLike
+from wire.codec import LIMIT
+from wire.messages import PLANT, Measurement, Pacing, PlantEvent, Telemetry
+
+_NUMBER_BYTES = 9
+"""Bytes of one float in msgpack."""
+
+
+def measurement_of(
+    name: str, reading: ReadingLike, *, incarnation: int, tick: int, t: float, roster: tuple[str, ...] = ()
+) -> Measurement:
+    """Measurement of one inverter (t in s) from what its sensors read."""
+    return Measurement(
+        sender=PLANT,
+        incarnation=incarnation,
+        seq=tick,
+        t=t,
+        to=name,
+        P=reading.P,
+        Q=reading.Q,
+        V=reading.V,
+        f=reading.f,
+        P_set=reading.P_set,
+        V_set=reading.V_set,
+        grid_connected=reading.grid_connected,
+        island=reading.island,
+        roster=roster,
+    )
+
+
+class Reporter:
+    """Gathers rows and events between two reports.
+
+    Parameters
+    ----------
+    incarnation : int
+        Which life of the plant.
+    plant : PlantLike
+        Where the rows come from.
+    """
+
+    def __init__(self, incarnation: int, plant: PlantLike) -> None:
+        self._incarnation, self._plant = incarnation, plant
+        self._rows: list[tuple[float, ...]] = []
+        self._events: list[PlantEvent] = []
+        self._seq = 0
+
+    def collect(self) -> None:
+        """Take what the plant has recorded."""
+        self._rows += self._plant.take_rows()
+        self._events += self._plant.take_events()
+
+    def note(self, event: PlantEvent) -> None:
+        """Add an event that is not the plant's own."""
+        self._events.append(event)
+
+    def report(
+        self, t: float, *, final: bool, outcome: str, reproducible: bool, pacing: Pacing | None = None
+    ) -> Iterator[Telemetry]:
+        """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
+        inverters = self._plant.inverters
+        bytes_per_row = _NUMBER_BYTES * (1 + 6 * len(inverters)) + 8
+        at_once = max(1, LIMIT // 2 // bytes_per_row)
+        rows, events = self._rows, self._events
+        self._rows, self._events = [], []
+        while True:
+            part, rows = rows[:at_once], rows[at_once:]
+            yield Telemetry(
+                sender=PLANT,
+                incarnation=self._incarnation,
+                seq=self._seq,
+                t=t,
+                inverters=inverters,
+                rows=tuple(part),
+                events=() if rows else tuple(events),
+                final=final and not rows,
+                outcome=outcome,
+                reproducible=reproducible,
+                pacing=pacing,
+            )
+            self._seq += 1
+            if not rows:
+                return

@@ -1,0 +1,69 @@
+"""What people ask of a running plant, and the answers. Wall-clock time only; pure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from wire.messages import PLANT, Answer, Command
+
+if TYPE_CHECKING:
+    from plant.freerun import FreePlant
+
+
+class Service:
+    """Serves commands.
+
+    Parameters
+    ----------
+    side : FreePlant
+        The plant that is asked.
+    """
+
+    def __init__(self, side: FreePlant) -> None:
+        self._side = side
+
+    def serve(self, command: Command) -> Answer:
+        """Do what is asked, but for "down", which is the plant's own; the answer says what became of it."""
+        side = self._side
+        try:
+            if side.phase not in ("gathering", "running"):
+                raise ValueError("the run is ending")
+            text = self._do(command.verb, command.argument)
+            ok = True
+        except ValueError as error:
+            text, ok = str(error), False
+        return Answer(sender=PLANT, incarnation=side.config.incarnation, seq=command.seq, t=side.t, ok=ok, text=text)
+
+    def _do(self, verb: str, argument: str) -> str:
+        side = self._side
+        if verb == "status":
+            return msgspec.json.encode(self.status()).decode()
+        if verb == "down":
+            return f"run {side.config.run} ends at t = {side.t:g} s"
+        if verb == "stop":
+            instance = side.instances.get(argument)
+            if instance is None:
+                running = ", ".join(side.instances) or "none"
+                raise ValueError(f'no agent "{argument}" is running; running are: {running}')
+            side.stop(side.keys.dismissal(argument, instance), f"{argument} was stopped by command")
+            return f"{argument} was asked to leave at t = {side.t:g} s"
+        side.plant.switch(argument, verb)
+        return f"switch {argument}: {verb} at t = {side.t:g} s"
+
+    def status(self) -> dict[str, Any]:
+        """How the run stands: times in s, delays in s of wall time."""
+        side = self._side
+        return {
+            "run": side.config.run,
+            "phase": side.phase,
+            "t": side.t,
+            "tick": side.tick,
+            "end": side.config.end,
+            "speed": side.config.speed,
+            "pacing": side.pacer.report(),
+            "agents": [name for name in side.plant.inverters if name in side.plates],
+            "absent": [name for name in side.plant.inverters if name not in side.plates],
+            "rejected": sum(side.rejects.counts.values()),
+        }
