@@ -33,13 +33,16 @@ class Inbox:
     def __init__(self) -> None:
         self._events: deque[Event] = deque()
         self._wanted = 1
+        self._urgent = False
         self._wake = allocate_lock()
         self._wake.acquire()
 
     def put(self, event: Event) -> None:
         """Put an event in; from any thread, never blocking."""
         self._events.append(event)
-        if len(self._events) >= self._wanted or event[0] != "message":
+        if event[0] != "message":
+            self._urgent = True  # before the wake: one that comes while the owner computes is forgotten by `take`
+        if self._urgent or len(self._events) >= self._wanted:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
 
@@ -61,8 +64,9 @@ class Inbox:
         events = self._events
         self._wake.acquire(blocking=False)  # an old wake is of no interest
         self._wanted = wanted
-        if len(events) < wanted:
+        if len(events) < wanted and not self._urgent:
             self._wake.acquire(timeout=-1.0 if timeout is None else timeout)
+        self._urgent = False
         taken = []
         while events:
             taken.append(events.popleft())
