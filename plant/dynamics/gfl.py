@@ -103,6 +103,41 @@ def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> 
     return record
 
 
+def settle(
+    g: np.void,
+    state: np.void,
+    V: NDArray[np.complex128],
+    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    S: complex,
+    v: float,
+) -> None:
+    """Set a state to rest, in step with the voltage (section 7).
+
+    Parameters
+    ----------
+    g, state
+        Records of `PARAMETERS` and `STATE`; the state is written.
+    V, I
+        Phase voltages (V) and currents out of the inverter (A).
+    S
+        Terminal power (pu).
+    v
+        Mean terminal voltage (pu).
+    """
+    theta = float(np.angle(V @ np.array([1.0, A120, A120**2])))
+    turn = np.exp(-1j * theta) * np.array([1.0, A120, A120.conjugate()])
+    i_dq, u_dq = I * turn / g["I_b"], V * turn / g["V_b"]
+    c = i_dq
+    if not g["current_source"]:
+        e = (I / g["y_e"] + V) * turn / g["V_b"]
+        c = e - u_dq - 1j * g["X_f"] * g["F_current"] * i_dq
+    state["w_i"], state["theta"] = 0.0, theta
+    state["f_m"] = state["f"] = F_NOM
+    state["P_f"], state["V_m"], state["Q_f"] = S.real, v, S.imag
+    for phase, name in enumerate("ABC"):
+        state["cd_" + name], state["cq_" + name] = c[phase].real, c[phase].imag
+
+
 @compiled
 def power_reference(g: Any, P_set: float, f_m: float) -> float:
     """Freq-watt characteristic (7) with dead band, section 4.3 (pu).

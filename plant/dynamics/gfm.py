@@ -89,6 +89,27 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> 
     return record
 
 
+def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> None:
+    """Set a state to rest (section 7).
+
+    Parameters
+    ----------
+    g, state
+        Records of `PARAMETERS` and `STATE`; the state is written.
+    J_A
+        Injection of phase A (A), from which the internal voltage follows.
+    S
+        Terminal power (pu).
+    v
+        Mean terminal voltage (pu).
+    """
+    E = J_A / g["y_f"]
+    state["p"], state["q"], state["v"] = S.real, S.imag, v
+    state["x_over"] = state["x_under"] = state["y_over"] = state["y_under"] = state["w"] = 0.0
+    state["e"] = state["E"] = abs(E) / g["V_b"]
+    state["theta"] = np.angle(E)
+
+
 @compiled
 def advance_gfm(
     g: Any, P_set: float, V_set: float, x0: Any, x: Any, d: Any, P: float, Q: float, v: float, h: float, second: bool

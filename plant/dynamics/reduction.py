@@ -17,17 +17,32 @@ solved in a frame that turns with its first GFM, and the tangent stays good for 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
 
 from plant.dynamics.circuit import Circuit
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+_BLAS = ThreadpoolController()
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def _one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Have linear algebra done by one thread: with more its sums come in another order.
+
+    Another number of cores would give other last digits, and the same run other bytes.
+    """
+    return cast("Callable[_P, _R]", _BLAS.wrap(limits=1)(function))
 
 
 class Reduced(NamedTuple):
@@ -80,6 +95,7 @@ class Reduction:
         Which inverters are connected; the others neither inject nor load the network.
     """
 
+    @_one_thread
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
         self.circuit = circuit
         n_inv = circuit.terminals.shape[0]
@@ -151,6 +167,7 @@ class Reduction:
         """What the ideal sources alone give at the branches and at the terminals (V)."""
         return self._b_S @ source_voltage, self._G_S @ source_voltage
 
+    @_one_thread
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
@@ -190,6 +207,7 @@ class Reduction:
             theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
         )
 
+    @_one_thread
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         """Voltage of every node (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)

@@ -138,38 +138,13 @@ class Dynamics:
                 )
         for k, i in enumerate(self.gfm_at.tolist()):
             if self.online[i]:
-                self._settle_gfm(k, S[i], v[i])
+                gfm_model.settle(self.gfm[k], self.gfm_state[k], self.J[i, 0], S[i], v[i])
         for k, i in enumerate(self.gfl_at.tolist()):
             if self.online[i]:
-                self._settle_gfl(k, S[i], v[i], point.I[i])
+                gfl_model.settle(self.gfl[k], self.gfl_state[k], self.V[i], point.I[i], S[i], v[i])
         self._V_branch[self.reduction.branches] = point.V_branch
         self.connect(self.circuit)
         return point
-
-    def _settle_gfm(self, k: int, S: complex, v: float) -> None:
-        """GFM state k at rest at power S and mean voltage v (pu)."""
-        g, state = self.gfm[k], self.gfm_state[k]
-        E = self.J[self.gfm_at[k], 0] / g["y_f"]
-        state["p"], state["q"], state["v"] = S.real, S.imag, v
-        state["x_over"] = state["x_under"] = state["y_over"] = state["y_under"] = state["w"] = 0.0
-        state["e"] = state["E"] = abs(E) / g["V_b"]
-        state["theta"] = np.angle(E)
-
-    def _settle_gfl(self, k: int, S: complex, v: float, current: Complex) -> None:
-        """GFL state k at rest at power S, mean voltage v (pu) and phase currents (A)."""
-        g, state, i = self.gfl[k], self.gfl_state[k], self.gfl_at[k]
-        theta = float(np.angle(self.V[i] @ np.array([1.0, A120, A120**2])))
-        turn = np.exp(-1j * theta) * np.conj(PHASES)
-        i_dq, u_dq = current * turn / g["I_b"], self.V[i] * turn / g["V_b"]
-        c = i_dq
-        if not g["current_source"]:
-            e = self.J[i] / g["y_e"] * turn / g["V_b"]
-            c = e - u_dq - 1j * g["X_f"] * g["F_current"] * i_dq
-        state["w_i"], state["theta"] = 0.0, theta
-        state["f_m"] = state["f"] = gfl_model.F_NOM
-        state["P_f"], state["V_m"], state["Q_f"] = S.real, v, S.imag
-        for phase, name in enumerate("ABC"):
-            state["cd_" + name], state["cq_" + name] = c[phase].real, c[phase].imag
 
     # ---------------------------------------------------------------- switching
 
@@ -205,7 +180,7 @@ class Dynamics:
                 if regained[i]:
                     v = float(np.mean(np.abs(self.V[i]))) / self.V_b[i]
                     self.J[i] = self.y_f[i] * self.V[i]
-                    self._settle_gfl(k, 0.0, v, np.zeros(3, complex))
+                    gfl_model.settle(self.gfl[k], self.gfl_state[k], self.V[i], np.zeros(3, complex), 0.0, v)
             self._solve(theta)
         if stopped.any():
             self.V[~self.reduction.live[self.reduction.inverter_island]] = 0.0
@@ -244,7 +219,7 @@ class Dynamics:
         if abs(V_1) < 0.1 * self.V_b[i]:
             V_1 = complex(self.set_points[i, 1] * self.V_b[i])
         self.J[i] = V_1 * PHASES * self.gfm[k]["y_f"]
-        self._settle_gfm(k, 0.0, abs(V_1) / self.V_b[i])
+        gfm_model.settle(self.gfm[k], self.gfm_state[k], self.J[i, 0], 0.0, abs(V_1) / self.V_b[i])
 
     def _theta(self) -> Real:
         theta = np.zeros(len(self.inverters))

@@ -18,6 +18,24 @@ READING = 4
 
 
 @compiled
+def read_terminal(
+    y_f: complex,
+    J: NDArray[np.complex128],
+    V: NDArray[np.complex128],
+    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    reading: NDArray[np.float64],
+) -> None:
+    """Write an inverter's phase currents (A), and P (W), Q (var) and mean V (V) into its reading (section 2)."""
+    S = 0.0j
+    v = 0.0
+    for phase in range(3):
+        I[phase] = J[phase] - y_f * V[phase]
+        S += V[phase] * I[phase].conjugate()
+        v += abs(V[phase])
+    reading[1], reading[2], reading[3] = S.real, S.imag, v / 3.0
+
+
+@compiled
 def run_steps(
     steps: int,
     h: float,
@@ -98,13 +116,7 @@ def run_steps(
                 if not online[i]:
                     continue
                 former = gfm[k]
-                S = 0.0j
-                v = 0.0
-                for phase in range(3):
-                    I[i, phase] = J[i, phase] - former.y_f * V[i, phase]
-                    S += V[i, phase] * I[i, phase].conjugate()
-                    v += abs(V[i, phase])
-                out[step, i, 1], out[step, i, 2], out[step, i, 3] = S.real, S.imag, v / 3.0
+                read_terminal(former.y_f, J[i], V[i], I[i], out[step, i])
                 state = gfm_state[k]
                 advance_gfm(
                     former,
@@ -113,9 +125,9 @@ def run_steps(
                     gfm_0[k],
                     state,
                     gfm_d[k],
-                    S.real / former.S_b,
-                    S.imag / former.S_b,
-                    v / (3.0 * former.V_b),
+                    out[step, i, 1] / former.S_b,
+                    out[step, i, 2] / former.S_b,
+                    out[step, i, 3] / former.V_b,
                     h,
                     second,
                 )
@@ -128,13 +140,7 @@ def run_steps(
                 if not online[i]:
                     continue
                 follower = gfl[k]
-                S = 0.0j
-                v = 0.0
-                for phase in range(3):
-                    I[i, phase] = J[i, phase] - follower.y_f * V[i, phase]
-                    S += V[i, phase] * I[i, phase].conjugate()
-                    v += abs(V[i, phase])
-                out[step, i, 1], out[step, i, 2], out[step, i, 3] = S.real, S.imag, v / 3.0
+                read_terminal(follower.y_f, J[i], V[i], I[i], out[step, i])
                 J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
                     follower,
                     set_points[i, 0],
