@@ -285,6 +285,11 @@ class FreePlant:
     # ---------------------------------------------------------------- steps
 
     @property
+    def events(self) -> tuple[PlantEvent, ...]:
+        """The latest events, oldest first."""
+        return tuple(self._reporter.latest)
+
+    @property
     def t(self) -> float:
         """Run time the plant stands at (s)."""
         return time_of(self.tick, self.config.T_c)

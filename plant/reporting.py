@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 
 from plant.interface import PlantLike, ReadingLike
@@ -34,6 +35,10 @@ def measurement_of(
     )
 
 
+_LATEST = 20
+"""Events that are told to who comes late: with twice as many of the longest, an answer is still short."""
+
+
 class Reporter:
     """Gathers rows and events between two reports.
 
@@ -50,15 +55,20 @@ class Reporter:
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
         self._seq = 0
+        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
+        """The latest events, for who comes late."""
 
     def collect(self) -> None:
         """Take what the plant has recorded."""
         self._rows += self._plant.take_rows()
-        self._events += self._plant.take_events()
+        events = self._plant.take_events()
+        self._events += events
+        self.latest.extend(events)
 
     def note(self, event: PlantEvent) -> None:
         """Add an event that is not the plant's own."""
         self._events.append(event)
+        self.latest.append(event)
 
     def report(
         self, t: float, *, final: bool, outcome: str, reproducible: bool, pacing: Pacing | None = None

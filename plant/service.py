@@ -65,5 +65,6 @@ class Service:
             "pacing": side.pacer.report(),
             "agents": [name for name in side.plant.inverters if name in side.plates],
             "absent": [name for name in side.plant.inverters if name not in side.plates],
+            "events": list(side.events),
             "rejected": sum(side.rejects.counts.values()),
         }

@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from scenarios.live.commands import register
 from scenarios.usage import (
     BAD_INPUT,
     BROKEN,
@@ -44,6 +45,13 @@ class DriverName(StrEnum):
     inprocess = "inprocess"
 
 
+class ClockName(StrEnum):
+    """Values of `--clock`."""
+
+    simulated = "simulated"
+    wall = "wall"
+
+
 class Topic(StrEnum):
     """Values of the argument of `doc`."""
 
@@ -72,6 +80,16 @@ def run(
         DriverName,
         typer.Option(help="processes: a plant process and one process per agent, over Zenoh; inprocess: all in one."),
     ] = DriverName.processes,
+    clock: Annotated[
+        ClockName,
+        typer.Option(help="simulated: in lock-step, the same result every time; wall: real time, agents run freely."),
+    ] = ClockName.simulated,
+    speed: Annotated[
+        float, typer.Option(metavar="X", help="With --clock wall: seconds of the run per second of real time.")
+    ] = 1.0,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
+    ] = False,
     case: Annotated[str, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")] = "",
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed instead of the one in the scenario.")] = None,
     out: Annotated[
@@ -90,6 +108,7 @@ def run(
 
     spec, feeder = load(scenario)
     spec = chosen(spec, case, seed)
+    _check_clock(clock, driver, speed, strict)
     require({"numba": "the plant"} | ({"zenoh": "the processes"} if driver is DriverName.processes else {}))
 
     from rich.console import Console
@@ -113,7 +132,15 @@ def run(
 
     before = signal.signal(signal.SIGTERM, terminate)
     console = Console()
-    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder)
+    request = Request(
+        scenario=spec,
+        feeder=feeder,
+        driver=driver.value,
+        folder=folder,
+        clock=clock.value,
+        speed=speed,
+        strict=strict,
+    )
     try:
         with progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)
@@ -126,6 +153,17 @@ def run(
         signal.signal(signal.SIGTERM, before)
     show(report, console)
     raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)
+
+
+def _check_clock(clock: ClockName, driver: DriverName, speed: float, strict: bool) -> None:
+    if clock is ClockName.simulated:
+        if speed != 1.0 or strict:
+            option = "--strict" if strict else "--speed"
+            fail([f"{option}: simulated time has no pace to keep; use it with --clock wall"], BAD_INPUT)
+    elif driver is DriverName.inprocess:
+        fail(["--clock wall: needs a process per agent; leave out --driver inprocess"], BAD_INPUT)
+    elif not 0.1 <= speed <= 50.0:
+        fail([f"--speed: must be from 0.1 to 50 (1 is real time), got {speed:g}"], BAD_INPUT)
 
 
 @app.command("list")
@@ -167,3 +205,6 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
     from scenarios.reference import page
 
     typer.echo(page(topic.value), nl=False)
+
+
+register(app)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -55,8 +56,13 @@ class Look:
     """How well the plant keeps real time, in a few words."""
     lines: tuple[Line, ...] = ()
     """In the order of the inverters."""
-    events: tuple[tuple[float, str], ...] = ()
-    """Time (s) and text of what happened, the latest last."""
+    events: tuple[str, ...] = ()
+    """What happened, a line each, the latest last."""
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names in the order in which people count: inv2 before inv10."""
+    return sorted(names, key=lambda name: (name.rstrip("0123456789"), len(name), name))
 
 
 def short(names: tuple[str, ...] | list[str]) -> str:

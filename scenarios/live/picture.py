@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection
 
+import msgspec
+
 from agents.config import AgentConfig
-from scenarios.live.look import Line, Look, short
+from scenarios.live.events import line_of
+from scenarios.live.look import Line, Look, in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 SILENT = 1.5
@@ -20,6 +23,22 @@ _PER_INVERTER = 6
 
 _KEPT = 100
 """Events that are remembered."""
+
+
+class Standing(msgspec.Struct, frozen=True, kw_only=True):
+    """What the plant answers to "status", as far as it is shown; see `plant.service`."""
+
+    phase: str
+    """gathering, running or closing."""
+    t: float
+    """Run time (s)."""
+    speed: float
+    """Run time per wall time (s/s)."""
+    pacing: Pacing
+    agents: tuple[str, ...] = ()
+    """Agents that take part."""
+    events: tuple[PlantEvent, ...] = ()
+    """The latest, oldest first."""
 
 
 class Picture:
@@ -38,7 +57,10 @@ class Picture:
         self._row: tuple[float, ...] = ()
         self._t: float | None = None
         self._told: float | None = None
+        self._life = 0
+        """Which life of the plant it is of."""
         self._pacing: Pacing | None = None
+        self._standing: Standing | None = None
         self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
         self._status: dict[str, tuple[AgentStatus, float]] = {}
 
@@ -50,19 +72,34 @@ class Picture:
         )
         return self._inverters + tuple(others)
 
+    @property
+    def has_plates(self) -> bool:
+        """Whether the nameplates of all inverters in the telemetry are here."""
+        return self._plates.keys() >= set(self._inverters)
+
     def plate(self, config: AgentConfig) -> None:
         """Note who an agent is."""
         self._plates[config.name] = config
 
+    def standing(self, standing: Standing) -> None:
+        """Note how the plant says the run stands."""
+        self._standing = standing
+        if standing.phase != "gathering":
+            self._t, self._pacing = standing.t, standing.pacing
+        self._events.extend(standing.events)
+
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Note what the plant tells; `now` is the visitor's clock (s)."""
-        if self._t is not None and message.t < self._t:  # another life of the plant
-            self._events.clear()
+        if message.incarnation > self._life:
+            if self._life:
+                self._events.clear()
+                self._standing = None
+            self._life = message.incarnation
         self._inverters, self._t, self._told = message.inverters, message.t, now
         self._pacing = message.pacing or self._pacing
         if message.rows:
             self._row = message.rows[-1]
-        self._events.extend(message.events)
+        self._events.extend(event for event in message.events if event not in self._events)
 
     def status(self, message: AgentStatus, now: float) -> None:
         """Note how an agent fares."""
@@ -81,13 +118,13 @@ class Picture:
         pace = self._pace()
         if self._told is not None and now - self._told > SILENT:
             pace = f"the plant has been silent for {now - self._told:.0f} s"
-        names = dict.fromkeys((*self.inverters, *sorted(present)))
+        names = dict.fromkeys((*self.inverters, *in_order(present)))
         return Look(
             run=self._run,
             t=self._t,
             pace=pace,
             lines=tuple(self._line(name, name in present, now) for name in names),
-            events=tuple((event.t, event.text) for event in self._events),
+            events=tuple(line_of(event) for event in self._events),
         )
 
     def _line(self, name: str, present: bool, now: float) -> Line:
@@ -116,25 +153,32 @@ class Picture:
             sent=status.sent if status else None,
             lost=status.lost if status else None,
             rejected=status.rejected if status else None,
-            note=_note(status, name in self._status, present, now - at),
+            note=self._note(name, present, status, now - at),
         )
 
     def _pace(self) -> str:
-        pacing = self._pacing
+        """How well the plant keeps real time, in a few words."""
+        pacing, standing = self._pacing, self._standing
         if pacing is None or pacing.steps == 0:
-            return ""
-        text = f"pace: {100.0 * (1.0 - pacing.late / pacing.steps):.2f} % of steps in time"
+            return "waits for its agents" if standing is not None and standing.phase == "gathering" else ""
+        speed = f"speed {standing.speed:g}   " if standing is not None else ""
+        text = f"{speed}pace: {100.0 * (1.0 - pacing.late / pacing.steps):.2f} % of steps in time"
         text += f" (p50 {1e3 * pacing.p50:.1f} ms, p99 {1e3 * pacing.p99:.1f} ms)"
         return text + (f", fell behind by {pacing.slipped:.1f} s" if pacing.slipped > 0.0 else "")
 
+    def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
+        """What a person should know of an agent; age (s) is that of its last status."""
+        if not present:
+            return "no agent"
+        if status is None:
+            return f"silent for {age:.0f} s" if name in self._status else "has not told yet"
+        if status.phase != "running":
+            return f"waits for {status.waits_for}" if status.waits_for else status.phase
+        unused = [neighbour for neighbour in status.neighbours if neighbour not in status.used]
+        apart = [neighbour for neighbour in unused if self._island(neighbour) not in ("", status.island)]
+        silent = [neighbour for neighbour in unused if neighbour not in apart]
+        parts = (f"apart: {short(apart)}" if apart else "", f"without {short(silent)}" if silent else "")
+        return "; ".join(part for part in parts if part)
 
-def _note(status: AgentStatus | None, known: bool, present: bool, age: float) -> str:
-    """What a person should know of an agent; age (s) is that of its last status."""
-    if not present:
-        return "no agent"
-    if status is None:
-        return f"silent for {age:.0f} s" if known else "has not told yet"
-    if status.phase != "running":
-        return f"waits for {status.waits_for}" if status.waits_for else status.phase
-    unused = [name for name in status.neighbours if name not in status.used]
-    return f"without {short(unused)}" if unused else ""
+    def _island(self, name: str) -> str:
+        return self._status[name][0].island if name in self._status else ""

@@ -78,6 +78,14 @@ def check_run(run: str) -> str:
     return run
 
 
+def check_inverter(name: str) -> None:
+    """Raise UsageError if a name cannot be that of an inverter."""
+    try:
+        check_name("INVERTER", name)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
 def check_endpoint(option: str, text: str) -> str:
     """Return an endpoint if it has the form of one.
 
@@ -154,3 +162,14 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
         if not match["host"].startswith(_LOOPBACKS):
             return ("tcp/[::]:0",) if match["host"].startswith("[") else ("tcp/0.0.0.0:0",)
     return ("tcp/127.0.0.1:0",)
+
+
+def near(listen: str) -> str:
+    """Where a process of the same machine connects to who listens there.
+
+    Examples
+    --------
+    >>> near("tcp/0.0.0.0:7447"), near("tcp/[::]:7447"), near("tcp/10.0.0.1:7447")
+    ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/10.0.0.1:7447')
+    """
+    return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")

@@ -27,7 +27,7 @@ class _Column:
 
 
 def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+    return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0
 
 
 def _count(value: int | None) -> str:
@@ -84,7 +84,7 @@ def plain(look: Look) -> str:
             for cell, width, column in zip(row, widths, _COLUMNS, strict=True)
         ]
         text.append("  ".join(cells).rstrip())
-    text += [f"{t:8.2f} s  {what}" for t, what in look.events[-EVENTS:]]
+    text += look.events[-EVENTS:]
     return "\n".join(text) + "\n"
 
 
@@ -104,7 +104,7 @@ def table(look: Look, keys: str = "q: quit") -> Group:
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
     for line in look.lines:
         grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in _COLUMNS))
-    events = [Text(f"{t:8.2f} s  {what}", style="dim") for t, what in look.events[-EVENTS:]]
+    events = [Text(line, style="dim") for line in look.events[-EVENTS:]]
     return Group(Text(head(look), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
 
 

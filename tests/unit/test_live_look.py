@@ -20,13 +20,13 @@ def plate(name: str) -> AgentConfig:
     )  # fmt: skip
 
 
-def told(t: float, *events: PlantEvent, late: int = 0) -> Telemetry:
+def told(t: float, *events: PlantEvent, life: int = 1) -> Telemetry:
     """Telemetry of two inverters at a time (s)."""
     return Telemetry(
-        sender="plant", incarnation=1, seq=0, t=t, inverters=("inv1", "inv2"),
+        sender="plant", incarnation=life, seq=0, t=t, inverters=("inv1", "inv2"),
         rows=((t, 60.01, 3e5, 1e4, 2400.0, 3.1e5, 2412.0, 60.0, 2.5e5, -2e4, 2376.0, 2.5e5, 2400.0),),
         events=events, final=False, outcome="", reproducible=False,
-        pacing=Pacing(steps=200, late=late, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0),
+        pacing=Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0),
     )  # fmt: skip
 
 
@@ -90,9 +90,9 @@ def test_a_silent_plant_is_told() -> None:
 
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
-    """When the run's time goes back, what happened before belongs to another run."""
+    """What happened before its new life belongs to another run."""
     seen = picture()
-    seen.telemetry(told(0.2), now=20.0)
+    seen.telemetry(told(0.2, life=2), now=20.0)
 
     assert seen.look((), now=20.0).events == ()
 

@@ -1,0 +1,181 @@
+"""Commands to a running plant and their answers: status, stop, event, down."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import Literal
+
+import msgspec
+
+from agents.config import AgentConfig
+from scenarios.live.look import Look, in_order
+from scenarios.live.picture import Picture, Standing
+from scenarios.live.visit import NobodyError, Visit
+from wire.codec import RejectedError, decode, encode
+from wire.messages import AgentStatus, Answer, Command, Telemetry
+
+Verb = Literal["open", "close", "stop", "down", "status"]
+
+ANSWER = 5.0
+"""Longest wait (s) for the answer of a plant that is there."""
+
+PLATES = 2.0
+"""Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds."""
+
+AGAIN = 0.1
+"""Time (s) between two questions about the same thing."""
+
+LOOK = 1.2
+"""Longest wait (s) for one look: two periods of an agent's status, and a bit."""
+
+LEAVING = 10.0
+"""Longest wait (s) for those who were told to leave."""
+
+
+class RefusedError(ValueError):
+    """The plant has said no; the message is its."""
+
+
+def ask(visit: Visit, verb: Verb, argument: str = "") -> str:
+    """Give the plant a command; what it answers.
+
+    Raises
+    ------
+    RefusedError
+        If it says no.
+    NobodyError
+        If it does not answer.
+    """
+    command = Command(sender="visitor", incarnation=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=visit.id)
+    visit.publish(visit.keys.command, encode(command))
+    end = monotonic() + ANSWER
+    while (left := end - monotonic()) > 0.0:
+        for _, payload in visit.take(left):
+            answer = _decoded(payload)
+            if isinstance(answer, Answer):
+                if not answer.ok:
+                    raise RefusedError(answer.text)
+                return answer.text
+    raise NobodyError(f"the plant of {visit.where} is there but has not answered within {ANSWER:g} s; is it frozen?")
+
+
+def standing(visit: Visit) -> Standing:
+    """How the plant says the run stands."""
+    return msgspec.json.decode(ask(visit, "status"), type=Standing)
+
+
+def configuration(visit: Visit, name: str) -> AgentConfig:
+    """What the plant hands to the agent of an inverter.
+
+    Raises
+    ------
+    NobodyError
+        If there is no such inverter.
+    """
+    known: dict[str, AgentConfig] = {}
+    visit.fetch(visit.keys.config("*"))
+    end = monotonic() + PLATES
+    while name not in known and (left := end - monotonic()) > 0.0:
+        for _, payload in visit.take(left):
+            config = _plate(payload)
+            if config is not None:
+                known[config.name] = config
+    if name not in known:
+        there = f"inverters are {', '.join(in_order(known))}" if known else "the plant names none"
+        raise NobodyError(f'no inverter "{name}" in {visit.where}; {there}')
+    return known[name]
+
+
+def look(visit: Visit) -> Look:
+    """Listen until the plant and every agent have told how they are, or for `LOOK` seconds."""
+    picture, heard = Picture(visit.where.run), set[str]()
+    picture.standing(standing(visit))
+    watch = Watching(visit, picture)
+    told = False
+    end = monotonic() + LOOK
+    while (left := end - monotonic()) > 0.0:
+        for message in watch.take(left):
+            told = told or isinstance(message, Telemetry)
+            if isinstance(message, AgentStatus):
+                heard.add(message.sender)
+        if told and heard >= set(present(visit)) and picture.has_plates:
+            break
+    return picture.look(present(visit), monotonic())
+
+
+def present(visit: Visit) -> list[str]:
+    """Inverters whose agents have a token."""
+    return [name for name, instances in visit.agents.items() if instances]
+
+
+class Watching:
+    """Brings what a run tells into a picture.
+
+    Parameters
+    ----------
+    visit : Visit
+        At the run.
+    picture : Picture
+        Takes it.
+    """
+
+    def __init__(self, visit: Visit, picture: Picture) -> None:
+        self._visit, self._picture = visit, picture
+        self._subscribed: set[str] = set()
+        self._plant = visit.plant
+        visit.listen(visit.keys.telemetry)
+        visit.fetch(visit.keys.config("*"))
+
+    def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
+        """Wait (s) for something to happen and note it; what was told."""
+        told: list[Telemetry | AgentStatus] = []
+        for _, payload in self._visit.take(seconds):
+            config = _plate(payload)
+            if config is not None:
+                self._picture.plate(config)
+                continue
+            message = _decoded(payload)
+            if isinstance(message, Telemetry):
+                self._picture.telemetry(message, monotonic())
+                told.append(message)
+            elif isinstance(message, AgentStatus):
+                self._picture.status(message, monotonic())
+                told.append(message)
+        if self._visit.plant and not self._plant:  # it was restarted, perhaps with other inverters
+            self._visit.fetch(self._visit.keys.config("*"))
+        self._plant = self._visit.plant
+        for name in {*self._picture.inverters, *self._visit.agents} - self._subscribed:
+            self._subscribed.add(name)
+            self._visit.listen(self._visit.keys.status(name))
+        return told
+
+
+def _plate(payload: bytes) -> AgentConfig | None:
+    if not payload.startswith(b"{"):
+        return None
+    try:
+        return msgspec.json.decode(payload, type=AgentConfig)
+    except msgspec.DecodeError:
+        return None
+
+
+def _decoded(payload: bytes) -> object:
+    try:
+        return decode(payload)
+    except RejectedError:  # nothing depends on a visitor
+        return None
+
+
+def has_left(visit: Visit, name: str) -> bool:
+    """Wait until an agent that was told to leave has left; whether it has."""
+    end = monotonic() + LEAVING
+    while name in standing(visit).agents:
+        if monotonic() > end:
+            return False
+        visit.until(lambda: False, AGAIN)
+    return True
+
+
+def has_ended(visit: Visit) -> bool:
+    """Wait until a run that was told to end has ended; whether it has. The plant goes when all others have."""
+    return visit.until(lambda: not visit.plant, LEAVING)

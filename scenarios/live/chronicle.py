@@ -1,0 +1,120 @@
+"""Tells in a terminal what happens in a run, and records it if that is wanted. In a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from scenarios.live.events import line_of
+from scenarios.record import Recorder, RecordError
+from wire.codec import RejectedError, decode
+from wire.keys import Keys
+from wire.messages import Pacing, Telemetry
+from wire.session import Session
+
+_STOP = "stop"
+
+
+class Chronicle:
+    """What a plant tells, as lines for a person and as files.
+
+    The plant waits for it before the start and at the end, so nothing of the run is missing. Use it as a context.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    endpoint : str
+        Where the plant listens.
+    tell : Callable[[str], None]
+        Told a line for everything that happens.
+    folder : Path or None
+        Folder for history.csv and events.csv; None records nothing.
+    untold : Collection[str], optional
+        Kinds of events that are told by others.
+    """
+
+    NAME = "chronicle"
+    """Name under which it is a recorder of the run."""
+
+    def __init__(
+        self,
+        run: str,
+        endpoint: str,
+        tell: Callable[[str], None],
+        folder: Path | None = None,
+        *,
+        untold: Collection[str] = (),
+    ) -> None:
+        keys = Keys(run)
+        self._tell, self._untold = tell, untold
+        self._recorder = None if folder is None else Recorder(folder)
+        self.pacing: Pacing | None = None
+        """How well the plant has kept pace so far."""
+        self.t = 0.0
+        """How far the run has come (s)."""
+        self.ended = False
+        """Whether the last telemetry is in."""
+        self._trouble = ""
+        self._session = Session(self.NAME, connect=(endpoint,), gossip=False, clock="wall")
+        self._session.subscribe(keys.telemetry)
+        self._session.hold_token(keys.alive_recorder(self.NAME))
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+
+    def __enter__(self) -> Chronicle:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Take in what has come, close the session, and give the files their names."""
+        self._session.inbox.put(("word", _STOP, b""))
+        self._thread.join()
+        self._session.close()
+        if self._recorder is None:
+            return
+        rows = self._recorder.rows
+        if self.ended and len(rows) > 1:
+            try:
+                self._recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
+            except RecordError as error:
+                self._trouble = str(error)
+        self._recorder.close()
+
+    @property
+    def trouble(self) -> str:
+        """What went wrong with the record; empty if nothing did."""
+        return self._trouble
+
+    def _follow(self) -> None:
+        while not self.ended:
+            for kind, _, payload in self._session.inbox.take(1, None):
+                if kind == "word":
+                    return
+                if kind == "message" and not self._take(payload):
+                    return
+        self._session.close()  # with it goes the token: the plant knows that the last telemetry is here
+
+    def _take(self, payload: bytes) -> bool:
+        """Tell and write down one message; False if it cannot be gone on."""
+        try:
+            message = decode(payload)
+        except RejectedError:
+            return True
+        if not isinstance(message, Telemetry):
+            return True
+        self.t, self.pacing = message.t, message.pacing or self.pacing
+        self.ended = message.final
+        for event in message.events:
+            if event.kind not in self._untold:
+                self._tell(line_of(event))
+        try:
+            if self._recorder is not None:
+                self._recorder(message)
+        except (RecordError, OSError) as error:
+            self._trouble = f"the record ends at {self.t:g} s: {error}"
+            return False
+        return True

@@ -1,0 +1,282 @@
+"""The commands for runs by hand. What they need is imported when one is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
+
+if TYPE_CHECKING:
+    from scenarios.live.hand import Ended
+    from scenarios.live.visit import Visit
+
+RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
+"""As in `scenarios.live.place`, which a test holds them against."""
+
+_Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
+_Connect = Annotated[
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help=f"Where the plant listens, {ENDPOINT} if left out; repeatable."),
+]
+_Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest wait for the plant.")]
+_Scenario = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
+]
+_Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
+_Listen = Annotated[
+    str,
+    typer.Option("--listen", metavar="ENDPOINT", help="Where the others connect; tcp/0.0.0.0:7447 for other hosts."),
+]
+_Speed = Annotated[float, typer.Option("--speed", metavar="X", help="Run time per wall time, 0.1 to 50; 1 is real.")]
+_WaitForAgents = Annotated[
+    float, typer.Option("--wait", metavar="SECONDS", help="How long the plant waits for its agents before it starts.")
+]
+_For = Annotated[float | None, typer.Option("--for", metavar="SECONDS", help="Run time to end at; no end if left out.")]
+_Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 3 when pace cannot be kept.")]
+_Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Record history.csv and events.csv in a new folder.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (plant, agent, up, down, status, watch, stop, event):
+        app.command()(command)
+
+
+def plant(
+    scenario: _Scenario,
+    case: _Case = "",
+    run: _Run = RUN,
+    listen: _Listen = ENDPOINT,
+    speed: _Speed = 1.0,
+    wait: _WaitForAgents = 30.0,
+    duration: _For = None,
+    strict: _Strict = False,
+    out: _Out = None,
+) -> None:
+    """Run the plant of a scenario in this terminal, in real time. Agents come from others.
+
+    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+
+    Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
+    """
+    _start(scenario, case, run, listen, speed, wait, duration, strict, out, agents=False)
+
+
+def up(
+    scenario: _Scenario,
+    case: _Case = "",
+    run: _Run = RUN,
+    listen: _Listen = ENDPOINT,
+    speed: _Speed = 1.0,
+    wait: _WaitForAgents = 30.0,
+    duration: _For = None,
+    strict: _Strict = False,
+    out: _Out = None,
+) -> None:
+    """Run the plant and all its agents at once, in real time, until `gridpeers down` or Ctrl-C.
+
+    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+
+    Example:  gridpeers up islanding --speed 0.5
+    """
+    _start(scenario, case, run, listen, speed, wait, duration, strict, out, agents=True)
+
+
+def agent(
+    inverter: Annotated[
+        str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2; spare ones too.")
+    ],
+    run: _Run = RUN,
+    connect: _Connect = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option("--listen", metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
+    ] = None,
+    wait: _Wait = 60.0,
+) -> None:
+    """Run the agent of one inverter in this terminal. Ctrl-C leaves properly: the inverter is switched off.
+
+    Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
+
+    Example:  gridpeers agent inv2 --connect tcp/192.168.1.10:7447
+    """
+    require({"zenoh": "an agent"})
+    with _told():
+        from scenarios.live.hand import agent_here
+        from scenarios.live.place import check_inverter, claim, place, return_path
+
+        where = place(run, connect)
+        check_inverter(inverter)
+        listening = tuple(claim("--listen", text) for text in listen) if listen else return_path(where.connect)
+        _finish(agent_here(where, inverter, listening, wait))
+
+
+def status(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None:
+    """Look once at a run: time, pacing, a line per agent, latest events.
+
+    Example:  gridpeers status
+    """
+    with _visit(run, connect, wait, meet_agents=True) as visit:
+        from scenarios.live.asking import look
+        from scenarios.live.render import plain
+
+        typer.echo(plain(look(visit)), nl=False)
+
+
+def watch(
+    run: _Run = RUN,
+    connect: _Connect = None,
+    wait: _Wait = 5.0,
+    duration: Annotated[
+        float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
+    ] = None,
+) -> None:
+    """Watch a run as a live table; q quits. Where the output is no terminal, a text every 2 s.
+
+    Example:  gridpeers watch --connect tcp/192.168.1.10:7447
+    """
+    with _visit(run, connect, wait, meet_agents=True) as visit:
+        from rich.console import Console
+
+        from scenarios.live.watching import watch as watch_run
+
+        watch_run(visit, Console(), duration)
+
+
+def stop(
+    inverter: Annotated[str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2.")],
+    run: _Run = RUN,
+    connect: _Connect = None,
+    wait: _Wait = 5.0,
+) -> None:
+    """Have an agent leave properly: its inverter is switched off, the others take over.
+
+    Exit code: 0 it has left, 2 there is no such agent, 3 it has not left.
+
+    Example:  gridpeers stop inv2
+    """
+    with _visit(run, connect, wait) as visit:
+        from scenarios.live.asking import LEAVING, ask, has_left
+
+        typer.echo(ask(visit, "stop", inverter))
+        if not has_left(visit, inverter):
+            fail([f"{inverter} has not left within {LEAVING:g} s; is its process frozen?"], BROKEN)
+
+
+def event(
+    action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
+    switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
+    run: _Run = RUN,
+    connect: _Connect = None,
+    wait: _Wait = 5.0,
+) -> None:
+    """Open or close a switch of a running plant.
+
+    Exit code: 0 it was done, 2 there is no such switch.
+
+    Example:  gridpeers event open sw1_2
+    """
+    if action not in ("open", "close"):
+        fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
+    with _visit(run, connect, wait) as visit:
+        from scenarios.live.asking import ask
+
+        typer.echo(ask(visit, "open" if action == "open" else "close", switch))
+
+
+def down(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None:
+    """End a run: its agents leave, its plant ends.
+
+    Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
+
+    Example:  gridpeers down --run lab
+    """
+    with _visit(run, connect, wait) as visit:
+        from scenarios.live.asking import LEAVING, ask, has_ended
+
+        typer.echo(ask(visit, "down"))
+        if not has_ended(visit):
+            fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)
+
+
+def _start(
+    scenario: str,
+    case: str,
+    run: str,
+    listen: str,
+    speed: float,
+    wait: float,
+    duration: float | None,
+    strict: bool,
+    out: Path | None,
+    *,
+    agents: bool,
+) -> None:
+    spec, feeder = load(scenario)
+    require({"numba": "the plant", "zenoh": "the processes"})
+    with _told():
+        from scenarios.live.folders import folders
+        from scenarios.live.hand import all_here, plant_here, say
+        from scenarios.live.place import check_run, claim
+        from scenarios.live.setup import Wishes, chosen_case, set_up
+
+        check_run(run)
+        spec = chosen(spec, chosen_case(spec, case), None)
+        wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
+        endpoint = claim("--listen", listen)
+        config, everyone = set_up(spec, feeder, wishes, endpoint)
+        with folders(out, spec) as kept:
+            say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
+            if agents:
+                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
+                ended = all_here(config, everyone, kept.logs, kept.record)
+            else:
+                ended = plant_here(config, kept.record)
+            kept.note(
+                "broken: interrupted" if ended.interrupted else f"broken: {ended.broke}" if ended.broke else "complete"
+            )
+        _finish(ended)
+
+
+def _finish(ended: Ended) -> None:
+    if ended.interrupted:
+        code = TERMINATED if ended.interrupted == "SIGTERM" else INTERRUPTED
+        fail([f"{ended.interrupted}: everything that was started here has ended"], code)
+    if ended.broke:
+        fail([ended.broke], BROKEN)
+
+
+@contextmanager
+def _visit(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[Visit]:
+    """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
+    require({"zenoh": "the connection to a run"})
+    with _told():
+        from scenarios.live.place import place
+        from scenarios.live.visit import Visit
+
+        with Visit(place(run, connect), meet_agents=meet_agents) as visit:
+            visit.find_plant(wait)
+            yield visit
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """What a person did wrong, or what is not there, in one line and exit code 2."""
+    from scenarios.folder import FolderError
+    from scenarios.live.asking import RefusedError
+    from scenarios.live.place import UsageError
+    from scenarios.live.visit import NobodyError
+    from wire.process import ConfigurationError
+    from wire.session import SessionError
+
+    try:
+        yield
+    except (ConfigurationError, FolderError, NobodyError, RefusedError, SessionError, UsageError) as error:
+        fail([str(error)], BAD_INPUT)

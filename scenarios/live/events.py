@@ -1,0 +1,16 @@
+"""Events of a run as lines for a person."""
+
+from __future__ import annotations
+
+from wire.messages import PlantEvent
+
+
+def line_of(event: PlantEvent) -> str:
+    """An event in a line, its time first and only there.
+
+    Examples
+    --------
+    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.5 s"))
+    '    1.50 s  inv2 joined'
+    """
+    return f"{event.t:8.2f} s  {event.text.removesuffix(f', at t = {event.t:g} s')}"

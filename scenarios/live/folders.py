@@ -1,0 +1,63 @@
+"""Where a run by hand leaves what it leaves: a run folder if one was asked for, else only logs while it lasts."""
+
+from __future__ import annotations
+
+import platform
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+
+from scenarios.folder import new_folder, set_status, write_whole
+from scenarios.spec import Scenario
+from scenarios.spec.writing import to_toml
+
+
+class Folders:
+    """Folders of a run by hand.
+
+    Parameters
+    ----------
+    logs : Path
+        For the logs of processes.
+    record : Path or None
+        For history.csv and events.csv; None if nothing is recorded.
+    whole : Path or None
+        The run folder; None if there is none.
+    """
+
+    def __init__(self, logs: Path, record: Path | None = None, whole: Path | None = None) -> None:
+        self.logs, self.record, self._whole = logs, record, whole
+
+    def note(self, status: str) -> None:
+        """Write the one line of status.txt."""
+        if self._whole is not None:
+            set_status(self._whole, status)
+
+
+@contextmanager
+def folders(out: Path | None, scenario: Scenario) -> Iterator[Folders]:
+    """Make the folders of a run.
+
+    Parameters
+    ----------
+    out : Path or None
+        What `--out` says.
+    scenario : Scenario
+        As run, with its one case.
+
+    Raises
+    ------
+    FolderError
+        If the folder has something in it, is a file, or cannot be made.
+    """
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
+            yield Folders(Path(logs))
+        return
+    whole = new_folder(out, scenario.name, datetime.now().astimezone())
+    write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": "by hand", "python": platform.python_version()}))
+    (whole / "log").mkdir()
+    (case,) = scenario.cases
+    yield Folders(whole / "log", whole / case, whole)

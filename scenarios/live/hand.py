@@ -1,0 +1,217 @@
+"""A plant, an agent, or both together, in the terminal where they were started."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn, TextIO
+
+import msgspec
+
+from agents.config import AgentConfig
+from agents.runtime import run_agent
+from plant.config import PlantConfig
+from plant.pacing import sentence
+from plant.runtime import COMPILING, READY, run_plant
+from scenarios.children import Child, Children
+from scenarios.live.asking import configuration
+from scenarios.live.chronicle import Chronicle
+from scenarios.live.look import short
+from scenarios.live.place import Place, near
+from scenarios.live.visit import Visit
+from wire.drive import StoppedError
+from wire.messages import PLANT
+
+LOGGED = ("roster", "warning")
+"""Kinds of events that the plant writes to its log too."""
+
+RECORDER_WAIT = 1.0
+"""Least wait (s) of a plant that is recorded: without its recorder the first row would be missing."""
+
+LEAVING = 5.0
+"""Time (s) that processes have to close by themselves once the plant has."""
+
+
+def say(line: str, file: TextIO | None = None) -> None:
+    """Print a line at once, on standard output unless said otherwise; who reads it may be gone already."""
+    with contextlib.suppress(BrokenPipeError):
+        print(line, file=file, flush=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    """How something that was started by hand ended."""
+
+    broke: str = ""
+    """Why it could not go on; empty after a good end."""
+    interrupted: str = ""
+    """Name of the signal that ended it: SIGINT, as Ctrl-C gives, or SIGTERM."""
+
+
+class _Words:
+    """Stands for standard output while the plant tells its words there, and says what they mean."""
+
+    def __init__(self, tell: Callable[[str], None], config: PlantConfig) -> None:
+        self._tell, self._config = tell, config
+        self._text = ""
+
+    def write(self, text: str) -> int:
+        *words, self._text = (self._text + text).split("\n")
+        for word in words:
+            if word == COMPILING:  # what comes then, the plant's log tells in sentences
+                self._tell(meaning(word, self._config))
+        return len(text)
+
+    def flush(self) -> None:
+        pass
+
+
+def meaning(word: str, config: PlantConfig) -> str:
+    """What a word of the starting plant means to a person."""
+    if word == COMPILING:
+        return "the plant is being built; the very first time its inner loop is compiled, which takes some seconds"
+    if word == READY:
+        agents = f"{len(config.agents)} agents {short(config.agents)}"
+        wait = config.wait_for_agents
+        return f"waits up to {wait:g} s for its {agents}" if wait > 0.0 else f"waits for none of its {agents}"
+    return ""
+
+
+def plant_here(config: PlantConfig, folder: Path | None) -> Ended:
+    """Run the plant in this process until it is told to end.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant.
+    folder : Path or None
+        Where to record the run.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    _log()
+    config, terminal = _recorded(config, folder), sys.stdout
+
+    def tell(line: str) -> None:
+        say(line, terminal)
+
+    with Chronicle(config.run, near(config.listen[0]), tell, folder, untold=LOGGED) as chronicle:
+        try:
+            with contextlib.redirect_stdout(_Words(tell, config)):
+                broke = run_plant(config)
+        except (StoppedError, KeyboardInterrupt) as stop:
+            farewell(chronicle, config)
+            return Ended(interrupted=str(stop) or "SIGINT")
+    if chronicle.trouble:
+        say(chronicle.trouble)
+    return Ended(broke=broke)
+
+
+def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) -> Ended:
+    """Run an agent in this process, as the plant tells it to, until it leaves.
+
+    Parameters
+    ----------
+    where : Place
+        The run, and where to look for it.
+    name : str
+        Name of its inverter.
+    listen : tuple[str, ...]
+        Where other agents can connect.
+    wait : float
+        Longest wait (s) for a plant.
+
+    Raises
+    ------
+    NobodyError
+        If there is no plant, no such inverter, or another agent of its name.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    _log()
+    say(f"{name}: seeks the plant of {where}, for up to {wait:g} s")
+    try:
+        with Visit(where) as visit:
+            visit.find_plant(wait, lambda line: say(f"{name}: {line}"))
+            config = configuration(visit, name)
+        config = msgspec.structs.replace(config, connect=where.connect, listen=listen)
+        return Ended(broke=run_agent(config))
+    except (StoppedError, KeyboardInterrupt) as stop:
+        return Ended(interrupted=str(stop) or "SIGINT")
+
+
+def all_here(config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None) -> Ended:
+    """Run the plant and all its agents as processes of their own, until the run is ended.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant.
+    agents : tuple[AgentConfig, ...]
+        All agents it knows; spare ones are not started.
+    logs : Path
+        Folder for what the processes print.
+    folder : Path or None
+        Where to record the run.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    config = _recorded(config, folder)
+    endpoint = near(config.listen[0])
+    over = threading.Event()
+
+    def on_exit(child: Child) -> None:
+        if child.name == PLANT:
+            over.set()
+        elif child.status != 0 and not over.is_set():
+            say(child.report(f"after t = {chronicle.t:.2f} s"))
+
+    def on_word(word: str) -> None:
+        if said := meaning(word, config):
+            say(said)
+
+    try:
+        with Chronicle(config.run, endpoint, say, folder) as chronicle, Children() as children:
+            children.add(Child(PLANT, ["-m", "plant"], config, logs / "plant.log", on_exit, on_word))
+            for agent in agents:
+                if agent.name in config.agents:
+                    agent = msgspec.structs.replace(agent, connect=(endpoint,))
+                    children.add(Child(agent.name, ["-m", "agents"], agent, logs / f"{agent.name}.log", on_exit))
+            try:
+                over.wait()
+                children.wait(LEAVING)
+            finally:
+                farewell(chronicle, config)
+            plant = children[PLANT]
+            return Ended(broke="" if plant.status == 0 else plant.report(f"after t = {chronicle.t:.2f} s"))
+    except (StoppedError, KeyboardInterrupt) as stop:
+        return Ended(interrupted=str(stop) or "SIGINT")
+
+
+def farewell(chronicle: Chronicle, config: PlantConfig) -> None:
+    """Say how far the run came and how well it kept pace."""
+    pacing = chronicle.pacing
+    if pacing is None or pacing.steps == 0:
+        say("the run ended before it began")
+    else:
+        say(f"ended at t = {chronicle.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
+    if chronicle.trouble:
+        say(chronicle.trouble)
+
+
+def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:
+    """The plant with its recorder, for which it waits a moment even if it waits for nobody else."""
+    wait = config.wait_for_agents if folder is None else max(RECORDER_WAIT, config.wait_for_agents)
+    return msgspec.structs.replace(config, recorders=(Chronicle.NAME,), wait_for_agents=wait)
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    raise StoppedError(signal.Signals(number).name)
+
+
+def _log() -> None:
+    logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")

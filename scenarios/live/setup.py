@@ -1,0 +1,120 @@
+"""What the plant of a run by hand is started with, and what it hands to the agents that come."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+
+from agents.config import AgentConfig
+from plant.config import PlantConfig
+from plant.equipment import Feeder
+from scenarios.live.place import UsageError
+from scenarios.spec import Scenario, suggestion
+from scenarios.spec.configs import configs
+
+SPEEDS = (0.1, 50.0)
+"""Least and greatest speed (s of run time per s of wall time) that is of any use."""
+
+
+class Wishes(msgspec.Struct, frozen=True, kw_only=True):
+    """What the options of `gridpeers plant` and `gridpeers up` say."""
+
+    run: str
+    """Name of the run."""
+    case: str = ""
+    """Case of the scenario; the last one if empty."""
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
+    wait: float = 30.0
+    """How long (s) the plant waits for its agents."""
+    duration: float | None = None
+    """Run time (s) after which the run ends; None for no end."""
+    strict: bool = False
+    """Whether the run breaks when the plant cannot keep pace."""
+
+
+def chosen_case(scenario: Scenario, case: str) -> str:
+    """Name of the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
+
+    Raises
+    ------
+    UsageError
+        If there is no such case.
+    """
+    if case and case not in scenario.cases:
+        raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
+    return case or list(scenario.cases)[-1]
+
+
+def set_up(
+    scenario: Scenario, feeder: Feeder, wishes: Wishes, listen: str
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Configurations of the plant and of all agents, spare ones last.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A checked scenario.
+    feeder : Feeder
+        Its feeder.
+    wishes : Wishes
+        Options of the command.
+    listen : str
+        Where the plant listens.
+
+    Raises
+    ------
+    UsageError
+        If an option cannot be used.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> plant, agents = set_up(*load_scenario("islanding"), Wishes(run="lab"), "tcp/127.0.0.1:7447")
+    >>> plant.end, plant.settings.spares, agents[-1].name
+    (None, ('inv10',), 'inv10')
+    """
+    _check(wishes)
+    plant, agents = configs(scenario, feeder, chosen_case(scenario, wishes.case), listen)
+    live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed}
+    everyone = tuple(
+        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*agents, *_spares(feeder, agents[0]))
+    )
+    end = None if wishes.duration is None else max(1, round(wishes.duration / plant.T_c)) * plant.T_c
+    plant = msgspec.structs.replace(
+        plant,
+        **live,
+        settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
+        end=end,
+        wait_for_agents=wishes.wait,
+        strict=wishes.strict,
+        handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
+    )
+    return plant, everyone
+
+
+def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
+    """Configurations of the spare inverters' agents: as the others', but for the nameplate."""
+    for row in feeder.spares:
+        yield msgspec.structs.replace(
+            like,
+            name=row.name,
+            kind=row.kind,
+            microgrid=row.microgrid,
+            P_rated=row.P_rated,
+            V_nom=row.V_nom,
+            m_p=row.m_p,
+            m_q=row.m_q,
+        )
+
+
+def _check(wishes: Wishes) -> None:
+    least, greatest = SPEEDS
+    if not least <= wishes.speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {wishes.speed:g}")
+    if not (math.isfinite(wishes.wait) and wishes.wait >= 0.0):
+        raise UsageError(f"--wait: must be a time of at least 0 s, got {wishes.wait:g} s")
+    if wishes.duration is not None and not (math.isfinite(wishes.duration) and wishes.duration > 0.0):
+        raise UsageError(f"--for: must be a time of more than 0 s, got {wishes.duration:g} s")

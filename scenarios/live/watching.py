@@ -1,0 +1,66 @@
+"""`gridpeers watch`: a table that renews itself on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+from time import monotonic
+
+from rich.console import Console
+from rich.live import Live
+
+from scenarios.live.asking import Watching, present, standing
+from scenarios.live.keyboard import keyboard
+from scenarios.live.picture import Picture
+from scenarios.live.render import plain, table
+from scenarios.live.visit import Visit
+
+REFRESH = 0.25
+"""Time (s) between two pictures on a terminal: the plant tells five times a second."""
+
+PERIOD = 2.0
+"""Time (s) between two texts where the output is no terminal."""
+
+QUIT = ("q", "Q", "\x1b")
+"""Keys that end it."""
+
+
+def watch(visit: Visit, console: Console, seconds: float | None) -> None:
+    """Show a run until somebody quits, or for a time.
+
+    Parameters
+    ----------
+    visit : Visit
+        At the run, with its agents met.
+    console : Console
+        Where to.
+    seconds : float or None
+        For how long (s); None until q or Ctrl-C.
+    """
+    picture = Picture(visit.where.run)
+    picture.standing(standing(visit))
+    watching = Watching(visit, picture)
+    end = None if seconds is None else monotonic() + seconds
+    if console.is_terminal:
+        _on_terminal(visit, picture, watching, console, end)
+    else:
+        _as_lines(visit, picture, watching, console, end)
+
+
+def _on_terminal(visit: Visit, picture: Picture, watching: Watching, console: Console, end: float | None) -> None:
+    with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
+        while end is None or monotonic() < end:
+            _gather(watching, monotonic() + REFRESH)
+            live.update(table(picture.look(present(visit), monotonic())), refresh=True)
+            if key(0.0) in QUIT:
+                return
+
+
+def _as_lines(visit: Visit, picture: Picture, watching: Watching, console: Console, end: float | None) -> None:
+    while end is None or monotonic() < end:
+        _gather(watching, monotonic() + PERIOD if end is None else min(end, monotonic() + PERIOD))
+        text = plain(picture.look(present(visit), monotonic()))
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def _gather(watching: Watching, until: float) -> None:
+    while (left := until - monotonic()) > 0.0:
+        watching.take(left)
