@@ -15,7 +15,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
+import msgspec
+
+from agents.config import AgentConfig
+from plant.config import PlantConfig
 from plant.equipment import Feeder
+from plant.pacing import sentence
 from scenarios import claims, metrics
 from scenarios.folder import set_status, shown, write_whole
 from scenarios.history import History, Plates
@@ -26,10 +31,13 @@ from scenarios.report import Report, plain
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.writing import to_toml
-from wire.messages import Telemetry
+from wire.messages import Pacing, Telemetry
 
 Driver = Literal["processes", "inprocess"]
 """How a case is run: as one process per agent over Zenoh, or all in this process."""
+
+Clock = Literal["simulated", "wall"]
+"""Lock-step of plant and agents, or real time."""
 
 Progress = Callable[[str, float, float], None]
 """Told the case, the time it has reached (s) and its end (s)."""
@@ -56,6 +64,12 @@ class Request:
     driver: Driver
     folder: Path
     """An empty folder."""
+    clock: Clock = "simulated"
+    """Wall-clock time needs the driver "processes"."""
+    speed: float = 1.0
+    """Wall-clock: run time per wall time (s/s)."""
+    strict: bool = False
+    """Wall-clock: whether the run breaks when the plant cannot keep pace."""
 
 
 def run(request: Request, progress: Progress) -> Report:
@@ -89,9 +103,14 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     scenario, folder = request.scenario, request.folder
     write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
     recorded, notes = {}, []
+    pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = _run_case(request, case, progress)
         notes += [f"case {case}: {note}" for note in outcome.notes]
+        if outcome.pacing is not None:
+            pacing[case] = outcome.pacing
+            pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
+            notes.append(f"case {case}, wall-clock time at speed {request.speed:g}: {pace}")
         print(
             f"case {case}: start {outcome.start_s:.2f} s, run {outcome.run_s:.2f} s, {outcome.ticks} ticks",
             *outcome.notes,
@@ -110,7 +129,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         for case, history in histories.items()
     }
     sha256 = {case: record.sha256 for case, record in recorded.items()}
-    write_whole(folder / "metrics.json", metrics_json(request, results, sha256))
+    write_whole(folder / "metrics.json", metrics_json(request, results, sha256, pacing))
     titles = {case: rule.title for case, rule in scenario.cases.items()}
     _draw(histories, titles, plates, events, folder / "plots")
     report = Report(
@@ -118,7 +137,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         titles=titles,
         results=results,
         verdicts=_judge(request, plates, results),
-        notes=[*notes, *_notes(recorded)],
+        notes=[*notes, *_notes(recorded, request.clock)],
         folder=shown(folder) + "/",
     )
     write_whole(folder / "report.txt", plain(report))
@@ -126,14 +145,19 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     return report
 
 
-def metrics_json(request: Request, results: claims.Results, sha256: Mapping[str, str]) -> str:
-    """Text of metrics.json; what is not a number (nothing to share) is null."""
+def metrics_json(
+    request: Request, results: claims.Results, sha256: Mapping[str, str], pacing: Mapping[str, Pacing]
+) -> str:
+    """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time."""
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
         cases[case]["history_sha256"] = sha256[case]
+        if case in pacing:
+            cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
     scenario = request.scenario
-    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": request.driver, "cases": cases}
+    clock = {"clock": request.clock, "speed": request.speed} if request.clock == "wall" else {}
+    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": request.driver, **clock, "cases": cases}
     return json.dumps(whole, indent=2, allow_nan=False) + "\n"
 
 
@@ -146,7 +170,7 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
     """Run one case by the driver asked for, and record it."""
     time = request.scenario.time
     listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
-    plant, agents = configs(request.scenario, request.feeder, case, listen)
+    plant, agents = _timed(request, *configs(request.scenario, request.feeder, case, listen))
     with Recorder(request.folder / case) as recorder:
 
         def note(telemetry: Telemetry) -> None:
@@ -170,6 +194,19 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             raise BrokenRunError(f"case {case}: {error}") from error
 
 
+def _timed(
+    request: Request, plant: PlantConfig, agents: tuple[AgentConfig, ...]
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Give the configurations the kind of time asked for."""
+    if request.clock == "simulated":
+        return plant, agents
+    if request.driver != "processes":
+        raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
+    replace, clock, speed = msgspec.structs.replace, request.clock, request.speed
+    plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
+    return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)
+
+
 def _draw(
     histories: Mapping[str, History],
     titles: Mapping[str, str],
@@ -190,8 +227,10 @@ def _judge(request: Request, plates: Plates, results: claims.Results) -> tuple[c
     return claims.judge(results, claims.Start(P_set0=request.scenario.plant.P_set0_pu, GFL=GFL))
 
 
-def _notes(recorded: Mapping[str, Recorded]) -> list[str]:
+def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
     """What makes a case differ from what its scenario says."""
+    if clock == "wall":
+        return ["in wall-clock time no two runs are the same: each has its own delays"]
     notes = []
     for case, record in recorded.items():
         if not record.reproducible:
