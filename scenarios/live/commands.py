@@ -110,10 +110,11 @@ def agent(
     require({"zenoh": "an agent"})
     with _told():
         from scenarios.live.hand import agent_here
-        from scenarios.live.place import check_inverter, claim, place, return_path
+        from scenarios.live.place import check_inverter, check_wait, claim, place, return_path
 
         where = place(run, connect)
         check_inverter(inverter)
+        check_wait(wait)
         listening = tuple(claim("--listen", text) for text in listen) if listen else return_path(where.connect)
         _finish(agent_here(where, inverter, listening, wait))
 
@@ -138,7 +139,7 @@ def watch(
         float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
     ] = None,
 ) -> None:
-    """Watch a run as a live table; q quits. Where the output is no terminal, a text every 2 s.
+    """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
 
     Example:  gridpeers watch --connect tcp/192.168.1.10:7447
     """
@@ -258,9 +259,10 @@ def _visit(run: str, connect: list[str] | None, wait: float, *, meet_agents: boo
     """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
     require({"zenoh": "the connection to a run"})
     with _told():
-        from scenarios.live.place import place
+        from scenarios.live.place import check_wait, place
         from scenarios.live.visit import Visit
 
+        check_wait(wait)
         with Visit(place(run, connect), meet_agents=meet_agents) as visit:
             visit.find_plant(wait)
             yield visit

@@ -78,6 +78,19 @@ def check_run(run: str) -> str:
     return run
 
 
+def check_wait(wait: float) -> float:
+    """Return a longest wait (s), if it is one; infinity waits for ever.
+
+    Examples
+    --------
+    >>> check_wait(2.5)
+    2.5
+    """
+    if not wait >= 0.0:
+        raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
+    return wait
+
+
 def check_inverter(name: str) -> None:
     """Raise UsageError if a name cannot be that of an inverter."""
     try:

@@ -10,7 +10,7 @@ import msgspec
 from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.equipment import Feeder
-from scenarios.live.place import UsageError
+from scenarios.live.place import UsageError, check_wait
 from scenarios.spec import Scenario, suggestion
 from scenarios.spec.configs import configs
 
@@ -114,7 +114,6 @@ def _check(wishes: Wishes) -> None:
     least, greatest = SPEEDS
     if not least <= wishes.speed <= greatest:
         raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {wishes.speed:g}")
-    if not (math.isfinite(wishes.wait) and wishes.wait >= 0.0):
-        raise UsageError(f"--wait: must be a time of at least 0 s, got {wishes.wait:g} s")
+    check_wait(wishes.wait)
     if wishes.duration is not None and not (math.isfinite(wishes.duration) and wishes.duration > 0.0):
         raise UsageError(f"--for: must be a time of more than 0 s, got {wishes.duration:g} s")

@@ -12,7 +12,7 @@ from wire.session import Session
 
 VISITOR = "visitor"
 
-REMINDER = 5.0
+REMINDER = 2.0
 """A wait is said again after so long (s)."""
 
 

@@ -16,7 +16,7 @@ from scenarios.live.visit import Visit
 REFRESH = 0.25
 """Time (s) between two pictures on a terminal: the plant tells five times a second."""
 
-PERIOD = 2.0
+PERIOD = 1.0
 """Time (s) between two texts where the output is no terminal."""
 
 QUIT = ("q", "Q", "\x1b")

@@ -135,7 +135,7 @@ class Desk:
     """
 
     def __init__(self, folder: Path, *options: str) -> None:
-        self._folder, self._options = folder, options
+        self.folder, self.options = folder, options
         self._terminals: list[Terminal] = []
 
     def __enter__(self) -> Desk:
@@ -149,11 +149,11 @@ class Desk:
 
     def open(self, *words: str, prefix: Sequence[str] = ()) -> Terminal:
         """Start a command in a new terminal, with the options of the desk."""
-        return self.open_bare(*words, *self._options, prefix=prefix)
+        return self.open_bare(*words, *self.options, prefix=prefix)
 
     def open_bare(self, *words: str, prefix: Sequence[str] = ()) -> Terminal:
         """Start a command without the options of the desk."""
-        terminal = Terminal(words, self._folder, prefix)
+        terminal = Terminal(words, self.folder, prefix)
         self._terminals.append(terminal)
         return terminal
 

@@ -1,0 +1,135 @@
+"""The commands for runs by hand: help, options, and one clear line with exit code 2 for what cannot be."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import msgspec
+import pytest
+from typer.testing import CliRunner
+
+from agents.config import AgentConfig
+from scenarios import cli
+from scenarios.live import commands, place
+from scenarios.live.setup import Wishes, set_up
+from scenarios.spec import load_scenario
+
+COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "stop", "event")
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def invoke(*words: str) -> tuple[int, str]:
+    """Exit code of a command, and all that it printed."""
+    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    """--help tells what a command does, shows one, and takes --run."""
+    code, text = invoke(command, "--help")
+
+    assert code == 0
+    assert f"Example:  gridpeers {command}" in text
+    assert "--run NAME" in text
+
+
+def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
+    """The help must not import what the place needs, so it has its own copy."""
+    assert (commands.RUN, commands.ENDPOINT) == (place.RUN, place.ENDPOINT)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["plant"], "Missing argument 'SCENARIO'"),
+        (["plant", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
+        (["plant", "islanding", "--run", "a/b"], '--run: "a/b" cannot be part of a Zenoh key'),
+        (["plant", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
+        (["plant", "islanding", "--listen", "7447"], '--listen: "7447" is no endpoint; write PROTOCOL/HOST:PORT'),
+        (["plant", "islanding", "--listen", "tcp/192.0.2.1:1"], "--listen: tcp/192.0.2.1:1 cannot be listened on"),
+        (["plant", "islanding", "--speed", "0"], "--speed: must be from 0.1 to 50 (1 is real time), got 0"),
+        (["plant", "islanding", "--wait", "-1"], "--wait: must be a time of at least 0 s, got -1 s"),
+        (["plant", "islanding", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
+        (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s, got 0 s"),
+        (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
+        (["agent"], "Missing argument 'INVERTER'"),
+        (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
+        (["agent", "inv2", "--run", "*"], '--run: "*" cannot be part of a Zenoh key'),
+        (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),
+        (["agent", "inv2", "--wait", "-3"], "--wait: must be a time of at least 0 s, got -3 s"),
+        (["down", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
+        (["status", "--run", "$x"], '--run: "$x" cannot be part of a Zenoh key'),
+        (["event", "toggle", "sw1_2"], '"toggle" cannot be done to a switch; write open or close'),
+        (["event", "open"], "Missing argument 'SWITCH'"),
+        (["stop"], "Missing argument 'INVERTER'"),
+    ],
+)
+def test_what_cannot_be_used_is_told_before_anything_starts(elsewhere: Path, words: list[str], said: str) -> None:
+    """Exit code 2, where, what, and what would be right; no traceback, nothing written."""
+    (elsewhere / "full").mkdir()
+    (elsewhere / "full" / "mine.txt").write_text("mine")
+
+    code, text = invoke(*words, *(["--listen", "tcp/127.0.0.1:0"] if words[0] == "up" else []))
+
+    assert code == 2
+    assert said in text
+    assert "Traceback" not in text
+    assert [path.name for path in elsewhere.iterdir()] == ["full"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["agent", "inv2"], ["status"], ["watch"], ["stop", "inv2"], ["event", "open", "sw1_2"], ["down"]],
+    ids=lambda words: words[0],
+)
+def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
+    """The endpoint, how long it was tried, and what to do."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))  # nobody listens, and nobody else gets the port meanwhile
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+        code, text = invoke(*words, "--connect", endpoint, "--wait", "0.2")
+
+    line = [line for line in text.splitlines() if line.startswith("gridpeers: ")]
+    assert code == 2
+    assert line == [
+        f"gridpeers: nothing answers at {endpoint} within 0.2 s; start a plant there (gridpeers plant SCENARIO), "
+        "or say by --connect where it is"
+    ]
+
+
+def test_a_port_in_use_is_told(elsewhere: Path) -> None:
+    """The plant is not built for nothing."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+
+        code, text = invoke("plant", "islanding", "--listen", endpoint)
+
+    assert code == 2
+    assert f"--listen: {endpoint} cannot be listened on: address already in use; end what uses it" in text
+
+
+def test_the_plant_hands_every_agent_what_it_needs() -> None:
+    """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
+    wishes = Wishes(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
+    plant, agents = set_up(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
+    handed = {name: msgspec.json.decode(text, type=AgentConfig) for name, text in plant.handout.items()}
+
+    assert plant.agents == tuple(f"inv{i}" for i in range(1, 10))
+    assert plant.settings.spares == ("inv10",)
+    assert (plant.clock, plant.speed, plant.wait_for_agents, plant.end) == ("wall", 2.0, 5.0, 1.0)
+    assert tuple(handed.values()) == agents
+    assert {agent.run for agent in agents} == {"lab"}
+    assert {agent.control.graph for agent in agents} == {"GFM-only"}
+    assert (handed["inv10"].microgrid, handed["inv10"].P_rated) == ("MG3", 350e3)
+    assert handed["inv10"].name == "inv10"
