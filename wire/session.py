@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from wire.foreign import keep_thread_state
 from wire.inbox import Inbox, Kind
 from wire.keys import LATEST_ONLY
 
@@ -178,8 +179,9 @@ class Session:
             )
 
     def peers(self) -> int:
-        """Number of peers connected now."""
-        return len(self._session.info.peers_zid())
+        """Number of peers and routers connected now."""
+        info = self._session.info
+        return len(info.peers_zid()) + len(info.routers_zid())
 
     def close(self) -> None:
         """Take back the tokens and leave."""
@@ -189,7 +191,12 @@ class Session:
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
         """Have a callback run in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
-        return self._zenoh.handlers.Callback(callback, indirect=False)
+
+        def from_zenoh(item: Any) -> None:
+            keep_thread_state()
+            callback(item)
+
+        return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
 
 
 def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, profile: _Profile) -> dict[str, Any]:
