@@ -32,6 +32,10 @@ _Listen = Annotated[
     str,
     typer.Option("--listen", metavar="ENDPOINT", help="Where the others connect; tcp/0.0.0.0:7447 for other hosts."),
 ]
+_Beyond = Annotated[
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help="What the plant connects to itself, e.g. a Zenoh router."),
+]
 _Speed = Annotated[float, typer.Option("--speed", metavar="X", help="Run time per wall time, 0.1 to 50; 1 is real.")]
 _WaitForAgents = Annotated[
     float, typer.Option("--wait", metavar="SECONDS", help="How long the plant waits for its agents before it starts.")
@@ -54,6 +58,7 @@ def plant(
     case: _Case = "",
     run: _Run = RUN,
     listen: _Listen = ENDPOINT,
+    connect: _Beyond = None,
     speed: _Speed = 1.0,
     wait: _WaitForAgents = 30.0,
     duration: _For = None,
@@ -66,7 +71,7 @@ def plant(
 
     Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
     """
-    _start(scenario, case, run, listen, speed, wait, duration, strict, out, agents=False)
+    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, agents=False)
 
 
 def up(
@@ -74,6 +79,7 @@ def up(
     case: _Case = "",
     run: _Run = RUN,
     listen: _Listen = ENDPOINT,
+    connect: _Beyond = None,
     speed: _Speed = 1.0,
     wait: _WaitForAgents = 30.0,
     duration: _For = None,
@@ -86,7 +92,7 @@ def up(
 
     Example:  gridpeers up islanding --speed 0.5
     """
-    _start(scenario, case, run, listen, speed, wait, duration, strict, out, agents=True)
+    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, agents=True)
 
 
 def agent(
@@ -212,6 +218,7 @@ def _start(
     case: str,
     run: str,
     listen: str,
+    connect: list[str] | None,
     speed: float,
     wait: float,
     duration: float | None,
@@ -225,14 +232,15 @@ def _start(
     with _told():
         from scenarios.live.folders import folders
         from scenarios.live.hand import all_here, plant_here, say
-        from scenarios.live.place import check_run, claim
+        from scenarios.live.place import check_endpoint, check_run, claim
         from scenarios.live.setup import Wishes, chosen_case, set_up
 
         check_run(run)
+        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         spec = chosen(spec, chosen_case(spec, case), None)
         wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
         endpoint = claim("--listen", listen)
-        config, everyone = set_up(spec, feeder, wishes, endpoint)
+        config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             if agents:

@@ -49,7 +49,7 @@ def chosen_case(scenario: Scenario, case: str) -> str:
 
 
 def set_up(
-    scenario: Scenario, feeder: Feeder, wishes: Wishes, listen: str
+    scenario: Scenario, feeder: Feeder, wishes: Wishes, listen: str, beyond: tuple[str, ...] = ()
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Configurations of the plant and of all agents, spare ones last.
 
@@ -63,6 +63,8 @@ def set_up(
         Options of the command.
     listen : str
         Where the plant listens.
+    beyond : tuple[str, ...], optional
+        What the plant connects to itself, e.g. a Zenoh router.
 
     Raises
     ------
@@ -88,6 +90,7 @@ def set_up(
         **live,
         settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
         end=end,
+        connect=beyond,
         wait_for_agents=wishes.wait,
         strict=wishes.strict,
         handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},

@@ -34,7 +34,7 @@ class Visit:
     def __init__(self, where: Place, *, meet_agents: bool = False) -> None:
         self.where, self.keys = where, Keys(where.run)
         listen = return_path(where.connect) if meet_agents else ()
-        self._session = Session(VISITOR, listen=listen, connect=where.connect, gossip=meet_agents, clock="wall")
+        self._session = Session(VISITOR, listen=listen, connect=where.connect, clock="wall")
         self.plant = False
         """Whether the plant's token is there."""
         self.agents: dict[str, set[str]] = {}
