@@ -35,7 +35,7 @@ from wire.timer import Timer
 Phase = Literal["seeking", "waiting", "running"]
 
 STATUS_PERIOD = 0.5
-"""Time (s, wall) between two `AgentStatus`."""
+"""Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
 
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
@@ -91,6 +91,8 @@ class FreeAgent:
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
         self._lateness = 0.0
+        self._in_sums: tuple[str, ...] = ()
+        """Neighbours in the sums of the last tick."""
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -165,9 +167,12 @@ class FreeAgent:
             self._lateness = max(self._lateness, late)
             if late * self._config.speed > self._config.max_age:
                 self._hold(f"woken {late:.2f} s late; waits for news")
+        before = self.phase, self._in_sums
         self._tick(now)
-        if now >= self._status.due:
+        due = now >= self._status.due
+        if due:
             self._status.take(now)
+        if due or (self.phase, self._in_sums) != before:
             self._publish_status(now)
 
     def leave(self, reason: str) -> None:
@@ -235,7 +240,7 @@ class FreeAgent:
         if self.phase == "running":
             self.phase = "waiting"
             self._say(why)
-        self._measurement = None
+        self._measurement, self._in_sums = None, ()
         self._heard.clear()
         self._agent.let_go()
 
@@ -322,7 +327,7 @@ class FreeAgent:
         state, at = self._heard[name]
         return max((now - at) * self._config.speed, self._t - state.t)
 
-    def _used(self, now: float) -> tuple[str, ...]:
+    def _young(self, now: float) -> tuple[str, ...]:
         limit = self._config.max_age
         return tuple(name for name in self._neighbours if self._age(name, now) <= limit)
 
@@ -336,7 +341,9 @@ class FreeAgent:
         if self.phase != "running":
             self.phase = "running"
             self._say(f"joins at t = {measurement.t:g} s, from {measurement.P_set:.0f} W and {measurement.V_set:.1f} V")
-        state = replace(self._agent.tick(measurement, self._used(now)), seq=self.sent)
+        young = self._young(now)
+        state = replace(self._agent.tick(measurement, young), seq=self.sent)
+        self._in_sums = tuple(name for name in young if self._agent.shares_island(name))
         self.ticks += 1
         self.sent += 1
         self._actions.append(Publish(self.keys.state(self._name), encode(state)))
@@ -358,7 +365,7 @@ class FreeAgent:
             island="" if self._measurement is None else self._measurement.island,
             neighbours=self._neighbours,
             ages=tuple(age if age < float("inf") else -1.0 for age in ages),
-            used=tuple(name for name in self._used(now) if self._agent.shares_island(name)),
+            used=self._in_sums,
             received=self.used,
             sent=self.sent,
             rejected=sum(self.rejects.counts.values()),

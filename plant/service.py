@@ -45,7 +45,7 @@ class Service:
         if verb == "stop":
             instance = side.instances.get(argument)
             if instance is None:
-                running = ", ".join(side.instances) or "none"
+                running = ", ".join(name for name in side.plant.inverters if name in side.instances) or "none"
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
             side.stop(side.keys.dismissal(argument, instance), f"{argument} was stopped by command")
             return f"{argument} was asked to leave at t = {side.t:g} s"

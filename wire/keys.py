@@ -199,7 +199,7 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(
             keys.status(agent), "publication", "AgentStatus", "agent", "watchers",
-            "wall-clock: every 0.5 s of wall time",
+            "wall-clock: every 0.5 s of wall time, and when its phase or its neighbours in use change",
         ),
         row(
             keys.config(agent), "queryable", "-", "plant", "an agent started by hand",

@@ -218,8 +218,8 @@ def test_who_dies_stays_on_primary_droop() -> None:
     lab.token("inv2", gone=True)
     lab.step()
 
-    droop = lab.toy.measure()["inv2"]
-    assert droop.P == pytest.approx(60e3)
+    held = lab.toy.measure()["inv2"].P
+    assert held == pytest.approx(60e3)
     assert lab.side.phase == "running"
     assert "inv2 died; its inverter stays on primary droop" in lab.events("roster")[-1].text
 
@@ -232,8 +232,8 @@ def test_a_spare_inverter_comes_on_line_with_its_agent() -> None:
     lab.join("inv4")
     lab.step()
 
-    spare = lab.toy.measure()["inv4"]
-    assert spare.P == pytest.approx(50e3)
+    on_line = lab.toy.measure()["inv4"].P
+    assert on_line == pytest.approx(50e3)
     assert [event.text for event in lab.events("inverter")] == ["inv4 connected"]
 
 

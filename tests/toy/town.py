@@ -1,0 +1,197 @@
+"""A wall-clock run of real processes around the toy plant, and an observer who only waits for messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any
+
+from msgspec.structs import replace
+
+from scenarios.children import Child, Children
+from scenarios.fleet import _endpoint
+from tests.toy.runs import TOY, exists
+from tests.toy.toy_configs import toy_configs
+from wire.codec import decode, encode
+from wire.keys import Keys
+from wire.messages import AgentStatus, Answer, Command, PlantEvent, State, Telemetry
+from wire.session import Session
+
+PATIENCE = 20.0
+"""Longest wait (s) for anything; a busy machine is slow, and nothing here should take a tenth of it."""
+
+
+class Town:
+    """A plant, its agents and an observer. Nothing is started until it is asked for.
+
+    Parameters
+    ----------
+    n : int
+        Inverters.
+    folder : Path
+        For the logs.
+    run : str, optional
+        Name of the run.
+    spares : tuple[str, ...], optional
+        Inverters that are off at the start.
+    also : tuple[str, ...], optional
+        Endpoints that agents connect to beside the plant's.
+    changes : Any
+        Fields of the plant's configuration.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        folder: Path,
+        *,
+        run: str = "toy",
+        spares: tuple[str, ...] = (),
+        also: tuple[str, ...] = (),
+        **changes: Any,
+    ) -> None:
+        plant, agents = toy_configs(n, run=run)
+        self.endpoint = _endpoint(())
+        self.plant_config = replace(
+            plant,
+            clock="wall",
+            end=None,
+            listen=(self.endpoint,),
+            settings=replace(plant.settings, spares=spares),
+            agents=tuple(name for name in plant.agents if name not in spares),
+        )
+        self.plant_config = replace(self.plant_config, **changes)
+        connect = (self.endpoint, *also)
+        self.agent_configs = {
+            config.name: replace(config, clock="wall", connect=connect, deadline=PATIENCE) for config in agents
+        }
+        self.keys = Keys(run)
+        self.folder = folder
+        self.children = Children()
+        self.pids: list[int] = []
+        self.status: dict[str, AgentStatus] = {}
+        self.states: dict[str, State] = {}
+        self.events: list[PlantEvent] = []
+        self.rows: list[tuple[float, ...]] = []
+        self.telemetry: Telemetry | None = None
+        self.answers: list[Answer] = []
+        self.tokens: set[str] = set()
+        self.session = Session("observer", listen=("tcp/127.0.0.1:0",), connect=connect, clock="wall")
+        for name in self.agent_configs:
+            self.session.subscribe(self.keys.status(name))
+            self.session.subscribe(self.keys.state(name))
+        self.session.subscribe(self.keys.telemetry)
+        self.session.subscribe(self.keys.answer("observer"))
+        self.session.watch(self.keys.any_alive)
+
+    def __enter__(self) -> Town:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.session.close()
+        self.children.end()
+        assert [pid for pid in self.pids if exists(pid)] == []
+
+    def start(self, *names: str) -> Town:
+        """Start the plant ("plant") or agents; a name that has run before is started anew."""
+        for name in names:
+            is_plant = name == "plant"
+            config = self.plant_config if is_plant else self.agent_configs[name]
+            command = list(TOY) if is_plant else ["-m", "agents"]
+            self.add(name, command, config)
+        return self
+
+    def add(self, name: str, command: list[str], config: Any) -> Child:
+        """Start one process, whose log is named after it and its turn."""
+        for former in self.children:
+            if former.name == name:
+                former.release()
+        log = self.folder / f"{name}-{len(self.pids)}.log"
+        child = Child(name, command, config, log, self._ended)
+        self.children.add(child)
+        self.pids.append(child.pid)
+        return child
+
+    def all(self) -> Town:
+        """Start everything and wait until every agent ticks with all others in its sums."""
+        self.start("plant", *self.plant_config.agents)
+        return self.together(self.plant_config.agents)
+
+    def together(self, names: tuple[str, ...]) -> Town:
+        """Wait until these agents use each other's values."""
+        return self.until(
+            lambda: all(name in self.status and set(self.status[name].used) == {*names} - {name} for name in names),
+            f"{', '.join(names)} use each other",
+        )
+
+    def signal(self, name: str, number: int) -> None:
+        """Send a signal to the process of a name."""
+        self.children[name].signal(number)
+
+    def command(self, verb: Any, argument: str = "") -> Answer:
+        """Send the plant a command, and wait for its answer."""
+        count = len(self.answers)
+        command = Command(
+            sender="observer", incarnation=1, seq=count, t=0.0, verb=verb, argument=argument, reply_to="observer"
+        )
+        self.session.publish(self.keys.command, encode(command))
+        self.until(lambda: len(self.answers) > count, f"answer to {verb}")
+        return self.answers[-1]
+
+    def until(self, condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> Town:
+        """Take in messages until a condition holds."""
+        end = monotonic() + patience
+        while not condition():
+            left = end - monotonic()
+            assert left > 0.0, f"not within {patience:g} s: {what}; {self}"
+            for kind, key, payload in self.session.inbox.take(1, left):
+                self._take(kind, key, payload)
+        return self
+
+    def until_event(self, subject: str, text: str, after: int = 0) -> Town:
+        """Wait for a plant's event on a subject with a text in it."""
+        return self.until(
+            lambda: any(event.subject == subject and text in event.text for event in self.events[after:]),
+            f"event {subject}: {text}",
+        )
+
+    def until_ended(self, name: str) -> int:
+        """Wait for the end of a process; its exit status."""
+        child = self.children[name]
+        self.until(lambda: child.status is not None, f"{name} ends")
+        assert child.status is not None
+        return child.status
+
+    @property
+    def t(self) -> float:
+        """Run time of the last telemetry (s)."""
+        return -1.0 if self.telemetry is None else self.telemetry.t
+
+    def __str__(self) -> str:
+        used = {name: (status.phase, status.used) for name, status in self.status.items()}
+        return f"t = {self.t:g} s; {used}; events {[event.text for event in self.events]}; logs in {self.folder}"
+
+    def _ended(self, child: Child) -> None:
+        self.session.inbox.put(("word", child.name, b""))
+
+    def _take(self, kind: str, key: str, payload: bytes) -> None:
+        if kind == "appeared":
+            self.tokens.add(key)
+        elif kind == "vanished":
+            self.tokens.discard(key)
+        elif kind == "message":
+            message = decode(payload)
+            if isinstance(message, AgentStatus):
+                self.status[message.sender] = message
+            elif isinstance(message, State):
+                self.states[message.sender] = message
+            elif isinstance(message, Answer):
+                self.answers.append(message)
+            elif isinstance(message, Telemetry):
+                self.telemetry = message
+                self.rows += message.rows
+                self.events += message.events
