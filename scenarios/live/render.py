@@ -104,13 +104,13 @@ def table(look: Look, keys: str = "q: quit") -> Group:
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
     for line in look.lines:
         grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in _COLUMNS))
-    events = [Text(line, style="dim") for line in look.events[-EVENTS:]]
+    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in look.events[-EVENTS:]]
     return Group(Text(head(look), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
 
 
 def _style(column: _Column, line: Line) -> str:
-    if line.note and column.head in ("agent", ""):
-        return "yellow"
+    if line.note and not line.note.startswith("apart") and column.head in ("agent", ""):
+        return "yellow"  # to be in another island is no fault
     if column.head == "age" and max(line.ages.values(), default=0.0) >= OLD:
         return "yellow"
     if column.head == "lost" and line.lost:
