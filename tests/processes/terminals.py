@@ -157,7 +157,7 @@ class Desk:
         self._terminals.append(terminal)
         return terminal
 
-    def type(self, *words: str) -> tuple[int, str]:
+    def type(self, *words: str, prefix: Sequence[str] = ()) -> tuple[int, str]:
         """Run a command to its end; its exit status and what it printed."""
-        terminal = self.open(*words)
+        terminal = self.open(*words, prefix=prefix)
         return terminal.end(), terminal.text
