@@ -1,0 +1,113 @@
+"""The paper's feeder in wall-clock time, it islands; one inverter leaves and returns, one is new.
+
+What is asked of the numbers holds on a machine that keeps pace; one that is too busy for that skips, and says so.
+"""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from scenarios.children import Child
+from scenarios.fleet import _endpoint
+from scenarios.live.setup import Wishes, set_up
+from scenarios.outcome import Outcome
+from scenarios.spec import load_scenario
+from tests.toy.runs import FleetRun
+
+REAL = ("-m", "plant")
+
+
+class Feeder:
+    """Case IV of the islanding experiment in wall-clock time, without its second event."""
+
+    def __init__(self, folder: Path, end: float) -> None:
+        scenario, feeder = load_scenario("islanding")
+        scenario = replace(scenario, events=scenario.events[:1])
+        self.endpoint = _endpoint(())
+        plant, agents = set_up(scenario, feeder, Wishes(run="feeder", case="IV", duration=end), self.endpoint)
+        self.agents = {agent.name: replace(agent, connect=(self.endpoint,)) for agent in agents}
+        self.rated = [agent.P_rated for agent in agents]
+        standing = [self.agents[name] for name in plant.agents]
+        self.folder = folder
+        self.run = FleetRun(plant, standing, folder)
+
+    def start(self, name: str) -> None:
+        """Start an agent of a name while the run goes on."""
+        assert self.run.children is not None
+        log = self.folder / f"{name}-again.log"
+        child = Child(name, ["-m", "agents"], self.agents[name], log, lambda child: None)
+        before = [child for child in self.run.children if child.name == name]
+        for former in before:
+            former.release()
+        self.run.children.add(child)
+        self.run.pids.append(child.pid)
+
+    def __call__(self) -> Outcome:
+        """Run; skip if the machine was too busy to keep pace."""
+        outcome = self.run(plant_command=REAL)
+        assert outcome.broke == ""
+        pacing = outcome.pacing
+        assert pacing is not None
+        if pacing.late > 0.01 * pacing.steps or pacing.slipped:
+            pytest.skip(f"this machine is too busy for wall-clock time: {msgspec.to_builtins(pacing)}")
+        return outcome
+
+    def worst(self, start: float, end: float, of: tuple[int, ...]) -> tuple[float, float]:
+        """Worst frequency error (Hz) and worst spread of P (pu) of these inverters between two times (s)."""
+        rows = [row for row in self.run.rows if start <= row[0] <= end]
+        assert rows
+        errors = [abs(row[1 + 6 * (i - 1)] - 60.0) for row in rows for i in of]
+        shares = [[row[2 + 6 * (i - 1)] / self.rated[i - 1] for i in of] for row in rows]
+        return max(errors), max(max(share) - min(share) for share in shares)
+
+
+NINE = tuple(range(1, 10))
+EIGHT = tuple(i for i in NINE if i != 2)
+
+
+def test_an_inverter_leaves_and_returns(tmp_path: Path) -> None:
+    """The paper's plug-n-play: 60 Hz within 0.01 Hz and equal sharing of those present within 1 s, both times."""
+    feeder = Feeder(tmp_path, end=6.0)
+    feeder.run.at(2.0, lambda: feeder.run.child("inv2").signal(signal.SIGTERM))
+    feeder.run.at(3.5, lambda: feeder.start("inv2"))
+    outcome = feeder()
+    times = {event.text.split(",")[0].split(";")[0]: event.t for event in outcome.events if event.subject == "inv2"}
+    left, back = times["inv2 disconnected"], times["inv2 connected"]
+
+    away, again = feeder.worst(left + 1.0, back - 0.01, EIGHT), feeder.worst(back + 1.0, 6.0, NINE)
+
+    assert 2.0 <= left < 2.6
+    assert max(away[0], again[0]) < 0.01
+    assert max(away[1], again[1]) < 0.02
+
+
+def test_a_tenth_inverter_nobody_has_heard_of_joins(tmp_path: Path) -> None:
+    """The spare one comes on line with its agent, and after 1 s shares with the nine that nobody has touched."""
+    feeder = Feeder(tmp_path, end=4.5)
+    feeder.run.at(2.0, lambda: feeder.start("inv10"))
+    outcome = feeder()
+    joined = next(event.t for event in outcome.events if event.text.startswith("inv10 connected"))
+    error, spread = feeder.worst(joined + 1.0, 4.5, (*NINE, 10))
+
+    assert error < 0.01
+    assert spread < 0.02
+    assert outcome.notes == ()
+
+
+def test_a_killed_agents_inverter_stays_on_droop_and_the_rest_hold_60_hz(tmp_path: Path) -> None:
+    """Kill -9 of a follower: its set-points stay, the others share among themselves and keep the frequency."""
+    feeder = Feeder(tmp_path, end=4.0)
+    feeder.run.at(2.0, lambda: feeder.run.child("inv2").signal(signal.SIGKILL))
+    outcome = feeder()
+    died = next(event.t for event in outcome.events if event.subject == "inv2" and "died" in event.text)
+    error, spread = feeder.worst(died + 1.0, 4.0, EIGHT)
+    held = {row[5 + 6] for row in feeder.run.rows if row[0] > died + 0.1}
+
+    assert error < 0.01
+    assert spread < 0.02
+    assert len(held) == 1
