@@ -37,6 +37,13 @@ Phase = Literal["seeking", "waiting", "running"]
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
 
+ASTRAY = 3.5
+"""Time (s, wall) without a measurement, though the plant is there and has sent some before, after which the session is
+opened anew. Longer than Zenoh's lease, after which the plant has forgotten the old one.
+
+After a cut that heals just as the lease runs out, Zenoh can add the new link to the transport of which the other side
+has closed its end. The two then disagree on what the numbers of keys mean, and messages go astray for good."""
+
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
 
@@ -62,6 +69,8 @@ class FreeAgent:
         self.failed = ""
         """Why this agent could never take part; empty unless so."""
         self.phase: Phase = "seeking"
+        self.astray = False
+        """Whether it closes only to begin again with a new session."""
         self.plant_seen = False
         """Whether the plant's token was ever there."""
         self.missed = 0
@@ -76,6 +85,8 @@ class FreeAgent:
             self.keys.measurement(config.name): (PLANT, self._on_measurement),
         }
         self._plant_there = False
+        self._ran = False
+        self._waiting_since: float | None = None
         self._plant_incarnation = 0
         self._measurement: Measurement | None = None
         self._measured_at = 0.0
@@ -124,7 +135,7 @@ class FreeAgent:
     @property
     def over(self) -> bool:
         """Whether the driver should close."""
-        return bool(self.stopped or self.failed)
+        return bool(self.stopped or self.failed or self.astray)
 
     @property
     def wanted(self) -> int:
@@ -169,11 +180,23 @@ class FreeAgent:
                 self._hold(f"woken {late:.2f} s late; waits for news")
         before = self.phase, self._in_sums
         self._tick(now)
+        self._note_astray(now)
         due = now >= self._status.due
         if due:
             self._status.take(now)
         if due or (self.phase, self._in_sums) != before:
             self._publish_status(now)
+
+    def _note_astray(self, now: float) -> None:
+        if self.phase == "running":
+            self._ran = True
+        if self.phase != "waiting" or not self._ran:
+            self._waiting_since = None
+        elif self._waiting_since is None:
+            self._waiting_since = now
+        elif now - self._waiting_since >= ASTRAY:
+            self.astray = True
+            self._say(f"the plant is there, but nothing has come for {ASTRAY:g} s; opens a new session")
 
     def leave(self, reason: str) -> None:
         """Leave properly: have the own inverter taken off the network, then close."""

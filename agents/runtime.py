@@ -42,6 +42,25 @@ def run_agent(config: AgentConfig) -> str:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
+    side = _take_part(config, log)
+    while isinstance(side, FreeAgent) and side.astray:
+        side = _take_part(config, log)
+    if side.rejects.counts:
+        log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
+    if not side.failed:
+        log.info("%s: %s", config.name, side.stopped)
+        return ""
+    failed = side.failed
+    if not side.plant_seen:
+        failed += f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
+    if wall:
+        raise ConfigurationError(failed)
+    return failed
+
+
+def _take_part(config: AgentConfig, log: logging.Logger) -> FreeAgent | AgentSide:
+    """Take part with one session; what decided, when it is over."""
+    wall = config.clock == "wall"
     if wall:  # an agent that is started again is told from its ghost by its later start
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
     session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
@@ -62,14 +81,4 @@ def run_agent(config: AgentConfig) -> str:
             raise
     finally:
         session.close()
-    if side.rejects.counts:
-        log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
-    if not side.failed:
-        log.info("%s: %s", config.name, side.stopped)
-        return ""
-    failed = side.failed
-    if not side.plant_seen:
-        failed += f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
-    if wall:
-        raise ConfigurationError(failed)
-    return failed
+    return side

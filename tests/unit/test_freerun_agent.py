@@ -320,3 +320,37 @@ def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
     lab.measure(3)
 
     assert lab.side.lost == 2 + 2
+
+
+def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:
+    """A link half renewed after a cut can mislead messages for good; before the first measurement one waits."""
+    lab = Lab()
+    lab.token("plant")
+    for _ in range(20):
+        lab.go(0.5)
+    assert not lab.side.over
+
+    lab.measure(1)
+    lab.go(T_C)
+    assert lab.side.phase == "running"
+    for _ in range(7):
+        lab.go(0.5)
+    assert not lab.side.over
+    lab.go(0.5)
+    assert lab.side.astray
+    assert lab.side.over
+    assert lab.side.failed == ""
+
+
+def test_an_agent_without_a_plant_keeps_its_session() -> None:
+    """What is not there cannot be found by another session either."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    for _ in range(20):
+        lab.go(0.5)
+
+    assert lab.side.phase == "seeking"
+    assert not lab.side.over

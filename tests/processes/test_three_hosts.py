@@ -1,0 +1,60 @@
+"""Three hosts, three agents on each, the plant on the first: network namespaces, skipped where they are not allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.processes.hosts import Hosts, NoHostsError
+from tests.processes.terminals import Desk
+
+CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'
+
+
+@pytest.fixture
+def hosts() -> Iterator[Hosts]:
+    """Three hosts on one switch."""
+    try:
+        with Hosts(3) as made:
+            yield made
+    except NoHostsError as error:
+        pytest.skip(f"network namespaces cannot be made here: {error}")
+
+
+def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Path) -> None:
+    """All nine share; without the third host six do, at 60 Hz; healed, nine again, without anybody's help."""
+    (tmp_path / "calm.toml").write_text(CALM)
+    endpoint = f"tcp/{hosts.address(1)}:7447"
+    with Desk(tmp_path, "--run", "sites", "--connect", endpoint) as desk:
+        agents = {
+            f"inv{number}": desk.open("agent", f"inv{number}", prefix=hosts.at(1 + (number - 1) // 3))
+            for number in range(1, 10)
+        }
+        plant = desk.open_bare(
+            *("plant", "calm.toml", "--run", "sites", "--listen", endpoint, "--wait", "20"), prefix=hosts.at(1)
+        )
+        for agent in agents.values():
+            agent.expect("joins at t = ")
+        watch = desk.open("watch", prefix=hosts.at(1))
+        watch.expect(r"inv1 .* inv2-9 ")
+        desk.open("event", "open", "13-152", prefix=hosts.at(2)).expect("open at t = ")
+        watch.expect(r"inv1 +inv1 +60\.0")
+
+        hosts.cut(3)
+        agents["inv7"].expect("inv7: no measurement of late; holds")
+        watch.expect(r"inv1 .* inv2-6 ")
+        plant.expect("inv[789] died; its inverter stays on primary droop")
+        watch.expect(r"inv1 +inv1 +(60\.00|59\.99)")
+
+        hosts.heal(3)
+        for name in ("inv7", "inv8", "inv9"):
+            agents[name].expect(f"{name}: joins at t = ")
+        watch.expect(r"inv1 .* inv2-9 ")
+        watch.expect(r"inv9 .* inv1-8 ")
+        code, text = desk.type("down", prefix=hosts.at(3))
+
+        assert code == 0, text
+        assert plant.end() == 0
+        assert [agent.end() for agent in agents.values()] == [0] * 9
