@@ -36,6 +36,9 @@ TELEMETRY = 0.2
 CLOSING = 2.0
 """Longest wait for the others to close (s)."""
 
+LEAD = 0.25
+"""Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
+
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
@@ -302,7 +305,7 @@ class FreePlant:
 
     def _begin(self, now: float) -> None:
         self.phase = "running"
-        self.pacer = Pacer(self.pacer.period, now)
+        self.pacer = Pacer(self.pacer.period, now + LEAD)
         absent = [name for name in self.config.agents if name not in self.plates]
         if absent:
             text = f"started without the agents of {', '.join(absent)}, which stay on primary droop until they come"

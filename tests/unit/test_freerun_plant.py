@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from plant.freerun import FreePlant
+from plant.freerun import LEAD, FreePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
@@ -114,8 +114,9 @@ def running(n: int = 3, **changes: Any) -> Lab:
 
 
 def test_it_begins_when_all_are_there() -> None:
-    """Step 0 is due at once then, and goes to every agent, without a roster."""
+    """Step 0 is due a moment later, and goes to every agent, without a roster."""
     lab = running()
+    assert lab.side.until == lab.now + LEAD
     lab.step()
     measurements: list[Measurement] = lab.take(Measurement)
 
@@ -166,7 +167,7 @@ def test_the_last_state_heard_is_held_from_the_next_step_on() -> None:
 def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
     """All rows are there; Stop goes to everybody; it is over once they have gone."""
     lab = running(speed=4.0)
-    began = lab.now
+    began = lab.now + LEAD
     lab.step(101)
     rows = [row for message in lab.take(Telemetry) for row in message.rows]
 
