@@ -143,7 +143,8 @@ class Plant:
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events: list[PlantEvent] = []
-        self._dead = self._dead_buses()
+        self._dead: list[str] = []
+        self._report_dead(0.0)
 
     # ---------------------------------------------------------------- what agents see and do
 
@@ -272,12 +273,18 @@ class Plant:
             if members:
                 text = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
                 self._events.append(PlantEvent(t=t, kind="island", subject=name, text=text))
+        self._report_dead(t)
+
+    def _report_dead(self, t: float) -> None:
+        """Tell of the buses that nothing feeds any more, and of the inverters and loads on them."""
         dead = self._dead_buses()
         new = [bus for bus in dead if bus not in set(self._dead)]
         if new:
             lost = sum(load.S[p].real for load in self.network.feeder.loads if load.bus in new for p in range(3)) / 1e3
             some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
+            idle = [unit.name for unit in self.network.inverters if unit.bus in new]
             text = f"dead: {len(new)} buses ({some}) without substation or GFM, {lost:.0f} kW of load not served"
+            text += f", {', '.join(idle)} idle" if idle else ""
             self._events.append(PlantEvent(t=t, kind="dead", subject=new[0], text=text))
         self._dead = dead
 

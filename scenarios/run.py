@@ -240,5 +240,13 @@ def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
 
 def _as_run(request: Request) -> dict[str, Any]:
     return {"driver": request.driver, "python": platform.python_version()} | {
-        name: metadata.version(name) for name in _VERSIONS
+        name: _version(name) for name in _VERSIONS
     }
+
+
+def _version(package: str) -> str:
+    """Version of an installed package; one process does not need all of them."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

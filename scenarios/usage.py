@@ -16,6 +16,9 @@ def load(name: str) -> tuple[Scenario, Feeder]:
     """Read and check a scenario and its feeder, or end with every mistake in them."""
     from scenarios.spec import ScenarioError, load_scenario
 
+    if not name:
+        fail(["no scenario was named; `gridpeers list` shows those of the catalogue"], BAD_INPUT)
+
     try:
         return load_scenario(name)
     except ScenarioError as error:
@@ -24,13 +27,13 @@ def load(name: str) -> tuple[Scenario, Feeder]:
         fail([*head, *error.mistakes], BAD_INPUT)
 
 
-def chosen(spec: Scenario, case: str, seed: int | None) -> Scenario:
+def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     """The scenario with the cases and the seed of the command line."""
     import msgspec
 
     from scenarios.spec import suggestion
 
-    if case:
+    if case is not None:
         names = list(dict.fromkeys(name.strip() for name in case.split(",") if name.strip()))
         unknown = [name for name in names if name not in spec.cases]
         if unknown or not names:
@@ -47,7 +50,7 @@ def require(modules: dict[str, str]) -> None:
     packages = {"zenoh": "eclipse-zenoh"}
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        lines = [f"{packages.get(name, name)} is not installed; {modules[name]} need(s) it" for name in missing]
+        lines = [f"{packages.get(name, name)} is not installed; {modules[name]} cannot do without" for name in missing]
         fail([*lines, "install gridpeers with its dependencies: pip install -e ."], BAD_INPUT)
 
 

@@ -28,10 +28,10 @@ _GRACE = 5.0
 LEASH = "--leash"
 """Option: end when standard input ends, that is, when the parent is gone."""
 
-_USAGE = """usage: python -m {module} [{leash}] < CONFIG.json
+_USAGE = """usage: python -m {module} [{leash} [NAME]] < CONFIG.json
 
 Runs {what}. The configuration is one JSON object on standard input; see {module}/config.py.
-With {leash} it must be on one line, and the process ends when standard input does.
+With {leash} it must be on one line, and the process ends when standard input does; NAME is only for `ps`.
 """
 
 C = TypeVar("C")
@@ -61,7 +61,7 @@ def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) 
         Exit status.
     """
     options = sys.argv[1:]
-    if options not in ([], [LEASH]):
+    if options[:1] not in ([], [LEASH]) or len(options) > 2:
         sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH))
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")

@@ -97,13 +97,14 @@ class BusTable:
 
 
 def report_unconnected(feeder: Feeder, buses: BusTable, mistakes: list[str]) -> None:
-    """Note every phase of a bus that no branch, switch, source or inverter touches: nothing could give it a voltage."""
+    """Note every phase of a bus that no branch, switch or source touches: an inverter there would feed nothing."""
     branches: list[Line | Switch | Regulator] = [*feeder.lines, *feeder.switches, *feeder.regulators]
     touched = {
         (end, phase) for branch in branches for end in (branch.from_bus, branch.to_bus) for phase in branch.phases
     }
     whole = [end for transformer in feeder.transformers for end in (transformer.from_bus, transformer.to_bus)]
-    whole += [inverter.bus for inverter in feeder.inverters]
+    if len(feeder.buses) == 1:  # what feeds the only bus is enough
+        whole += [inverter.bus for inverter in feeder.inverters]
     whole += [feeder.source.bus] if feeder.source else []
     touched |= {(bus, phase) for bus in whole for phase in PHASES}
     for bus in feeder.buses:

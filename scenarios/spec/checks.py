@@ -12,6 +12,9 @@ from scenarios.spec.model import Case, Scenario
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
 
+_RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
+"""What a run folder holds beside the folders of the cases."""
+
 
 def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
     """Every time of the scenario falls on the grid it belongs to."""
@@ -80,6 +83,8 @@ def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
 def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistakes) -> None:
     """Listed links join two known inverters, and are listed where the graph is "links"."""
     for name, case in scenario.cases.items():
+        if name in _RUN_FOLDER:
+            mistakes.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
         path = f"case.{name}.links"
         if mistakes.touch(path, f"case.{name}.graph"):
             continue
@@ -141,8 +146,11 @@ def _divides(path: str, step: float, of: str, value: float, mistakes: Mistakes) 
     ratio = value / step
     if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6:
         return
-    key, near = of.rpartition(".")[2], value / max(round(ratio), 1)
-    mistakes.add(path, f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:.6g}")
+    key = of.rpartition(".")[2]
+    # a step that can be written down in microseconds, for 0.02 / 7 cannot be typed
+    whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(value / n, 6) * n - value) < 1e-12]
+    near = value / min(whole, key=lambda n: abs(n - ratio), default=1)
+    mistakes.add(path, f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:g}")
 
 
 def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mistakes: Mistakes) -> None:

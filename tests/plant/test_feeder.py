@@ -251,3 +251,16 @@ def test_an_unknown_spare_is_refused_by_name() -> None:
     """A spare that the feeder does not have is named, with those there are."""
     with pytest.raises(ValueError, match=r'spare "inv11": no such spare inverter .* \[\x27inv10\x27\]'):
         Network(read_feeder("microgrid123", "main"), spares=["inv11"])
+
+
+def test_what_is_dead_from_the_start_is_said() -> None:
+    """An inverter cut off before the run begins is an event at t = 0, with its load, not a silent zero."""
+    feeder = read_feeder("microgrid123", "main")
+    cut = replace(feeder, lines=tuple(line for line in feeder.lines if "162" not in (line.from_bus, line.to_bus)))
+    lone = replace(cut, inverters=tuple(unit for unit in cut.inverters if unit.name != "inv1"))
+
+    (event,) = Plant(Network(lone), PlantSettings(), T_C, T_C).take_events()
+
+    assert (event.t, event.kind) == (0.0, "dead")
+    assert "1 buses (162)" in event.text
+    assert "inv3 idle" in event.text

@@ -38,7 +38,7 @@ def mistakes(folder: Path, text: str) -> tuple[str, ...]:
         (
             "h_s = 0.002",
             "h_s = 0.003",
-            r"time.h_s: 0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.00285714",
+            r"time.h_s: 0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025",
         ),
         ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
         ("record_s = 0.01", "record_s = 0.005", r"time.record_s: 0.005 s is not a multiple of h_s = 0.002 s"),
@@ -67,7 +67,8 @@ def mistakes(folder: Path, text: str) -> tuple[str, ...]:
         ('graph = "full"', 'graph = "full"\nlinks = [["inv1", "inv2"]]', r'the graph is "full"; write graph = "links"'),
         ('secondary = "all"', 'secondary = "GFMs"', r'case.IV.secondary: there is no "GFMs"; did you mean "GFM"\?'),
         ("[case.IV]", '[case."a/b"]', r'case.a/b: name "a/b" must be up to 31 letters'),
-        ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
+        ("[case.IV]", "[case.log]", r"case.log: a case's folder stands beside log, plots, .*; name it otherwise"),
+    ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
         ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
         ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
         ('paper = "islanding"', 'paper = "intermittency"', r'paper: there is no "intermittency"'),
