@@ -18,7 +18,9 @@ nameplates of the roster are known and all in-neighbours proven.
 
 **Ticking.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
 computes and sends State(k). A State(k) that overtakes the own Measurement(k) is kept back until tick k is done, so
-what is used never depends on who was faster. At its first tick an agent has no roster k-1 and listens to nobody.
+what is used never depends on who was faster. Whoever is no longer on roster k is left out at once, so that it does not
+matter whether its last state or its end is heard first. At its first tick an agent has no roster k-1 and listens to
+nobody.
 
 **No deadlock.** State(k) waits for Measurement(k) and States(k-1) only, Measurement(k) for States(k-1) only: every
 wait is for something earlier, so the earliest thing not yet sent always can be, if its sender lives. The token of a
@@ -203,7 +205,9 @@ class AgentSide:
     # ---------------------------------------------------------------- messages
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped."""
+        """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
+        if self.over:
+            return
         try:
             if key not in self._routes:
                 raise RejectedError("foreign", "nothing was asked for on this key")
@@ -236,7 +240,10 @@ class AgentSide:
     def _on_dismissal(self, message: AnyMessage, now: float) -> None:
         if not isinstance(message, Stop):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Stop")
-        self.failed = message.reason
+        if message.refused:
+            self.failed = message.reason
+        else:
+            self.stopped = message.reason
 
     def _on_prepare(self, message: Prepare, now: float) -> None:
         if len(message.instances) != len(message.roster):
@@ -343,9 +350,14 @@ class AgentSide:
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if all that it needs is here."""
         measurement, tick = self._measurement, self._tick
-        if measurement is None or tick is None or self._waiting:
+        if measurement is None or tick is None:
             return
-        state = self._agent.tick(measurement, self._neighbours)
+        for name in self._waiting.keys() - set(measurement.roster):
+            del self._waiting[name]
+        if self._waiting:
+            return
+        neighbours = tuple(name for name in self._neighbours if name in measurement.roster)
+        state = self._agent.tick(measurement, neighbours)
         self._actions.append(Publish(self.keys.state(self._name), encode(state)))
         self._patience.renew(now)
         self._tick, self._measurement = tick + 1, None

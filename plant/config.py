@@ -112,6 +112,16 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     action: Literal["open", "close"]
 
 
+class Move(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An agent that the scenario lets leave, its inverter with it, or join."""
+
+    t: float
+    """Time (s), a multiple of T_c."""
+    inverter: str
+    """Name, e.g. "inv2"."""
+    action: Literal["leave", "join"]
+
+
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything that decides the plant's numbers."""
 
@@ -141,6 +151,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     settings: PlantSettings
     agents: tuple[str, ...]
     """Agents the plant waits for before tick 0."""
+    moves: tuple[Move, ...] = ()
+    """Agents that leave and join on schedule; who joins need not be among `agents`."""
     T_c: float
     """Control period (s), a multiple of h."""
     end: float | None

@@ -45,6 +45,10 @@ class PlantLike(Protocol):
         """Take set-points (W, V)."""
         ...
 
+    def connect(self, name: str, on: bool) -> None:
+        """Put an inverter on the network or take it off; nothing happens if it is so already."""
+        ...
+
     def advance(self) -> None:
         """Go one control period on; RuntimeError if there is no solution."""
         ...
@@ -59,12 +63,8 @@ class PlantLike(Protocol):
 
 
 class LivePlant(PlantLike, Protocol):
-    """What wall-clock time needs of a plant on top: switches and inverters operated by hand."""
+    """What wall-clock time needs of a plant on top: switches operated by hand."""
 
     def switch(self, name: str, action: str) -> None:
         """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown."""
-        ...
-
-    def connect(self, name: str, on: bool) -> None:
-        """Put an inverter on the network or take it off; nothing happens if it is so already."""
         ...

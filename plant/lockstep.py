@@ -13,8 +13,12 @@ until `side.over`, the last actions included. `now` is the driver's clock (s) an
 **Phases.** *gathering*: until every agent of the configuration has a token and a nameplate, and every recorder a token.
 *preparing*: `Prepare` with the roster is out, until every agent on it is `Ready`. *ticking*: Measurement(k) is out,
 until the whole roster has sent State(k); then the set-points are held, the plant goes on to k+1, and so on. A change of
-the roster goes through *preparing* again, between two ticks. *closing*: `Stop` and the last telemetry are out, until
-all tokens are gone, as proof that everybody has heard it.
+the roster goes through *preparing* again, between two ticks. *joining*: the tick is held until those whom the scenario
+lets join have a token and a nameplate; telemetry has told, once, that they are awaited. *closing*: `Stop` and the last
+telemetry are out, until all tokens are gone, as proof that everybody has heard it.
+
+An agent that the scenario lets leave is told to stop, and its inverter goes off the network; one that joins finds its
+inverter on the network again, at no load. As the tick is held, it shows nowhere how long a process took to come up.
 
 An agent that dies is taken off the roster and the run goes on, marked not reproducible; one that dies before tick 0
 ends the run. Why there is no deadlock is written in `agents.lockstep`.
@@ -27,6 +31,7 @@ from typing import Literal
 from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.reporting import Reporter, measurement_of
+from plant.schedule import Schedule
 from wire.actions import Action, Fetch, Publish
 from wire.clock import ticks_until, time_of
 from wire.codec import RejectedError, Rejects, decode, encode
@@ -34,7 +39,7 @@ from wire.keys import Keys, check_name
 from wire.messages import PLANT, Nameplate, PlantEvent, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
 
-Phase = Literal["gathering", "preparing", "ticking", "closing", "over"]
+Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
 
 TELEMETRY_TICKS = 10
 """Telemetry is sent at tick 0 and then every so many ticks: enough for a progress bar, few enough to be cheap."""
@@ -75,6 +80,12 @@ class PlantSide:
         self._ticks = ticks_until(config.end, config.T_c)
         self._patience = Patience(PLANT, config.deadline)
         self._actions: list[Action] = []
+        self._schedule = Schedule(config, plant.inverters)
+        later = self._schedule.joiners.difference(config.agents)
+        self._everyone = (*config.agents, *(name for name in plant.inverters if name in later))
+        """All who may ever take part, in the order of the inverters."""
+        self._joining: tuple[str, ...] = ()
+        """Whom the tick is held for."""
         self._instances: dict[str, str] = {}
         """The one instance of each agent that takes part."""
         self._plates: dict[str, Nameplate] = {}
@@ -86,9 +97,9 @@ class PlantSide:
         self._roster_changed = False
         self._waiting: set[str] = set()
         self._states: dict[str, State] = {}
-        self._state_keys = {self.keys.state(name): name for name in config.agents}
-        self._ready_keys = {self.keys.ready(name): name for name in config.agents}
-        self._measurement_keys = {name: self.keys.measurement(name) for name in config.agents}
+        self._state_keys = {self.keys.state(name): name for name in self._everyone}
+        self._ready_keys = {self.keys.ready(name): name for name in self._everyone}
+        self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
         self._reporter = Reporter(config.incarnation, plant)
 
     # ---------------------------------------------------------------- what the driver needs
@@ -140,18 +151,23 @@ class PlantSide:
 
     def missing(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
-        agents = self._config.agents
+        agents = self._everyone
         match self.phase:
             case "gathering":
-                absent = [Awaited("token", name) for name in agents if name not in self._instances]
-                mute = [Awaited("nameplate", name) for name in self._instances if name not in self._plates]
                 recorders = [Awaited("token", name) for name in self._config.recorders if name not in self._recorders]
-                return (*absent, *mute, *recorders)
+                return (*self._absent(self._config.agents), *recorders)
+            case "joining":
+                return self._absent(self._joining)
             case "preparing":
                 return tuple(Awaited(f"Ready({self._roster_number})", name) for name in agents if name in self._waiting)
             case "ticking":
                 return tuple(Awaited(f"State({self.tick})", name) for name in agents if name in self._waiting)
         return ()
+
+    def _absent(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
+        absent = [Awaited("token", name) for name in names if name not in self._instances]
+        mute = [Awaited("nameplate", name) for name in names if name in self._instances and name not in self._plates]
+        return (*absent, *mute)
 
     def expire(self, now: float) -> None:
         """End the run if the deadline has passed."""
@@ -191,11 +207,13 @@ class PlantSide:
                     self._actions.append(Fetch(self.keys.nameplate(name, instance)))
 
     def _refusal(self, name: str, instance: str) -> str:
-        if name not in self._config.agents:
-            return f"{name}: the plant waits for no agent of this name, only for {', '.join(self._config.agents)}"
+        if name not in self._everyone:
+            return f"{name}: the plant waits for no agent of this name, only for {', '.join(self._everyone)}"
         if self._instances.get(name, instance) != instance:
             return f"{name}: another agent of this name takes part in the run already; give this one another name"
-        if self.phase != "gathering" and name not in self._instances:
+        if self.phase == "gathering" and name not in self._config.agents:
+            return f"{name}: the scenario lets it join later; start it when the plant awaits it"
+        if self.phase != "gathering" and name not in self._instances and name not in self._joining:
             return f"{name}: the run has begun, at t = {self._t:g} s; an agent can join only before its start"
         return ""
 
@@ -215,12 +233,19 @@ class PlantSide:
         self._plates.pop(name, None)
         if self.phase == "gathering" or (self.phase == "preparing" and self._roster_number == 0):
             self.abort(f"{name} died before the run began", now)
-        elif self.phase in ("preparing", "ticking"):
+        elif name in self._joining:
+            self.abort(f"{name} died at t = {self._t:g} s, before it had joined", now)
+        elif self.phase in ("preparing", "ticking", "joining"):
             self.reproducible = False
             self._roster_changed = True
             self._waiting.discard(name)
             text = f"{name} died at t = {self._t:g} s; its inverter stays on primary droop at its last set-points"
-            self._reporter.note(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
+            self._note(name, text)
+            if self.phase == "preparing":  # nobody can get ready to hear the dead
+                self._prepare(now)
+
+    def _note(self, name: str, text: str) -> None:
+        self._reporter.note(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
 
     # ---------------------------------------------------------------- messages
 
@@ -267,11 +292,18 @@ class PlantSide:
 
     def work(self, now: float) -> bool:
         """Go on if all that is awaited is here: a roster, or one tick of the plant. Whether anything was done."""
-        if self._waiting or self.phase not in ("preparing", "ticking"):
+        if self._waiting or self.phase not in ("preparing", "ticking", "joining"):
             return False
-        if self.phase == "ticking":
+        ticked = self.phase == "ticking"
+        if ticked:
             self._finish_tick(now)
-        if self.tick < self._ticks and not self.outcome:
+            if self.phase == "ticking":
+                self._move(now)
+        if self.phase == "joining":
+            if self.missing():
+                return ticked
+            self._admit(now)
+        if self.phase in ("preparing", "ticking"):
             if self._roster_changed:
                 self._prepare(now)
             else:
@@ -287,8 +319,46 @@ class PlantSide:
             self._patience.renew(now)
             assert set(self._roster) == set(config.agents)
 
+    def _move(self, now: float) -> None:
+        """Let leave who leaves at this tick, and begin to wait for who joins."""
+        leave, join = self._schedule.take(self.tick)
+        when = f"at t = {self._t:g} s, as the scenario says"
+        for name in leave:
+            self._note(name, f"{name} leaves {when}")
+            instance = self._instances.pop(name, "")
+            self._plates.pop(name, None)
+            if instance:
+                self._stop(self.keys.dismissal(name, instance), f"{name} leaves {when}")
+            self._connect(name, False, now)
+            self._roster_changed = True
+        join = tuple(name for name in join if name not in self._instances)
+        for name in join:
+            self._note(name, f"{name} joins {when}")
+        if join and not self.outcome:
+            self.phase, self._joining = "joining", join
+            self._patience.renew(now)
+            self._report(final=False, awaited=join)
+
+    def _admit(self, now: float) -> None:
+        """Go on with those who have joined: their inverters are on the network, at no load."""
+        self.phase, self._roster_changed = "ticking", True
+        for name in self._joining:
+            self._connect(name, True, now)
+        self._joining = ()
+
+    def _connect(self, name: str, on: bool, now: float) -> None:
+        if self.outcome:
+            return
+        try:
+            self._plant.connect(name, on)
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(f"plant at t = {self._t:g} s: {error}", now)
+        else:
+            self._reporter.collect()
+
     def _prepare(self, now: float) -> None:
-        self._roster = tuple(name for name in self._config.agents if name in self._instances)
+        self._roster = tuple(name for name in self._everyone if name in self._instances)
         self._roster_number += 1
         self._roster_changed = False
         self._waiting = set(self._roster)
@@ -342,10 +412,12 @@ class PlantSide:
     def _t(self) -> float:
         return time_of(self.tick, self._config.T_c)
 
-    def _report(self, *, final: bool) -> None:
-        """Send rows and events."""
-        outcome, reproducible = self.outcome, self.reproducible
-        for message in self._reporter.report(self._t, final=final, outcome=outcome, reproducible=reproducible):
+    def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
+        """Send rows and events, and who is to be started."""
+        messages = self._reporter.report(
+            self._t, final=final, outcome=self.outcome, reproducible=self.reproducible, awaited=awaited
+        )
+        for message in messages:
             self._actions.append(Publish(self.keys.telemetry, encode(message)))
 
     def _close(self, reason: str, now: float) -> None:

@@ -71,7 +71,14 @@ class Reporter:
         self.latest.append(event)
 
     def report(
-        self, t: float, *, final: bool, outcome: str, reproducible: bool, pacing: Pacing | None = None
+        self,
+        t: float,
+        *,
+        final: bool,
+        outcome: str,
+        reproducible: bool,
+        pacing: Pacing | None = None,
+        awaited: tuple[str, ...] = (),
     ) -> Iterator[Telemetry]:
         """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
         inverters = self._plant.inverters
@@ -93,6 +100,7 @@ class Reporter:
                 outcome=outcome,
                 reproducible=reproducible,
                 pacing=pacing,
+                awaited=() if rows else awaited,
             )
             self._seq += 1
             if not rows:

@@ -59,7 +59,7 @@ class Child:
         # -P: a folder named like one of our packages, where the user stands, must not be imported instead
         with log.open("wb") as stderr:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", *command, LEASH],
+                [sys.executable, "-P", *command, LEASH, name],  # the name is for people who look at ps
                 stdin=subprocess.PIPE,
                 stdout=stderr if on_word is None else subprocess.PIPE,
                 stderr=stderr,
@@ -123,7 +123,7 @@ class Children:
     """All children of a run; leaving the context ends every one of them."""
 
     def __init__(self) -> None:
-        self._children: dict[str, Child] = {}
+        self._children: list[Child] = []
 
     def __enter__(self) -> Children:
         """Nothing to do yet."""
@@ -136,18 +136,26 @@ class Children:
         self.end()
 
     def __getitem__(self, name: str) -> Child:
-        return self._children[name]
+        """Give the latest child of a name."""
+        for child in reversed(self._children):
+            if child.name == name:
+                return child
+        raise KeyError(name)
 
     def __iter__(self) -> Iterator[Child]:
-        return iter(self._children.values())
+        return iter(self._children)
+
+    def lives(self, name: str) -> tuple[Child, ...]:
+        """All children that were started under a name, the latest last."""
+        return tuple(child for child in self._children if child.name == name)
 
     def add(self, child: Child) -> None:
-        """Take charge of a child."""
-        self._children[child.name] = child
+        """Take charge of a child; former ones of its name stay in charge too, until all are ended."""
+        self._children.append(child)
 
     def running(self) -> list[Child]:
         """Those that have not ended."""
-        return [child for child in self._children.values() if child.status is None]
+        return [child for child in self._children if child.status is None]
 
     def wait(self, seconds: float) -> None:
         """Let them leave by themselves."""
@@ -165,5 +173,5 @@ class Children:
             for child in self.running():
                 child.signal(signal.SIGKILL)
             self.wait(GRACE)
-            for child in self._children.values():
+            for child in self._children:
                 child.release()

@@ -50,14 +50,15 @@ def run_processes(
 ) -> Outcome:
     """Run a scenario with a plant process and one process per agent, in simulated or in wall-clock time.
 
-    In wall-clock time the plant ends the run after end / speed, and an agent that dies is only an event.
+    In wall-clock time the plant ends the run after end / speed, and an agent that dies is only an event. Where the
+    scenario lets an agent join, or join again, its process is started when the plant says so.
 
     Parameters
     ----------
     plant_config : PlantConfig
         The plant. Its `listen` is used if it names a port other than 0, else a free port is chosen.
     agent_configs : Iterable[AgentConfig]
-        The agents; where they connect is filled in.
+        The agents, also those that join later; where they connect is filled in.
     log_dir : Path
         Folder for `plant.log`, `inv1.log`, ...; made if it does not exist.
     on_telemetry : Callable[[Telemetry], None]
@@ -87,19 +88,24 @@ def run_processes(
         agents = {name: msgspec.structs.replace(config, deadline=BUILD_DEADLINE) for name, config in agents.items()}
     endpoint = _endpoint(plant_config.listen)
     plant_config = msgspec.structs.replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
-    order = list(start_order) if start_order is not None else [PLANT, *agents]
-    if sorted(order) != sorted([PLANT, *agents]):
+    first = [name for name in agents if name in plant_config.agents]
+    order = list(start_order) if start_order is not None else [PLANT, *first]
+    if sorted(order) != sorted([PLANT, *first]):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
     keys = Keys(plant_config.run)
     session = Session(RECORDER, connect=(endpoint,), gossip=False, clock=plant_config.clock)
     try:
-        watch = _Watch(session, plant_config, on_telemetry, on_status or (lambda word: None))
+
+        def start(name: str, life: int) -> Child:
+            return _start(name, life, plant_config, agents, endpoint, log_dir, plant_command, session)
+
+        watch = _Watch(session, plant_config, on_telemetry, on_status or (lambda word: None), start)
         session.subscribe(keys.telemetry)
         session.hold_token(keys.alive_recorder(RECORDER))
         with Children() as children:
             for name in order:
-                children.add(_start(name, plant_config, agents, endpoint, log_dir, plant_command, session))
+                children.add(start(name, 1))
             if on_start is not None:
                 on_start(children)
             watch.until_the_end(children)
@@ -113,6 +119,7 @@ def run_processes(
 
 def _start(
     name: str,
+    life: int,
     plant_config: PlantConfig,
     agents: dict[str, AgentConfig],
     endpoint: str,
@@ -121,15 +128,15 @@ def _start(
     session: Session,
 ) -> Child:
     def on_exit(child: Child) -> None:
-        session.inbox.put(("word", _EXIT + child.name, b""))
+        session.inbox.put(("word", f"{_EXIT}{child.pid}", b""))
 
     def on_word(word: str) -> None:
         session.inbox.put(("word", _WORD + word, b""))
 
-    log = log_dir / f"{name}.log"
+    log = log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
     if name == PLANT:
         return Child(name, list(plant_command), plant_config, log, on_exit, on_word)
-    config = msgspec.structs.replace(agents[name], connect=(endpoint,))
+    config = msgspec.structs.replace(agents[name], connect=(endpoint,), incarnation=life)
     return Child(name, ["-m", "agents"], config, log, on_exit)
 
 
@@ -164,8 +171,12 @@ class _Watch:
         config: PlantConfig,
         on_telemetry: Callable[[Telemetry], None],
         on_status: Callable[[str], None],
+        start: Callable[[str, int], Child],
     ) -> None:
         self.broke = ""
+        self._start = start
+        self._awaited: set[str] = set()
+        """Agents that the scenario lets join, and whose process is yet to be started."""
         self._inbox, self._T_c = session.inbox, config.T_c
         self._wall = config.clock == "wall"
         self._patience = 1.5 * config.deadline + 1.0
@@ -197,10 +208,20 @@ class _Watch:
                 if kind == "message":
                     self._take(key, payload)
                 elif key.startswith(_EXIT):
-                    self._note_exit(children[key.removeprefix(_EXIT)])
+                    self._note_exit(next(child for child in children if str(child.pid) == key.removeprefix(_EXIT)))
                 else:
                     self._standing = self._standing or key == _WORD + READY
                     self._on_status(key.removeprefix(_WORD))
+            self._start_the_awaited(children)
+
+    def _start_the_awaited(self, children: Children) -> None:
+        """Start whom the plant awaits, once the former process of the name has really ended."""
+        for name in sorted(self._awaited):
+            lives = children.lives(name)
+            if self._ended or any(child.status is None for child in lives):
+                continue
+            self._awaited.discard(name)
+            children.add(self._start(name, len(lives) + 1))
 
     def _take(self, key: str, payload: bytes) -> None:
         try:
@@ -216,6 +237,7 @@ class _Watch:
         self._t = telemetry.t
         self._ticks = round(telemetry.t / self._T_c)
         self._events += telemetry.events
+        self._awaited.update(telemetry.awaited)
         self._on_telemetry(telemetry)
         if telemetry.final:
             self._break(telemetry.outcome)

@@ -43,6 +43,8 @@ class Bus:
         The agents' cores, in the order in which they start.
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
+    newcomer : Callable[[str], AgentSide]
+        Makes the core of an agent that the plant awaits while the run goes on.
     """
 
     def __init__(
@@ -50,8 +52,11 @@ class Bus:
         plant: PlantSide,
         agents: Iterable[AgentSide],
         on_telemetry: Callable[[Telemetry], None],
+        newcomer: Callable[[str], AgentSide],
     ) -> None:
         self._plant, self._agents = plant, list(agents)
+        self._newcomer = newcomer
+        self._awaited: list[str] = []
         self._on_telemetry = on_telemetry
         self._subscribers: defaultdict[str, list[PlantSide | AgentSide]] = defaultdict(list)
         self._nameplates: dict[str, bytes] = {}
@@ -71,10 +76,19 @@ class Bus:
                 to.received(key, payload, 0.0)
                 self._do(to, to.take_actions())
             self._end_the_stopped()
+            self._start_the_awaited()
             if not (plant.over or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing())
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
         self._do(plant, plant.take_actions())
+
+    def _start_the_awaited(self) -> None:
+        awaited, self._awaited = self._awaited, []
+        for name in awaited:
+            agent = self._newcomer(name)
+            self._agents.append(agent)
+            agent.start(0.0)
+            self._start(agent)
 
     def _start(self, agent: AgentSide) -> None:
         """Let an agent and everybody before it see each other."""
@@ -103,7 +117,9 @@ class Bus:
                 for to in self._subscribers.get(key, ()):
                     self._queue.append(_Delivery(to, key, payload))
                 if key == self._plant.keys.telemetry:
-                    self._on_telemetry(cast("Telemetry", decode(payload)))
+                    telemetry = cast("Telemetry", decode(payload))
+                    self._awaited += telemetry.awaited
+                    self._on_telemetry(telemetry)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
@@ -136,7 +152,7 @@ def run_inprocess(
     plant_config : PlantConfig
         The plant; its endpoints and recorders do not matter here.
     agent_configs : Iterable[AgentConfig]
-        The agents, in the order in which they start.
+        The agents, in the order in which they start; also those that join later.
     on_telemetry : Callable[[Telemetry], None]
         Called with every telemetry message as it comes; the first at t = 0.
     plant : PlantLike, optional
@@ -163,8 +179,17 @@ def run_inprocess(
 
         plant = build_plant(plant_config)
     side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant)
-    agents = [AgentSide(config, f"p{i}") for i, config in enumerate(agent_configs)]
-    Bus(side, agents, note).run()
+    known = {config.name: config for config in agent_configs}
+    agents = [
+        AgentSide(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
+    ]
+
+    def newcomer(name: str) -> AgentSide:
+        known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
+        agents.append(AgentSide(known[name], f"p{len(known) + len(agents)}"))
+        return agents[-1]
+
+    Bus(side, agents, note, newcomer).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

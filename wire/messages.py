@@ -227,6 +227,8 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     """False once something unscripted (a dead agent) has entered the run; always false in wall-clock time."""
     pacing: Pacing | None = None
     """How well the plant keeps real time; only in wall-clock time."""
+    awaited: tuple[Name, ...] = ()
+    """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
 
 
 AnyMessage = (

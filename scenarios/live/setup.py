@@ -81,14 +81,16 @@ def set_up(
     _check(wishes)
     plant, agents = configs(scenario, feeder, chosen_case(scenario, wishes.case), listen)
     live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed}
+    first = [agent for agent in agents if agent.name in plant.agents]
     everyone = tuple(
-        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*agents, *_spares(feeder, agents[0]))
+        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
     )
     end = None if wishes.duration is None else max(1, round(wishes.duration / plant.T_c)) * plant.T_c
     plant = msgspec.structs.replace(
         plant,
         **live,
         settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
+        moves=(),  # by hand, people let agents leave and join
         end=end,
         connect=beyond,
         wait_for_agents=wishes.wait,

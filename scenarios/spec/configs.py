@@ -8,6 +8,7 @@ from agents.config import AgentConfig, Control
 from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
 from scenarios.spec.model import Event, Scenario
+from scenarios.spec.moves import inverters_of, moves_of
 
 F_NOM = 60.0
 """Nominal frequency (Hz) of every feeder that gridpeers knows."""
@@ -16,7 +17,7 @@ F_NOM = 60.0
 def configs(
     scenario: Scenario, feeder: Feeder, case: str, endpoint: str = ""
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of the plant and of every inverter's agent for one case.
+    """Configurations of the plant and of every inverter's agent for one case, those that join later last.
 
     Parameters
     ----------
@@ -39,6 +40,7 @@ def configs(
     run = f"{scenario.name}-{case}"
     endpoints = (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
+    inverters = inverters_of(scenario, feeder)
     control = Control(secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains)
     plant = PlantConfig(
         run=run,
@@ -51,8 +53,10 @@ def configs(
             gfm=scenario.plant.gfm,
             gfl=scenario.plant.gfl,
             events=_switch_events(scenario),
+            spares=tuple(row.name for row in inverters if row.spare),
         ),
         agents=tuple(row.name for row in feeder.inverters),
+        moves=moves_of(scenario),
         T_c=time.T_c_s,
         end=time.end_s,
         record_step=time.record_s,
@@ -75,7 +79,7 @@ def configs(
             deadline=scenario.processes.deadline_s,
             connect=endpoints,
         )
-        for row in feeder.inverters
+        for row in inverters
     )
     return plant, agents
 

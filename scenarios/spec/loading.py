@@ -13,6 +13,7 @@ from plant.tables import FeederError, feeders, read_feeder
 from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
 from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
 from scenarios.spec.model import Scenario
+from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.reading import read_tables
 
 CATALOGUE = Path(__file__).parents[1] / "catalogue"
@@ -77,9 +78,10 @@ def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
     check_names(scenario, mistakes)
     scenario = _with_feeder_path(scenario, path.parent)
     feeder = _feeder_of(scenario, mistakes)
-    check_cases(scenario, tuple(row.name for row in feeder.inverters) if feeder else (), mistakes)
+    check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
     if feeder:
         check_switches(scenario, feeder, mistakes)
+        check_moves(scenario, feeder, mistakes)
     mistakes.raise_if_any()
     assert feeder is not None
     return scenario, feeder

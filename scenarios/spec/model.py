@@ -45,16 +45,20 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An entry of `[[event]]`: switches operated at once. It opens a measuring window that lasts to the next one."""
+    """An entry of `[[event]]`: what happens at once. It opens a measuring window that lasts to the next one."""
 
     label: str
     """Name of the window in metrics.json, e.g. "event1"."""
     t_s: float
-    """When (s), a multiple of h_s, after 0 and before end_s."""
+    """When (s), a multiple of h_s, or of T_c_s if agents leave or join; after 0 and before end_s."""
     open: tuple[str, ...] = ()
     """Switches to open, e.g. ["13-152"]."""
     close: tuple[str, ...] = ()
     """Switches to close."""
+    leave: tuple[str, ...] = ()
+    """Inverters whose agents end, e.g. ["inv2"]; each takes its inverter off the network."""
+    join: tuple[str, ...] = ()
+    """Inverters whose agents are started: those that have left, and spare ones. Each comes on line at no load."""
 
 
 class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -88,7 +92,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Name of the run folder; without it, that of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
-    paper: Literal["", "islanding"] = ""
+    paper: Literal["", "islanding", "plug-n-play"] = ""
     """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random. Links without faults draw nothing, so here it is only recorded."""

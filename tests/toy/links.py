@@ -10,6 +10,8 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from functools import partial
 
+import msgspec
+
 from agents.config import AgentConfig
 from agents.lockstep import AgentSide
 from plant.config import PlantConfig
@@ -37,13 +39,19 @@ class Links:
 
     def __init__(self, plant_config: PlantConfig, agent_configs: Iterable[AgentConfig], rng: random.Random) -> None:
         self.plant = PlantSide(plant_config, ToyPlant(plant_config))
-        self.agents = [AgentSide(config, f"p{i}") for i, config in enumerate(agent_configs)]
+        self._configs = {config.name: config for config in agent_configs}
+        self._born = 0
+        self.agents = [
+            self._bear(config) for config in agent_configs if config.name not in plant_config.settings.spares
+        ]
         self.telemetry: list[Telemetry] = []
         self._rng = rng
         self._living: dict[str, Side] = {side.token: side for side in (self.plant, *self.agents)}
         self._links: defaultdict[tuple[str, str], deque[Callable[[], None]]] = defaultdict(deque)
         self._subscribed: set[tuple[str, str, str]] = set()
         """Sender, receiver and key of the subscriptions that have arrived at the sender."""
+        self._keys = {token: set(side.subscriptions) for token, side in self._living.items()}
+        """All that somebody has subscribed to."""
         for side in self._living.values():
             side.start(0.0)
             for other in self._living.values():
@@ -83,15 +91,36 @@ class Links:
             self._links[self._rng.choice(waiting)].popleft()()
         elif not self.plant.work(0.0) and not waiting:
             return False
-        for token, side in self._living.items():
+        for token, side in list(self._living.items()):
             for action in side.take_actions():
                 if isinstance(action, Publish):
                     self._publish(token, action.key, action.payload)
                 elif isinstance(action, Fetch):
                     self._to_all(token, lambda to, a=action, b=token: partial(self._answer, to, b, a.key))
                 else:
+                    self._keys[token].add(action.key)
                     self._to_all(token, lambda to, a=action, b=token: partial(self._subscribed.add, (to, b, a.key)))
         return True
+
+    def _bear(self, config: AgentConfig) -> AgentSide:
+        self._born += 1
+        return AgentSide(config, f"p{self._born}")
+
+    def _start(self, name: str) -> None:
+        """Start an agent, perhaps once more: all others hear of it, and it of them, each at another time."""
+        config = self._configs[name]
+        self._configs[name] = msgspec.structs.replace(config, incarnation=config.incarnation + 1)
+        agent = self._bear(self._configs[name])
+        others = list(self._living)
+        self.agents.append(agent)
+        self._living[agent.token] = agent
+        self._keys[agent.token] = set(agent.subscriptions)
+        agent.start(0.0)
+        for other in others:
+            for a, b in ((agent.token, other), (other, agent.token)):
+                for key in sorted(self._keys[a]):
+                    self._send(a, b, partial(self._subscribed.add, (b, a, key)))
+                self._send(a, b, partial(self._living[b].appeared, a, 0.0))
 
     def _leave(self, agent: AgentSide) -> None:
         del self._living[agent.token]
@@ -116,6 +145,8 @@ class Links:
             telemetry = decode(payload)
             assert isinstance(telemetry, Telemetry)
             self.telemetry.append(telemetry)
+            for name in telemetry.awaited:
+                self._start(name)
         for to, side in self._living.items():
             if (sender, to, key) in self._subscribed:
                 self._send(sender, to, partial(side.received, key, payload, 0.0))
