@@ -122,7 +122,7 @@ class Plant:
         self._P_rated = np.array([unit.P_rated for unit in network.inverters])
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
         self._dynamics = Dynamics(
-            self._circuit(),
+            self._circuit(self._closed),
             tuple(
                 Inverter(
                     name=unit.name,
@@ -145,6 +145,17 @@ class Plant:
         self._events: list[PlantEvent] = []
         self._dead: list[str] = []
         self._report_dead(0.0)
+
+        self._foresee()
+        self._dynamics.run(0)
+
+    def _foresee(self) -> None:
+        """Factor the network of every scheduled switch state now: in wall-clock time an event must not be late."""
+        closed = self._closed
+        for step in sorted(self._schedule):
+            for name, action in self._schedule[step]:
+                closed = closed | {name} if action == "close" else closed - {name}
+            self._dynamics.reduced(self._circuit(closed))
 
     # ---------------------------------------------------------------- what agents see and do
 
@@ -240,10 +251,10 @@ class Plant:
 
     # ---------------------------------------------------------------- switching
 
-    def _circuit(self) -> Circuit:
-        if self._closed not in self._circuits:
-            self._circuits[self._closed] = circuit_of(self.network, self._closed, self._loads)
-        return self._circuits[self._closed]
+    def _circuit(self, closed: frozenset[str]) -> Circuit:
+        if closed not in self._circuits:
+            self._circuits[closed] = circuit_of(self.network, closed, self._loads)
+        return self._circuits[closed]
 
     def _operate(self, step: int) -> None:
         """Operate the switches of this step, all at once, then find the islands anew."""
@@ -260,7 +271,7 @@ class Plant:
                 else f"switch {shown} {_PAST[action]}"
             )
             self._events.append(PlantEvent(t=t, kind="switch", subject=name, text=text))
-        self._dynamics.connect(self._circuit())
+        self._dynamics.connect(self._circuit(self._closed))
         self._report_islands(t)
 
     def _report_islands(self, t: float) -> None:

@@ -84,7 +84,8 @@ class Dynamics:
         self.V = np.zeros((n, 3), complex)
         self.I = np.zeros((n, 3), complex)
         self.circuit = circuit
-        self.reduction = Reduction(circuit, self.y_f, self.forming, self.connected)
+        self._reductions: dict[tuple[int, bytes], Reduction] = {}
+        self.reduction = self.reduced(circuit)
         self._V_branch = circuit.V_branch.astype(complex)
 
     def _pack(self, i: int) -> NDArray[np.void]:
@@ -148,6 +149,13 @@ class Dynamics:
 
     # ---------------------------------------------------------------- switching
 
+    def reduced(self, circuit: Circuit) -> Reduction:
+        """Factor a circuit, once: called ahead of a scheduled event, it takes the work out of the event's step."""
+        key = id(circuit), self.connected.tobytes()  # the reduction keeps its circuit, so the id stays its own
+        if key not in self._reductions:
+            self._reductions[key] = Reduction(circuit, self.y_f, self.forming, self.connected)
+        return self._reductions[key]
+
     def connect(self, circuit: Circuit) -> None:
         """Go on with another network: factor it and find its first solution with the present injections.
 
@@ -163,7 +171,7 @@ class Dynamics:
         live = np.zeros(circuit.C.shape[1], bool)
         live[self.reduction.branches] = True
         self.circuit = circuit
-        self.reduction = Reduction(circuit, self.y_f, self.forming, self.connected)
+        self.reduction = self.reduced(circuit)
         stopped, regained = before & ~self.online, self.online & ~before
         self.J[~self.online] = 0.0
         for k, i in enumerate(self.gfm_at.tolist()):
@@ -280,7 +288,7 @@ class Dynamics:
     # ---------------------------------------------------------------- time
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V).
+        """Advance by `steps` steps (0: only compile or load the inner loop); returns steps x n_inv x (f in Hz, P in W, Q in var, V in V).
 
         Raises
         ------
@@ -308,7 +316,7 @@ class Dynamics:
             self._x,
             out,
         )
-        if status < 0 or not np.isfinite(out[-1]).all():
+        if status < 0 or not np.isfinite(out[-1:]).all():
             where = f" in step {-1 - status} of {steps}" if status < 0 else ""
             raise PlantError(
                 f"the network solution did not converge{where} (lowest terminal voltage "
