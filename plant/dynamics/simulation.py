@@ -288,7 +288,9 @@ class Dynamics:
     # ---------------------------------------------------------------- time
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps (0: only compile or load the inner loop); returns steps x n_inv x (f in Hz, P in W, Q in var, V in V).
+        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V).
+
+        With 0 steps the inner loop is only compiled or loaded.
 
         Raises
         ------
