@@ -234,12 +234,14 @@ def _start(
         from scenarios.live.hand import all_here, plant_here, say
         from scenarios.live.place import check_endpoint, check_run, claim
         from scenarios.live.setup import Wishes, chosen_case, set_up
+        from scenarios.live.visit import check_alone
 
         check_run(run)
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         spec = chosen(spec, chosen_case(spec, case), None)
         wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
         endpoint = claim("--listen", listen)
+        check_alone(run, beyond)
         config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.live.place import Place, return_path
+from scenarios.live.place import Place, UsageError, return_path
 from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
 from wire.session import Session
 
@@ -14,6 +14,9 @@ VISITOR = "visitor"
 
 REMINDER = 2.0
 """A wait is said again after so long (s)."""
+
+LOOKING = 1.5
+"""Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
 
 
 class NobodyError(ValueError):
@@ -136,3 +139,23 @@ class Visit:
             f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
             f"start one (gridpeers plant SCENARIO --run {self.where.run}), or give another name by --run"
         )
+
+
+def check_alone(run: str, beyond: tuple[str, ...]) -> None:
+    """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    beyond : tuple[str, ...]
+        What the plant will connect to; without any, it cannot meet another plant.
+    """
+    if not beyond:
+        return
+    with Visit(Place(run=run, connect=beyond)) as visit:
+        if visit.until(lambda: visit.plant, LOOKING):
+            raise UsageError(
+                f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
+                f"(gridpeers down --run {run} --connect {beyond[0]}), or give this run another name"
+            )

@@ -190,7 +190,11 @@ def test_plant_agents_and_commands_meet_at_a_router(tmp_path: Path, router: str)
         for name in ("inv1", "inv2"):
             desk.open("agent", name).expect(f"{name}: joins at t = ")
         desk.open("watch").expect(r"inv1 .* inv2 ")
+        second, said = desk.type("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0")
         code, _ = desk.type("stop", "inv2")
+
+        assert second == 2
+        assert f"--run: a plant of run site is there already, at {router}; end it" in said
 
         assert code == 0
         plant.expect("inv2 left; its inverter is off the network")
