@@ -15,7 +15,9 @@ from time import monotonic
 import pytest
 from msgspec.structs import replace
 
+from tests.toy.runs import FleetRun
 from tests.toy.town import Town
+from tests.toy.toy_configs import toy_configs
 
 FOUR = ("inv1", "inv2", "inv3", "inv4")
 OTHERS = ("inv1", "inv3", "inv4")
@@ -222,3 +224,32 @@ def test_an_agent_without_a_plant_ends_after_its_deadline(tmp_path: Path) -> Non
         assert town.until_ended("inv1") == 2
         text = lonely.log.read_text()
         assert "inv1: no plant of run toy within 0.5 s; is the plant of run toy running at tcp/127.0.0.1:" in text
+
+
+def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: Path) -> None:
+    """All rows come, after end / speed, with the percentiles of the pace; who died is in the notes."""
+    plant, agents = toy_configs(4, end=3.0)
+    run = FleetRun(
+        replace(plant, clock="wall", speed=2.0), [replace(a, clock="wall", speed=2.0) for a in agents], tmp_path
+    )
+    run.at(1.0, lambda: run.child("inv3").signal(signal.SIGKILL))
+    outcome = run()
+
+    assert outcome.broke == ""
+    assert not outcome.reproducible
+    assert [row[0] for row in run.rows] == pytest.approx([0.02 * k for k in range(151)])
+    assert outcome.run_s == pytest.approx(1.5, abs=0.4)
+    assert outcome.pacing is not None
+    assert outcome.pacing.steps == 150
+    assert [event.subject for event in outcome.events if "died" in event.text] == ["inv3"]
+    assert [note.split(" after")[0] for note in outcome.notes] == ["inv3 was killed by SIGKILL"]
+
+
+def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
+    """At a speed that nothing can keep the plant ends with status 3, says how late it was and what to do."""
+    plant, agents = toy_configs(2, end=400.0)
+    plant = replace(plant, clock="wall", speed=1e6, strict=True)
+    outcome = FleetRun(plant, [replace(agent, clock="wall") for agent in agents], tmp_path)()
+
+    assert outcome.broke.startswith("plant: cannot keep pace at speed 1e+06: ")
+    assert outcome.broke.endswith("give it a lower speed or more cores")
