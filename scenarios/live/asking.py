@@ -8,8 +8,8 @@ from typing import Literal
 import msgspec
 
 from agents.config import AgentConfig
-from scenarios.live.look import Look, in_order
-from scenarios.live.picture import Picture, Standing
+from scenarios.live.show.look import Look, in_order
+from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
 from wire.codec import RejectedError, decode, encode
 from wire.messages import AgentStatus, Answer, Command, Telemetry

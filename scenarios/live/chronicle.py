@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from scenarios.live.events import line_of
+from scenarios.live.show.events import line_of
 from scenarios.record import Recorder, RecordError
 from wire.codec import RejectedError, decode
 from wire.keys import Keys

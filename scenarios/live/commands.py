@@ -132,7 +132,7 @@ def status(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None
     """
     with _visit(run, connect, wait, meet_agents=True) as visit:
         from scenarios.live.asking import look
-        from scenarios.live.render import plain
+        from scenarios.live.show.render import plain
 
         typer.echo(plain(look(visit)), nl=False)
 
@@ -152,7 +152,7 @@ def watch(
     with _visit(run, connect, wait, meet_agents=True) as visit:
         from rich.console import Console
 
-        from scenarios.live.watching import watch as watch_run
+        from scenarios.live.show.watching import watch as watch_run
 
         watch_run(visit, Console(), duration)
 

@@ -23,8 +23,8 @@ from plant.runtime import COMPILING, READY, run_plant
 from scenarios.children import Child, Children
 from scenarios.live.asking import configuration
 from scenarios.live.chronicle import Chronicle
-from scenarios.live.look import short
 from scenarios.live.place import Place, near
+from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
 from wire.drive import StoppedError
 from wire.messages import PLANT

@@ -6,9 +6,9 @@ import pytest
 from rich.console import Console
 
 from agents.config import AgentConfig, Control
-from scenarios.live.look import Line, Look, short
-from scenarios.live.picture import Picture
-from scenarios.live.render import plain, table
+from scenarios.live.show.look import Line, Look, short
+from scenarios.live.show.picture import Picture
+from scenarios.live.show.render import plain, table
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 

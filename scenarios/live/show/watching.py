@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.live import Live
 
 from scenarios.live.asking import Watching, present, standing
-from scenarios.live.keyboard import keyboard
-from scenarios.live.picture import Picture
-from scenarios.live.render import plain, table
+from scenarios.live.show.keyboard import keyboard
+from scenarios.live.show.picture import Picture
+from scenarios.live.show.render import plain, table
 from scenarios.live.visit import Visit
 
 REFRESH = 0.25

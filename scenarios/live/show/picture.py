@@ -11,8 +11,8 @@ from collections.abc import Collection
 import msgspec
 
 from agents.config import AgentConfig
-from scenarios.live.events import line_of
-from scenarios.live.look import Line, Look, in_order, short
+from scenarios.live.show.events import line_of
+from scenarios.live.show.look import Line, Look, in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 SILENT = 1.5
