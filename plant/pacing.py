@@ -15,7 +15,7 @@ HOPELESS = 10
 FIRST = 100
 """Steps before which nothing is judged."""
 
-_KEPT = 20_000
+_KEPT = 5_000
 """Delays that are remembered, the latest, for the percentiles of a run that stays."""
 
 

@@ -126,6 +126,22 @@ def test_a_plant_that_dies_is_held_out_for_and_its_successor_followed(tmp_path: 
         settled(town)
 
 
+def test_a_frozen_plant_puts_its_schedule_off_and_has_its_agents_again(tmp_path: Path) -> None:
+    """SIGSTOP of the plant: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was."""
+    with Town(4, tmp_path).all() as town:
+        settled(town)
+        town.signal("plant", signal.SIGSTOP)
+        town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")
+        town.signal("plant", signal.SIGCONT)
+        town.until_event("plant", "hopelessly late: the schedule was put off by")
+        town.together(FOUR)
+        settled(town)
+
+        assert town.telemetry is not None
+        assert town.telemetry.pacing is not None
+        assert town.telemetry.pacing.slipped > 1.0
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_any_start_order_works(tmp_path: Path, seed: int) -> None:
     """Agents wait for a plant; the plant waits for agents as long as told."""
