@@ -21,6 +21,9 @@ from tests.toy.runs import FleetRun
 
 REAL = ("-m", "plant")
 
+TOO_LATE = 0.1
+"""Part of the steps that may be late before the numbers mean nothing; the law stands more than a run may be late."""
+
 
 class Feeder:
     """Case IV of the islanding experiment in wall-clock time, without its second event."""
@@ -48,12 +51,12 @@ class Feeder:
         self.run.pids.append(child.pid)
 
     def __call__(self) -> Outcome:
-        """Run; skip if the machine was too busy to keep pace."""
+        """Run; skip if the machine was far too busy to keep pace."""
         outcome = self.run(plant_command=REAL)
         assert outcome.broke == ""
         pacing = outcome.pacing
         assert pacing is not None
-        if pacing.late > 0.01 * pacing.steps or pacing.slipped:
+        if pacing.late > TOO_LATE * pacing.steps or pacing.slipped:
             pytest.skip(f"this machine is too busy for wall-clock time: {msgspec.to_builtins(pacing)}")
         return outcome
 
