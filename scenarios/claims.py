@@ -48,6 +48,8 @@ class Claim:
     """Cases that must have been run."""
     judge: Callable[[Results, Start], tuple[bool, str]]
     """Whether it holds, and what we found."""
+    events: tuple[str, ...] = EVENTS
+    """Events that must have been measured in them."""
     known_miss: str = ""
     """Why it cannot hold here, where that is known. It is shown as a miss then, and does not fail the run."""
 
@@ -81,7 +83,7 @@ def _verdict(claim: Claim, results: Results, start: Start) -> Verdict:
     missing = [case for case in claim.cases if case not in results]
     if missing:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
-    absent = [event for event in EVENTS if any(event not in results[case] for case in claim.cases)]
+    absent = [event for event in claim.events if any(event not in results[case] for case in claim.cases)]
     if absent:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
     holds, found = claim.judge(results, start)

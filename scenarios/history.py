@@ -13,6 +13,7 @@ from plant.equipment import InverterRow
 from scenarios.record import QUANTITIES, header
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +66,15 @@ class History:
     """Real-power set-point (W), shape (T, N)."""
     V_set: Floats
     """Voltage set-point (V), shape (T, N)."""
+
+    @property
+    def present(self) -> Flags:
+        """Who is on the network in each row, shape (T, N).
+
+        The plant tells exactly no power of who is off it; of who is on it, not even at no load are both exactly 0.
+        """
+        on: Flags = (self.P != 0.0) | (self.Q != 0.0)
+        return on
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]]) -> History:

@@ -1,7 +1,8 @@
 """The paper's measures of a run: abs(f - 60), MPSI (16), MQSI (17), V_error, and the time to restore.
 
 Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end.
-Powers enter per unit of each inverter's own rating (the paper writes kW in (9) and pu elsewhere).
+Powers enter per unit of each inverter's own rating (the paper writes kW in (9) and pu elsewhere). An inverter that is
+off the network takes no part: each row is measured over those that are present in it.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.history import Floats, History, Plates
+from scenarios.history import Flags, Floats, History, Plates
 
 STEADY = 0.2
 """Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
 
 F_BAND, MPSI_BAND = 0.01, 0.01
 """Frequency (Hz) and MPSI below which a microgrid counts as restored."""
+
+LOAD_BAND = 0.02
+"""Part of the steady total real power within which the load counts as taken over."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +40,10 @@ class Steady:
     t_restore_s: float | None
     """Time (s) from the event until abs(f - f_nom) < 0.01 Hz at every GFM and MPSI < 0.01 for good; None if never."""
     p: dict[str, float]
-    """Real power of each inverter (pu of its rating)."""
+    """Real power of each inverter (pu of its rating); exactly 0 of one that is off the network."""
+    t_load_s: float | None = None
+    """Time (s) from the event until the inverters' total real power is within 2 % of its steady value for good: until
+    those that remain carry the load of one that left. None if never."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +69,7 @@ def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ..
     return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
 
 
-def eta(x: Floats, s: Floats, m: Floats) -> Floats:
+def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
     r"""Equal-sharing value of each row, (9).
 
     .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
@@ -75,55 +82,76 @@ def eta(x: Floats, s: Floats, m: Floats) -> Floats:
         Ratings (W), shape (N,).
     m : Floats
         Droops (pu per pu), shape (N,).
+    present : Flags, optional
+        Who takes part in each row, shape (T, N); everybody if left out.
 
     Examples
     --------
     >>> eta(np.array([[300.0, 700.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
     array([0.005])
     """
-    total: Floats = x.sum(axis=1)
-    return total / float((s / m).sum())
+    everybody = np.ones(x.shape, bool) if present is None else present
+    total: Floats = np.where(everybody, x, 0.0).sum(axis=1)
+    capacity: Floats = np.where(everybody, s / m, 0.0).sum(axis=1)
+    return total / np.where(capacity > 0.0, capacity, np.nan)
 
 
-def sharing_index(x: Floats, s: Floats, m: Floats) -> Floats:
+def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
     r"""Mean sharing index of each row: (16) with P and m_p, (17) with Q and m_q.
 
     .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
 
-    It is not a number where nothing is shared (eta = 0).
+    N counts who is present in the row, as the sums do. It is not a number where nothing is shared (eta = 0).
 
     Examples
     --------
     >>> sharing_index(np.array([[300.0, 700.0], [400.0, 600.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
     array([0.        , 0.23809524])
     """
-    equal = eta(x, s, m)[:, None]
+    everybody = np.ones(x.shape, bool) if present is None else present
+    equal = eta(x, s, m, everybody)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        index: Floats = np.abs((m * x / s - equal) / equal).mean(axis=1)
+        index = mean_over(np.abs((m * x / s - equal) / equal), everybody)
     index[equal[:, 0] == 0.0] = np.nan
     return index
 
 
+def mean_over(x: Floats, present: Flags) -> Floats:
+    """Mean of each row over those that are present in it; not a number where nobody is.
+
+    Examples
+    --------
+    >>> mean_over(np.array([[1.0, 3.0], [1.0, 3.0]]), np.array([[True, True], [True, False]]))
+    array([2., 1.])
+    """
+    count = present.sum(axis=1)
+    total: Floats = np.where(present, x, 0.0).sum(axis=1)
+    return total / np.where(count > 0, count, np.nan)
+
+
+def mean_voltage(history: History, plates: Plates) -> Floats:
+    """Mean terminal voltage of each row (pu)."""
+    return mean_over(history.V / plates.V_nom, history.present)
+
+
 def mean_frequency(history: History, plates: Plates) -> Floats:
     """Frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
-    f: Floats = history.f[:, plates.GFM].mean(axis=1)
-    return f
+    return mean_over(history.f[:, plates.GFM], history.present[:, plates.GFM])
 
 
 def MPSI(history: History, plates: Plates) -> Floats:
     """Mean power sharing index of each row, (16)."""
-    return sharing_index(history.P, plates.s, plates.m_p)
+    return sharing_index(history.P, plates.s, plates.m_p, history.present)
 
 
 def MQSI(history: History, plates: Plates) -> Floats:
     """Mean var sharing index of each row, (17)."""
-    return sharing_index(history.Q, plates.s, plates.m_q)
+    return sharing_index(history.Q, plates.s, plates.m_q, history.present)
 
 
 def V_error(history: History, plates: Plates) -> Floats:
     """Mean of abs(V_i - 1) of each row (pu)."""
-    error: Floats = np.abs(history.V / plates.V_nom - 1.0).mean(axis=1)
-    return error
+    return mean_over(np.abs(history.V / plates.V_nom - 1.0), history.present)
 
 
 def measure(history: History, plates: Plates, window: Window, f_nom: float) -> Steady:
@@ -141,18 +169,23 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
         Nominal frequency (Hz).
     """
     assert plates.names == history.inverters
-    f_errors = np.abs(history.f[:, plates.GFM] - f_nom)
+    forming = history.present[:, plates.GFM]
+    f_errors = np.where(forming, np.abs(history.f[:, plates.GFM] - f_nom), 0.0)
+    f_error = mean_over(f_errors, forming)
     sharing = MPSI(history, plates)
     inside = _between(history.t, window)
     steady = inside & (history.t >= window.end - STEADY - 1e-9)
-    restored = (f_errors < F_BAND).all(axis=1) & (sharing < MPSI_BAND)
+    restored = (f_errors < F_BAND).all(axis=1) & forming.any(axis=1) & (sharing < MPSI_BAND)
+    total = history.P.sum(axis=1)
+    carried = np.abs(total - total[steady].mean()) <= LOAD_BAND * abs(total[steady].mean())
     return Steady(
-        f_error_Hz=float(f_errors[steady].mean()),
+        f_error_Hz=float(f_error[steady].mean()),
         MPSI=float(sharing[steady].mean()),
         V_error=float(V_error(history, plates)[steady].mean()),
         MQSI=float(MQSI(history, plates)[steady].mean()),
         t_restore_s=_for_good(history.t[inside], restored[inside], window.start),
         p=dict(zip(plates.names, (history.P[steady].mean(axis=0) / plates.s).tolist(), strict=True)),
+        t_load_s=_for_good(history.t[inside], carried[inside], window.start),
     )
 
 

@@ -7,7 +7,7 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -39,6 +39,12 @@ OTHER_STYLES: tuple[Style, ...] = (
     ("#56b4e9", "--", 1.8),
 )
 """Styles of other cases, and of inverters, in turn."""
+
+MOVER: Style = ("#d55e00", "-", 2.2)
+"""Style of an inverter that leaves or joins, among all others."""
+
+STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "--", 1.2)}
+"""Styles of the others: grid-forming, or not."""
 
 _PAGE: Any = {
     "font.size": 9,
@@ -72,6 +78,8 @@ class Drawing:
     """Label and time (s) of each event."""
     f_nom: float
     """Nominal frequency (Hz)."""
+    moves: bool = False
+    """Whether inverters leave or join, which has a figure of its own."""
 
 
 def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
@@ -93,6 +101,8 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
             "power_GFL.png": _powers(drawing, GFM=False),
             "overview.png": overview(drawing),
         }
+        if drawing.moves:
+            figures["plug-n-play.png"] = plug_and_play(drawing)
         for name, figure in figures.items():
             partial = folder / f".{name}"
             figure.savefig(partial, format="png")
@@ -111,6 +121,40 @@ def overview(drawing: Drawing) -> Figure:
         for panel in axes[0]:
             panel.set_xlabel("")
         handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def plug_and_play(drawing: Drawing) -> Figure:
+    """P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
+    with mpl.rc_context(_PAGE):
+        count = len(drawing.histories)
+        figure = Figure(figsize=(5.2 * count + 1.2, 6.4), layout="constrained")
+        grid = figure.subplots(3, count, sharex=True, sharey="row", squeeze=False)
+        for (top, middle, bottom), (case, history) in zip(grid.T, drawing.histories.items(), strict=True):
+            alone = replace(drawing, histories={case: history})
+            present = history.present
+            for i, name in enumerate(drawing.plates.names):
+                colour, dashes, width = MOVER if not present[:, i].all() else STAYERS[drawing.plates.GFM[i]]
+                top.plot(history.t, history.P[:, i] / drawing.plates.s[i], dashes, color=colour, lw=width, label=name)
+            top.set_title(f"Case {case} {drawing.titles.get(case, '')}".strip(), loc="left")
+            _curves(middle, alone, metrics.mean_frequency)
+            middle.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
+            middle.ticklabel_format(axis="y", useOffset=False)
+            _curves(bottom, alone, metrics.mean_voltage)
+            for panel in (top, middle, bottom):
+                _mark_events(panel, drawing, labelled=panel is top)
+                _time_axis(panel, alone)
+        for panel in grid[:-1].flat:
+            panel.set_xlabel("")
+        for panel, label in zip(
+            grid[:, 0], ("P (pu of rating)", "f, mean of the GFM (Hz)", "mean V (pu)"), strict=True
+        ):
+            panel.set_ylabel(label)
+        lines = {line.get_color(): line for line in grid[0, 0].get_lines() if line.get_label() in drawing.plates.names}
+        words = {MOVER[0]: "", STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
+        shown = [(line, words[str(colour)] or line.get_label()) for colour, line in lines.items()]
+        handles, labels = [line for line, _ in shown], [label for _, label in shown]
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
 
@@ -151,11 +195,7 @@ def _MPSI(axes: Axes, drawing: Drawing) -> None:
 
 
 def _voltage(axes: Axes, drawing: Drawing) -> None:
-    def mean_voltage(history: History, plates: Plates) -> Floats:
-        mean: Floats = (history.V / plates.V_nom).mean(axis=1)
-        return mean
-
-    _curves(axes, drawing, mean_voltage)
+    _curves(axes, drawing, metrics.mean_voltage)
     axes.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
     axes.set_title("Voltage", loc="left")
     axes.set_ylabel("mean of all inverters, V (pu)")

@@ -94,7 +94,9 @@ def show(report: Report, console: Console) -> None:
 def _grid(report: Report, table: str) -> Grid:
     columns = [column for column in COLUMNS if column.table == table]
     events = list(dict.fromkeys(event for steady in report.results.values() for event in steady))
-    judged = bool(report.verdicts)
+    judged = any(event in ISLANDING.get(case, {}) for case in report.results for event in events) and bool(
+        report.verdicts
+    )
     header = ["case"]
     for event in events:
         header += [f"{event}\n{column.heading}" for column in columns]

@@ -24,12 +24,15 @@ from plant.pacing import sentence
 from scenarios import claims, metrics
 from scenarios.folder import set_status, shown, write_whole
 from scenarios.history import History, Plates
+from scenarios.moves import as_they_came
 from scenarios.outcome import Outcome
+from scenarios.plug_claims import PLUG_CLAIMS
 from scenarios.ports import endpoint
 from scenarios.record import Recorded, Recorder, RecordError
 from scenarios.report import Report, plain
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.moves import inverters_of
 from scenarios.spec.writing import to_toml
 from wire.messages import Pacing, Telemetry
 
@@ -118,20 +121,20 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
             file=log,
             flush=True,
         )
-    plates = Plates.of(request.feeder.inverters)
+    plates = Plates.of(inverters_of(scenario, request.feeder))
     histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
     events = [(event.label, event.t_s) for event in scenario.events]
     results = {
         case: {
             window.label: metrics.measure(history, plates, window, F_NOM)
-            for window in metrics.windows(events, scenario.time.end_s)
+            for window in metrics.windows(as_they_came(scenario, recorded[case].events), scenario.time.end_s)
         }
         for case, history in histories.items()
     }
     sha256 = {case: record.sha256 for case, record in recorded.items()}
     write_whole(folder / "metrics.json", metrics_json(request, results, sha256, pacing))
     titles = {case: rule.title for case, rule in scenario.cases.items()}
-    _draw(histories, titles, plates, events, folder / "plots")
+    _draw(histories, titles, plates, events, folder / "plots", moves=any(e.leave or e.join for e in scenario.events))
     report = Report(
         scenario=scenario.name,
         titles=titles,
@@ -213,10 +216,12 @@ def _draw(
     plates: Plates,
     events: list[tuple[str, float]],
     folder: Path,
+    *,
+    moves: bool,
 ) -> None:
     from scenarios import plots  # matplotlib takes longer to import than a case to run; nothing else waits for it
 
-    drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM)
+    drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM, moves=moves)
     plots.draw_all(drawing, folder)
 
 
@@ -224,7 +229,8 @@ def _judge(request: Request, plates: Plates, results: claims.Results) -> tuple[c
     if not request.scenario.paper:
         return ()
     GFL = tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM)
-    return claims.judge(results, claims.Start(P_set0=request.scenario.plant.P_set0_pu, GFL=GFL))
+    start = claims.Start(P_set0=request.scenario.plant.P_set0_pu, GFL=GFL)
+    return claims.judge(results, start, PLUG_CLAIMS if request.scenario.paper == "plug-n-play" else claims.CLAIMS)
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:

@@ -164,7 +164,7 @@ def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
     assert found["cases"].keys() == {"I"}
     assert found["cases"]["I"].keys() == {"event1", "history_sha256"}
     measures = found["cases"]["I"]["event1"]
-    assert measures.keys() == {"f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s"}
+    assert measures.keys() == {"f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s"}
     assert measures["t_restore_s"] is None
     assert all(isinstance(value, float) for name, value in measures.items() if name != "t_restore_s")
 
