@@ -10,7 +10,9 @@ first step after it came, as it would on a real inverter; nothing is applied to 
 
 **Agents** come and go. A token and a nameplate: its inverter is put on the network, if it is not there, and its agent
 is sent measurements. `Leave`: its inverter is taken off. A token gone without `Leave`: the agent died, and its inverter
-stays on primary droop at its last set-points. Of two processes of one name the first takes part, the other is refused.
+stays on primary droop at its last set-points. Whom the scenario lets leave is asked to; telemetry tells, once, that
+whoever joins is awaited, and the run goes on meanwhile. Of two processes of one name the first takes part, the other is
+refused.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from plant.config import PlantConfig
 from plant.interface import LivePlant
 from plant.pacing import TOLERATED, Pacer, sentence
 from plant.reporting import Reporter, measurement_of
+from plant.schedule import Schedule
 from plant.service import Service
 from wire.actions import Action, Fetch, Publish, Say
 from wire.clock import ticks_until, time_of
@@ -89,6 +92,7 @@ class FreePlant:
         self._complained = False
         self._reporter = Reporter(config.incarnation, plant)
         self._service = Service(self)
+        self._schedule = Schedule(config, plant.inverters)
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
         self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
 
@@ -325,7 +329,20 @@ class FreePlant:
         elif self.phase == "running":
             self._keep_pace(now)
             if self.phase == "running":
+                self._move()
                 self._measure()
+
+    def _move(self) -> None:
+        """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""
+        leave, join = self._schedule.take(self.tick)
+        for name in leave:
+            if name in self.instances:
+                reason = f"{name} leaves at t = {self.t:g} s, as the scenario says"
+                self.stop(self.keys.dismissal(name, self.instances[name]), reason)
+                self._say(reason)
+        if join:
+            self._say(f"{', '.join(join)} may join from t = {self.t:g} s on, as the scenario says")
+            self._report(final=False, awaited=join)
 
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
@@ -383,9 +400,15 @@ class FreePlant:
     def _say(self, text: str) -> None:
         self._actions.append(Say(f"plant: {text}"))
 
-    def _report(self, *, final: bool) -> None:
+    def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
-        pacing = self.pacer.report()
-        messages = self._reporter.report(self.t, final=final, outcome=self.outcome, reproducible=False, pacing=pacing)
+        messages = self._reporter.report(
+            self.t,
+            final=final,
+            outcome=self.outcome,
+            reproducible=False,
+            pacing=self.pacer.report(),
+            awaited=awaited,
+        )
         for message in messages:
             self._actions.append(Publish(self.keys.telemetry, encode(message)))

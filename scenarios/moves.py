@@ -29,3 +29,14 @@ def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tup
         times = [t for t, name in moved if name in names and event.t_s - 1e-9 <= t < end]
         came.append((event.label, max(times, default=event.t_s)))
     return came
+
+
+def late_moves(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[str]:
+    """Sentences on events that came later than the scenario says, as processes had to end or to come up first."""
+    came = as_they_came(scenario, recorded)
+    return [
+        f"{event.label}, meant for t = {event.t_s:g} s, came at {t:g} s, as its process took that long; "
+        "what is measured of it begins there"
+        for event, (_, t) in zip(scenario.events, came, strict=True)
+        if t > event.t_s + 1e-9
+    ]

@@ -24,7 +24,7 @@ from plant.pacing import sentence
 from scenarios import claims, metrics
 from scenarios.folder import set_status, shown, write_whole
 from scenarios.history import History, Plates
-from scenarios.moves import as_they_came
+from scenarios.moves import as_they_came, late_moves
 from scenarios.outcome import Outcome
 from scenarios.plug_claims import PLUG_CLAIMS
 from scenarios.ports import endpoint
@@ -114,6 +114,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
             notes.append(f"case {case}, wall-clock time at speed {request.speed:g}: {pace}")
+        notes += [f"case {case}: {note}" for note in late_moves(scenario, recorded[case].events)]
         print(
             f"case {case}: start {outcome.start_s:.2f} s, run {outcome.run_s:.2f} s, {outcome.ticks} ticks",
             *outcome.notes,

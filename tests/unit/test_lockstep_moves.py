@@ -1,0 +1,185 @@
+"""Agents that leave and join on schedule in simulated time: who is faster must not show, whatever a process takes."""
+
+from __future__ import annotations
+
+import random
+from typing import Any, Literal
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.config import AgentConfig, Control, GraphRule
+from plant.config import PlantConfig
+from plant.lockstep import PlantSide
+from scenarios.inprocess import run_inprocess
+from scenarios.outcome import Outcome
+from tests.toy.links import Links
+from tests.toy.toy_configs import Moves, toy_configs
+from tests.toy.toy_plant import M_P, ToyPlant
+from wire.actions import Publish
+from wire.codec import decode
+from wire.messages import Stop
+
+SEEDS = st.integers(0, 2**32 - 1)
+AWAY: Moves = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
+
+
+def configured(
+    moves: Moves = AWAY, n: int = 4, graph: GraphRule = "full", end: float = 0.4, spares: tuple[str, ...] = ()
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Plant and agents of a toy with these moves."""
+    return toy_configs(n, Control(secondary="all", graph=graph), end=end, moves=moves, spares=spares)
+
+
+def in_one_process(*args: Any, **kwargs: Any) -> tuple[Outcome, list[tuple[float, ...]]]:
+    """Outcome and rows of the in-process driver."""
+    plant, agents = configured(*args, **kwargs)
+    rows: list[tuple[float, ...]] = []
+    return run_inprocess(plant, agents, lambda message: rows.extend(message.rows), plant=ToyPlant(plant)), rows
+
+
+@settings(deadline=None, max_examples=60)
+@given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
+def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
+    """Leaving and returning gives the same rows and events to the last bit, whoever is heard first."""
+    plant, agents = configured(graph=graph)
+    run = Links(plant, agents, random.Random(seed))
+    run.run()
+    outcome, rows = in_one_process(graph=graph)
+
+    assert run.rows == rows
+    assert tuple(run.events) == outcome.events
+    assert run.plant.outcome == ""
+    assert run.plant.reproducible
+    assert not run.plant.rejects.counts
+    assert not any(agent.rejects.counts for agent in run.agents)
+
+
+def test_the_events_tell_what_happened() -> None:
+    """Leaving, being off, joining and being on again are events at their times, and the run is reproducible."""
+    outcome, rows = in_one_process()
+
+    assert [(event.t, event.kind, event.subject) for event in outcome.events if event.subject == "inv2"] == [
+        (0.2, "roster", "inv2"),
+        (0.2, "inverter", "inv2"),
+        (0.3, "roster", "inv2"),
+        (0.3, "inverter", "inv2"),
+    ]
+    assert outcome.reproducible
+    assert outcome.notes == ()
+    assert [row[0] for row in rows] == [round(0.02 * k, 9) for k in range(21)]
+
+
+def test_who_is_away_gives_nothing_and_the_others_take_over() -> None:
+    """From the tick after it left inv2 has no power; the others carry its load, and f comes back."""
+    _, rows = in_one_process(n=6, end=4.0, moves=((2.0, "inv2", "leave"),))
+    after = rows[101]
+
+    assert after[8] == 0.0
+    assert sum(after[2::6]) == pytest.approx(sum(rows[100][2::6]))
+    assert rows[-1][1] == pytest.approx(60.0, abs=0.01)
+    assert rows[-1][11] == rows[101][11]
+
+
+def test_a_returning_agent_starts_from_what_its_measurement_shows() -> None:
+    """No set-point jumps by more than the law allows in a period, that of the returned inverter included."""
+    _, rows = in_one_process(end=3.0, moves=((1.0, "inv2", "leave"), (2.0, "inv2", "join")))
+    k = 100
+    steps = [abs(b - a) for a, b in zip(rows[k][5::6], rows[k + 1][5::6], strict=True)]
+
+    assert max(steps) < 0.35 * 100e3 * 0.02 / 0.0007 * M_P
+
+
+def test_a_spare_joins_for_the_first_time() -> None:
+    """A spare's agent is not awaited at the start, and shares the load after it has joined."""
+    outcome, rows = in_one_process(end=6.0, moves=((2.0, "inv4", "join"),), spares=("inv4",))
+
+    assert outcome.broke == ""
+    assert outcome.reproducible
+    assert rows[100][20] == 0.0
+    assert rows[-1][20] == pytest.approx(rows[-1][2], rel=0.01)
+
+
+def test_everybody_may_leave_and_return_at_once() -> None:
+    """A run without any agent in between goes on, and all come back."""
+    names = ("inv1", "inv2", "inv3")
+    moves = (*((0.1, name, "leave") for name in names), *((0.2, name, "join") for name in reversed(names)))
+    outcome, rows = in_one_process(moves, n=3)
+
+    assert outcome.broke == ""
+    assert rows[-1][0] == 0.4
+
+
+@settings(deadline=None, max_examples=40)
+@given(SEEDS, st.integers(0, 40))
+def test_a_death_around_a_move_does_not_stall_the_run(seed: int, steps: int) -> None:
+    """When another agent dies just as one leaves or joins, the rest go on to the end."""
+    plant, agents = configured(n=5)
+    run = Links(plant, agents, random.Random(seed))
+    run.run(until_tick=14)
+    for _ in range(steps):
+        run.step()
+    run.kill("inv3")
+    run.run()
+
+    assert run.plant.outcome == ""
+    assert run.rows[-1][0] == 0.4
+
+
+def test_a_newcomer_that_does_not_come_is_named_by_the_deadline() -> None:
+    """The tick is held for the newcomer; who waits in vain says for whom."""
+    plant, agents = configured()
+    run = Links(plant, agents, random.Random(3))
+    run._start = lambda name: None  # type: ignore[method-assign]
+    while run.plant.phase != "joining":
+        assert run.step()
+    assert run.plant.tick == 15
+    assert run.plant.until is not None
+    run.plant.expire(run.plant.until)
+
+    assert "token" in run.plant.outcome
+    assert "inv2" in run.plant.outcome
+
+
+def test_who_joins_is_awaited_once_by_telemetry() -> None:
+    """Drivers are told at the tick itself, not ten ticks later."""
+    plant, agents = configured()
+    run = Links(plant, agents, random.Random(4))
+    run.run()
+
+    assert [(message.t, message.awaited) for message in run.telemetry if message.awaited] == [(0.3, ("inv2",))]
+
+
+@pytest.mark.parametrize(
+    ("move", "said"),
+    [
+        ((0.2, "inv9", "leave"), 'moves: no inverter "inv9"; inverters are inv1, inv2'),
+        (
+            (0.21, "inv2", "leave"),
+            "moves: inv2 must leave at a positive multiple of the control period 0.02 s, got 0.21 s",
+        ),
+    ],
+)
+def test_a_move_that_cannot_be_is_refused_at_the_start(
+    move: tuple[float, str, Literal["leave", "join"]], said: str
+) -> None:
+    """An unknown inverter, or a time that is no tick, is told with its value."""
+    plant, _ = configured((move,), n=2)
+
+    with pytest.raises(ValueError, match=said):
+        PlantSide(plant, ToyPlant(plant))
+
+
+def test_who_comes_before_its_time_is_refused() -> None:
+    """An agent of a spare that is to join later is told so when it comes at the start."""
+    plant, agents = configured(((0.2, "inv4", "join"),), spares=("inv4",))
+    side = PlantSide(plant, ToyPlant(plant))
+    side.start(0.0)
+    side.appeared(side.keys.alive_agent("inv4", "early"), 0.0)
+    (stop,) = [decode(action.payload) for action in side.take_actions() if isinstance(action, Publish)]
+
+    assert isinstance(stop, Stop)
+    assert stop.refused
+    assert "the scenario lets it join later" in stop.reason
+    assert len(agents) == 4
