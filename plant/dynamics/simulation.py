@@ -214,6 +214,10 @@ class Dynamics:
         self.connect(self.circuit)
         if on and self.forming[i]:
             self.gfm_state["w"][self.gfm_at == i] = w
+        elif on:  # its PLL has found the island's frequency before the contactor closes
+            k = int(np.flatnonzero(self.gfl_at == i)[0])
+            self.gfl_state[k]["w_i"] = w
+            self.gfl_state[k]["f"] = self.gfl_state[k]["f_m"] = gfl_model.F_NOM + w / (2.0 * np.pi)
 
     def _island_speed(self, i: int) -> float:
         """Speed (rad/s, relative to nominal) of the island that inverter i stands in; 0 with a source or dead."""
