@@ -17,7 +17,7 @@ from scenarios.outcome import Outcome
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 from tests.toy.runs import FleetRun, Rows, first_difference
-from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
 
@@ -114,6 +114,38 @@ def test_the_feeder_gives_the_same_rows_to_the_last_bit(tmp_path: Path) -> None:
     outcome = run(plant_command=("-m", "plant"), start_order=["inv9", *(f"inv{i}" for i in range(1, 9)), "plant"])
 
     assert outcome.broke == ""
+    assert first_difference(expected.rows, run.rows) == ""
+    assert outcome.events == expected.outcome.events
+
+
+def test_leaving_and_returning_give_the_same_rows(driver: Driver) -> None:
+    """It shows nowhere how long the new process of who returns took to come up, nor that of a spare that joins."""
+    moves: Moves = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"), (0.3, "inv4", "join"))
+    plant, agents = toy_configs(4, moves=moves, spares=("inv4",))
+    expected, ran = in_one_process(plant, agents), driver(plant, agents)
+
+    assert ran.outcome.broke == ""
+    assert ran.outcome.reproducible
+    assert ran.outcome.notes == ()
+    assert ran.outcome.events == expected.outcome.events
+    assert first_difference(expected.rows, ran.rows) == ""
+
+
+def test_plug_n_play_gives_the_same_history_with_processes(tmp_path: Path) -> None:
+    """Case IV of the paper's experiment, moved to the first tenths of a second: the same rows to the last bit."""
+    scenario, feeder = load_scenario("plug-n-play")
+    plant, agents = configs(scenario, feeder, "IV")
+    sooner = tuple(msgspec.structs.replace(move, t=move.t / 10) for move in plant.moves)
+    events = (SwitchEvent(t=0.1, switch="13-152", action="open"),)
+    plant = msgspec.structs.replace(
+        plant, end=0.4, moves=sooner, settings=msgspec.structs.replace(plant.settings, events=events)
+    )
+    expected = in_one_process(plant, agents)
+    run = FleetRun(plant, agents, tmp_path)
+    outcome = run(plant_command=("-m", "plant"))
+
+    assert outcome.broke == ""
+    assert outcome.reproducible
     assert first_difference(expected.rows, run.rows) == ""
     assert outcome.events == expected.outcome.events
 

@@ -1,4 +1,4 @@
-"""The islanding experiment, each case run once for all tests of this folder."""
+"""The paper's experiments, each case run once for all tests of this folder."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,18 @@ class Experiment:
 @pytest.fixture(scope="session")
 def islanding() -> Experiment:
     """The paper's islanding experiment, by the driver without processes."""
-    scenario, feeder = load_scenario("islanding")
+    return experiment("islanding")
+
+
+@pytest.fixture(scope="session")
+def plug_n_play() -> Experiment:
+    """The paper's plug-n-play experiment, by the driver without processes."""
+    return experiment("plug-n-play")
+
+
+def experiment(name: str) -> Experiment:
+    """Run all cases of a scenario."""
+    scenario, feeder = load_scenario(name)
     plates = Plates.of(feeder.inverters)
     windows = metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     histories, steady = {}, {}

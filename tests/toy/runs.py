@@ -61,7 +61,8 @@ class FleetRun:
                 **{"plant_command": TOY} | more,
             )
         finally:
-            assert [pid for pid in self.pids if exists(pid)] == []
+            later = [] if self.children is None else [child.pid for child in self.children]
+            assert [pid for pid in {*self.pids, *later} if exists(pid)] == []
 
     def _started(self, children: Children) -> None:
         self.children = children

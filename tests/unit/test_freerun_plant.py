@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
+from plant.config import Move
 from plant.freerun import LEAD, FreePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -337,3 +338,22 @@ def test_a_plant_without_solution_breaks_the_run() -> None:
     assert "no solution at t = 0.1 s" in lab.side.outcome
     assert lab.side.cause is not None
     assert len(lab.take(Stop)) == 1
+
+
+def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> None:
+    """At its tick the leaver alone is told to stop, and is off once it says so; telemetry tells once who is to come."""
+    moves = (Move(t=0.1, inverter="inv2", action="leave"), Move(t=0.2, inverter="inv2", action="join"))
+    lab = running(3, moves=moves)
+    lab.step(6)
+    stops = [(key, message.refused) for key, message in lab.sent if isinstance(message, Stop)]
+    lab.leave("inv2")
+    lab.token("inv2", gone=True)
+    off = lab.toy.measure()["inv2"].P
+    lab.step(6)
+    awaited = [(m.t, m.awaited) for m in lab.take(Telemetry) if m.awaited]
+    lab.join("inv2", instance="b", life=2)
+
+    assert stops == [(KEYS.dismissal("inv2", "a"), False)]
+    assert off == 0.0
+    assert awaited == [(0.2, ("inv2",))]
+    assert lab.toy.measure()["inv2"].P != 0.0

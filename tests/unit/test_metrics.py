@@ -1,5 +1,7 @@
 """The paper's measures, against forms that everybody can check."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -161,3 +163,54 @@ def test_every_GFM_must_be_restored() -> None:
 
     assert steady.t_restore_s is None
     assert steady.f_error_Hz == pytest.approx(0.05)
+
+
+def test_who_is_off_the_network_is_not_counted() -> None:
+    """Rows without inv3 are those of the two others alone: eta, (16), (17), V_error; steady p of it is 0."""
+    case = history([1.0, 1.1, 1.2], [60.0] * 3, [EQUAL, EQUAL, EQUAL])
+    case.P[1:, 2] = 0.0
+    case.Q[1:, 2] = 0.0
+    case.V[1:, 2] = 0.0
+
+    steady = metrics.measure(case, PLATES, Window(label="leave", start=1.0, end=1.2), F_NOM)
+
+    assert case.present.tolist() == [[True] * 3, [True, True, False], [True, True, False]]
+    assert metrics.MPSI(case, PLATES) == pytest.approx([0.0] * 3, abs=1e-12)
+    assert metrics.MQSI(case, PLATES) == pytest.approx([0.0] * 3, abs=1e-12)
+    assert metrics.V_error(case, PLATES) == pytest.approx([0.0] * 3, abs=1e-12)
+    assert steady.p["inv3"] == 0.0
+    assert steady.t_restore_s == pytest.approx(0.1)
+
+
+def test_sharing_among_those_present_is_equation_16_of_them() -> None:
+    """With inv3 off, (16) is that of a microgrid that never had it."""
+    p = np.array([[0.8, 0.6, 0.0]])
+    present = np.array([[True, True, False]])
+
+    index = metrics.sharing_index(p * PLATES.s, PLATES.s, PLATES.m_p, present)
+
+    assert index == pytest.approx(metrics.sharing_index(p[:, :2] * PLATES.s[:2], PLATES.s[:2], PLATES.m_p[:2]))
+
+
+def test_a_GFM_that_is_off_does_not_hold_back_the_frequency() -> None:
+    """What a GFM off the network shows is no frequency of the island; with none left there is none."""
+    both = replace(PLATES, GFM=np.array([True, True, False]))
+    case = history([0.0, 1.0, 2.0], [60.0] * 3, [EQUAL] * 3)
+    case.f[:, 1] = 55.0
+    case.P[:, 1] = case.Q[:, 1] = 0.0
+
+    assert metrics.measure(case, both, Window(label="e", start=0.0, end=2.0), F_NOM).t_restore_s == 1.0
+    case.P[:, 0] = case.Q[:, 0] = 0.0
+    assert np.isnan(metrics.mean_frequency(case, both)).all()
+    assert metrics.measure(case, both, Window(label="e", start=0.0, end=2.0), F_NOM).t_restore_s is None
+
+
+def test_the_load_is_carried_once_the_total_stays_at_its_steady_value() -> None:
+    """The others make up for inv3 in the second row after it left; until then power is missing."""
+    case = history([1.0, 1.1, 1.2, 1.3, 1.4], [60.0] * 5, [EQUAL] * 5)
+    case.P[1:, 2] = 0.0
+    case.P[2:, 0] += case.P[0, 2]
+
+    steady = metrics.measure(case, PLATES, Window(label="leave", start=1.0, end=1.4), F_NOM)
+
+    assert steady.t_load_s == pytest.approx(0.2)
