@@ -68,7 +68,7 @@ def mistakes(folder: Path, text: str) -> tuple[str, ...]:
         ('secondary = "all"', 'secondary = "GFMs"', r'case.IV.secondary: there is no "GFMs"; did you mean "GFM"\?'),
         ("[case.IV]", '[case."a/b"]', r'case.a/b: name "a/b" must be up to 31 letters'),
         ("[case.IV]", "[case.log]", r"case.log: a case's folder stands beside log, plots, .*; name it otherwise"),
-    ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
+        ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
         ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
         ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
         ('paper = "islanding"', 'paper = "intermittency"', r'paper: there is no "intermittency"'),
