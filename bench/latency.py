@@ -53,9 +53,10 @@ restored   the first time from which, for {HOLD:g} s, all rows of the plant have
            After kill -9, SIGSTOP, cut: of the other eight; the lost one's inverter stays on primary droop at its
            last set-points and is not judged. What they restore from is the change of load at the same moment
 again      SIGCONT, or healing, -> used by the first neighbour, by all eight, and all eight used by it too
-deaf       the cut lasts about 1.5 s, until the others are restored: Zenoh's lease of 2 s has then run out on some links.
-           Afterwards, once it has on all or none: a pair of agents that still does not hear each other, though both
-           are heard by others; or the observer, who hears no status of an agent
+deaf       the cut lasts about 1.5 s, until the others are restored; with TCP's back-off a link may then be silent for
+           longer than Zenoh's lease of 2 s. Counted once links have settled: a pair of agents that do not use each
+           other within {AFTERMATH + BOTH_WAYS:g} s more, then one is restarted; and the observer, who no longer
+           hears the status of an agent and opens a new session
 one-way    handed to Zenoh -> in the receiving thread of another process, at the rate of ticks ({TICK * 1e3:g} ms)
 All times in ms, from when the observer did it to when news of it reached his session; he shares the machine."""
 
@@ -180,8 +181,8 @@ class Budget:
                 if what in self.tokens:
                     print(f"  token still there when all had noticed {self.tokens[what]:6}")
                 if what in self.halves:
-                    print(f"  two agents deaf to each other for good  {self.halves[what]:6}")
-                    print(f"  observer deaf to an agent afterwards   {self.deaf[what]:6}")
+                    print(f"  two agents deaf to each other          {self.halves[what]:6}")
+                    print(f"  observer deaf to an agent              {self.deaf[what]:6}")
             print(f"  {part:38}{describe(values)}")
 
 
