@@ -44,6 +44,9 @@ opened anew. Longer than Zenoh's lease, after which the plant has forgotten the 
 After a cut that heals just as the lease runs out, Zenoh can add the new link to the transport of which the other side
 has closed its end. The two then disagree on what the numbers of keys mean, and messages go astray for good."""
 
+CROSSED = 10
+"""Messages under another's key after which the same is done, without waiting, whether or not the plant is seen."""
+
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
 
@@ -69,6 +72,7 @@ class FreeAgent:
         self.failed = ""
         """Why this agent could never take part; empty unless so."""
         self.phase: Phase = "seeking"
+        self._crossed = 0
         self.astray = False
         """Whether it closes only to begin again with a new session."""
         self.plant_seen = False
@@ -277,11 +281,19 @@ class FreeAgent:
             sender, handler = self._routes[key]
             message = decode(payload)
             if message.sender != sender:
+                self._misled(sender, message.sender)
                 raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
             handler(message, now)
             self.used += 1
         except RejectedError as rejected:
             self.rejects.add(rejected.kind, key, rejected.text)
+
+    def _misled(self, expected: str, sender: str) -> None:
+        """Note a message that came under another's key; many of them prove that key numbers are confused."""
+        self._crossed += 1
+        if self._crossed == CROSSED and self._ran and not self.astray:
+            self.astray = True
+            self._say(f"messages of {sender} come under the key of {expected}; opens a new session")
 
     def _on_control(self, message: AnyMessage, now: float) -> None:
         if not isinstance(message, Stop):

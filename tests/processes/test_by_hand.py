@@ -181,6 +181,7 @@ def router() -> Iterator[str]:
         yield endpoint
 
 
+@pytest.mark.site
 def test_plant_agents_and_commands_meet_at_a_router(tmp_path: Path, router: str) -> None:
     """All know the router alone."""
     (tmp_path / "calm.toml").write_text(CALM)

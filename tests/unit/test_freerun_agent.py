@@ -342,6 +342,23 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
     assert lab.side.failed == ""
 
 
+def test_messages_under_others_keys_prove_a_confused_session() -> None:
+    """A few strays are counted; many mean that key numbers are confused, and the agent begins again."""
+    lab = running("inv2")
+    measurement = Measurement(
+        sender="plant", incarnation=1, seq=9, t=0.2, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0, P_set=0.0, V_set=277.0,
+        grid_connected=False, island="inv1", roster=(),
+    )  # fmt: skip
+    for _ in range(9):
+        lab.hear(KEYS.state("inv2"), measurement)
+    assert not lab.side.over
+
+    lab.hear(KEYS.state("inv2"), measurement)
+
+    assert lab.side.astray
+    assert lab.said[-1] == "inv1: messages of plant come under the key of inv2; opens a new session"
+
+
 def test_an_agent_without_a_plant_keeps_its_session() -> None:
     """What is not there cannot be found by another session either."""
     lab = Lab()
