@@ -1,0 +1,10 @@
+"""What all tests need of their surroundings."""
+
+from __future__ import annotations
+
+import signal
+
+# A shell that runs its tests in the background, or nohup, has Ctrl-C ignored, and every process that a test starts
+# would inherit that; but what Ctrl-C does is what some of them are about.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
