@@ -78,7 +78,6 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
         S=on.S,
         I0=on.I0,
         V_branch=on.V_nom * np.exp(1j * on.phi0),
-        names=tuple(f"{bus}.{phase}" for bus, phase in network.nodes),
     )
 
 

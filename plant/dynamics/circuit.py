@@ -5,7 +5,7 @@ Made by `plant.network` for every set of closed switches; tests make their own s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,8 +38,6 @@ class Circuit:
     """Constant current of each branch (A), at branch voltage angle 0: I = I0 V / abs(V)."""
     V_branch: NDArray[np.complex128]
     """Nominal phasor of each branch (V): where the first solution starts."""
-    names: tuple[str, ...] = field(default=())
-    """Name of each node for messages, e.g. "47.A"."""
 
     def components(self) -> tuple[int, NDArray[np.int64]]:
         """Electrical islands: number and label of each node.

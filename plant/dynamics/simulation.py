@@ -329,7 +329,6 @@ class Dynamics:
                 f"{np.nanmin(np.abs(self.V) / self.V_b[:, None]):.2f} pu): the load may be more than the inverters "
                 "can feed, or the controllers unstable; try a smaller h, other gains, or less load"
             )
-        self.iterations = status
         if self._x.size:
             self._V_branch[self.reduction.branches] = self._branch_voltages()
         return out
