@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from time import monotonic, perf_counter
 
-from scenarios.fleet import _endpoint
+from scenarios.drivers.fleet import _endpoint
 from wire.session import Session
 
 ROOT = "gridpeers/floor"

@@ -27,8 +27,8 @@ from ping import TICK, one_way, round_trip
 from speed import machine
 from watched import HOLD, RUN, NotInTimeError, Watched, describe
 
-from scenarios.fleet import _endpoint
-from scenarios.metrics import F_BAND, MPSI_BAND
+from scenarios.drivers.fleet import _endpoint
+from scenarios.results.metrics import F_BAND, MPSI_BAND
 from tests.processes.hosts import Hosts, NoHostsError
 
 HURT, CUT = "inv2", "inv5"

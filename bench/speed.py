@@ -29,9 +29,9 @@ import agents.lockstep
 import plant.lockstep
 from agents.agent import Agent
 from plant.build import build_plant
-from scenarios.fleet import run_processes
-from scenarios.inprocess import run_inprocess
-from scenarios.record import Recorder
+from scenarios.drivers.fleet import run_processes
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.record import Recorder
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 

@@ -14,9 +14,9 @@ import numpy as np
 from msgspec.structs import replace
 from ping import STAMP, StampedInbox, stamp_of
 
-from scenarios.children import Child, Children
+from scenarios.drivers.children import Child, Children
 from scenarios.live.setup import Wishes, set_up
-from scenarios.metrics import F_BAND, MPSI_BAND, sharing_index
+from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import F_NOM
 from wire.codec import decode, encode

@@ -1,6 +1,6 @@
 """The plant's side of simulated time, sans-IO: tokens and messages in, actions out.
 
-A driver (`plant.runtime` over Zenoh, `scenarios.inprocess` on a bus) does, from one thread,
+A driver (`plant.runtime` over Zenoh, `scenarios.drivers.inprocess` on a bus) does, from one thread,
 
     side.appeared(key, now) | side.vanished(key, now)       a liveliness token came or went
     side.received(key, payload, now)                        a message, or the answer to a `Fetch`

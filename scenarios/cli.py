@@ -121,10 +121,10 @@ def run(
 
     from rich.console import Console
 
-    from scenarios.folder import FolderError, new_folder, shown
-    from scenarios.ports import PortError, check_port
+    from scenarios.drivers.ports import PortError, check_port
     from scenarios.progress import progress
-    from scenarios.report import show
+    from scenarios.results.folder import FolderError, new_folder, shown
+    from scenarios.results.report import show
     from scenarios.run import BrokenRunError, Request, TerminatedError
     from scenarios.run import run as run_scenario
 
@@ -212,7 +212,7 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
 
     Example:  gridpeers doc scenario
     """
-    from scenarios.reference import page
+    from scenarios.results.reference import page
 
     typer.echo(page(topic.value), nl=False)
 

@@ -1,6 +1,6 @@
 """One run from a checked scenario to its folder: cases, records, metrics, figures, claims, report.
 
-The drivers are `scenarios.inprocess` and `scenarios.fleet`; this module gives them configurations and takes telemetry.
+The drivers (`scenarios.drivers`) are given configurations here, and their telemetry is taken.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.equipment import Feeder
 from plant.pacing import sentence
-from scenarios import claims, metrics
-from scenarios.folder import set_status, shown, write_whole
-from scenarios.history import History, Plates
-from scenarios.moves import as_they_came, late_moves
-from scenarios.outcome import Outcome
-from scenarios.plug_claims import PLUG_CLAIMS
-from scenarios.ports import endpoint
-from scenarios.record import Recorded, Recorder, RecordError
-from scenarios.report import Report, plain
+from scenarios.drivers.outcome import Outcome
+from scenarios.drivers.ports import endpoint
+from scenarios.results import claims, metrics
+from scenarios.results.folder import set_status, shown, write_whole
+from scenarios.results.history import History, Plates
+from scenarios.results.moves import as_they_came, late_moves
+from scenarios.results.plug_claims import PLUG_CLAIMS
+from scenarios.results.record import Recorded, Recorder, RecordError
+from scenarios.results.report import Report, plain
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
@@ -184,11 +184,11 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
         progress(case, 0.0, time.end_s)
         try:
             if request.driver == "inprocess":
-                from scenarios.inprocess import run_inprocess
+                from scenarios.drivers.inprocess import run_inprocess
 
                 outcome = run_inprocess(plant, agents, note)
             else:
-                from scenarios.fleet import run_processes
+                from scenarios.drivers.fleet import run_processes
 
                 outcome = run_processes(plant, agents, request.folder / "log" / case, note)
             if outcome.broke:
@@ -220,7 +220,9 @@ def _draw(
     *,
     moves: bool,
 ) -> None:
-    from scenarios import plots  # matplotlib takes longer to import than a case to run; nothing else waits for it
+    from scenarios.results import (
+        plots,  # matplotlib takes longer to import than a case to run; nothing else waits for it
+    )
 
     drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM, moves=moves)
     plots.draw_all(drawing, folder)

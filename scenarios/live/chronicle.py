@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 
 from scenarios.live.show.events import line_of
-from scenarios.record import Recorder, RecordError
+from scenarios.results.record import Recorder, RecordError
 from wire.codec import RejectedError, decode
 from wire.keys import Keys
 from wire.messages import Pacing, Telemetry

@@ -281,10 +281,10 @@ def _visit(run: str, connect: list[str] | None, wait: float, *, meet_agents: boo
 @contextmanager
 def _told() -> Iterator[None]:
     """What a person did wrong, or what is not there, in one line and exit code 2."""
-    from scenarios.folder import FolderError
     from scenarios.live.asking import RefusedError
     from scenarios.live.place import UsageError
     from scenarios.live.visit import NobodyError
+    from scenarios.results.folder import FolderError
     from wire.process import ConfigurationError
     from wire.session import SessionError
 

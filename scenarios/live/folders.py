@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from scenarios.folder import new_folder, set_status, write_whole
+from scenarios.results.folder import new_folder, set_status, write_whole
 from scenarios.spec import Scenario
 from scenarios.spec.writing import to_toml
 

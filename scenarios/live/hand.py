@@ -20,7 +20,7 @@ from agents.runtime import run_agent
 from plant.config import PlantConfig
 from plant.pacing import sentence
 from plant.runtime import COMPILING, READY, run_plant
-from scenarios.children import Child, Children
+from scenarios.drivers.children import Child, Children
 from scenarios.live.asking import configuration
 from scenarios.live.chronicle import Chronicle
 from scenarios.live.place import Place, near

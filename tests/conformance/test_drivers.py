@@ -12,8 +12,8 @@ import pytest
 
 from agents.config import AgentConfig, Control, GraphRule
 from plant.config import PlantConfig, SwitchEvent
-from scenarios.inprocess import run_inprocess
-from scenarios.outcome import Outcome
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.outcome import Outcome
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 from tests.toy.runs import FleetRun, Rows, first_difference
@@ -33,7 +33,7 @@ Driver = Callable[[PlantConfig, tuple[AgentConfig, ...]], Ran]
 
 
 def in_one_process(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
-    """Run the toy, or the feeder if the configuration names one, by `scenarios.inprocess`."""
+    """Run the toy, or the feeder if the configuration names one, by `scenarios.drivers.inprocess`."""
     rows: Rows = []
     toy = ToyPlant(plant) if plant.settings.feeder.startswith("toy") else None
     return Ran(run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows), plant=toy), rows)

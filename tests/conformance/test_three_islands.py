@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from plant.config import SwitchEvent
-from scenarios.inprocess import run_inprocess
+from scenarios.drivers.inprocess import run_inprocess
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 

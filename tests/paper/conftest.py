@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from scenarios import metrics
-from scenarios.claims import Start
-from scenarios.history import History, Plates
-from scenarios.inprocess import run_inprocess
-from scenarios.metrics import Steady
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results import metrics
+from scenarios.results.claims import Start
+from scenarios.results.history import History, Plates
+from scenarios.results.metrics import Steady
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import F_NOM, configs
 from wire.messages import Telemetry

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from scenarios import metrics
-from scenarios.claims import CLAIMS, EVENTS, judge
+from scenarios.results import metrics
+from scenarios.results.claims import CLAIMS, EVENTS, judge
 
 from .conftest import Experiment
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scenarios import metrics
-from scenarios.claims import judge
-from scenarios.plug_claims import PLUG_CLAIMS
+from scenarios.results import metrics
+from scenarios.results.claims import judge
+from scenarios.results.plug_claims import PLUG_CLAIMS
 
 from .conftest import Experiment
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from scenarios.claims import EVENTS
-from scenarios.paper_tables import COLUMNS, ISLANDING, Column
+from scenarios.results.claims import EVENTS
+from scenarios.results.paper_tables import COLUMNS, ISLANDING, Column
 
 from .conftest import Experiment
 

@@ -15,7 +15,7 @@ from time import monotonic
 import msgspec
 import pytest
 
-from scenarios.fleet import run_processes
+from scenarios.drivers.fleet import run_processes
 from tests.toy import toy_plant
 from tests.toy.runs import FleetRun
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -143,7 +143,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
 PARENT = """
 import json, sys
 from pathlib import Path
-from scenarios.fleet import run_processes
+from scenarios.drivers.fleet import run_processes
 from tests.toy.toy_configs import toy_configs
 plant, agents = toy_configs(3, end=2000.0)
 def told(children):

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.children import Child
-from scenarios.outcome import Outcome
+from scenarios.drivers.children import Child
+from scenarios.drivers.outcome import Outcome
 from tests.toy.runs import FleetRun, exists
 from tests.toy.toy_configs import Moves, toy_configs
 

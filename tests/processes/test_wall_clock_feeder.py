@@ -12,10 +12,10 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from scenarios.children import Child
-from scenarios.fleet import _endpoint
+from scenarios.drivers.children import Child
+from scenarios.drivers.fleet import _endpoint
+from scenarios.drivers.outcome import Outcome
 from scenarios.live.setup import Wishes, set_up
-from scenarios.outcome import Outcome
 from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from agents.config import AgentConfig
 from plant.config import PlantConfig
-from scenarios.children import Child, Children
-from scenarios.fleet import run_processes
-from scenarios.outcome import Outcome
+from scenarios.drivers.children import Child, Children
+from scenarios.drivers.fleet import run_processes
+from scenarios.drivers.outcome import Outcome
 from tests.toy import toy_plant
 from wire.messages import Telemetry
 

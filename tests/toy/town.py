@@ -10,8 +10,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.children import Child, Children
-from scenarios.fleet import _endpoint
+from scenarios.drivers.children import Child, Children
+from scenarios.drivers.fleet import _endpoint
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
 from wire.codec import decode, encode

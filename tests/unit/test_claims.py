@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from scenarios.claims import CLAIMS, Start, Verdict, judge
-from scenarios.metrics import Steady
-from scenarios.paper_tables import COLUMNS, ISLANDING
+from scenarios.results.claims import CLAIMS, Start, Verdict, judge
+from scenarios.results.metrics import Steady
+from scenarios.results.paper_tables import COLUMNS, ISLANDING
 
 START = Start(P_set0=0.65, GFL=("inv2",))
 Table = dict[str, dict[str, Steady]]

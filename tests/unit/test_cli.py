@@ -208,12 +208,12 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
     elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The reason stands on the screen and in the folder; no history bears its name."""
-    import scenarios.inprocess
+    import scenarios.drivers.inprocess
 
     def broken(*_: object) -> None:
         raise RuntimeError("no such luck")
 
-    monkeypatch.setattr(scenarios.inprocess, "run_inprocess", broken)
+    monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", broken)
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
@@ -229,12 +229,12 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
 
 def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C ends with one line, and the folder tells it."""
-    import scenarios.inprocess
+    import scenarios.drivers.inprocess
 
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(scenarios.inprocess, "run_inprocess", interrupted)
+    monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", interrupted)
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.folder import FolderError, new_folder, set_status
+from scenarios.results.folder import FolderError, new_folder, set_status
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 

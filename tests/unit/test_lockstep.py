@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from agents.config import Control, GraphRule
 from agents.lockstep import AgentSide
 from plant.lockstep import PlantSide
-from scenarios.inprocess import run_inprocess
+from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from agents.config import AgentConfig, Control, GraphRule
 from plant.config import PlantConfig
 from plant.lockstep import PlantSide
-from scenarios.inprocess import run_inprocess
-from scenarios.outcome import Outcome
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.outcome import Outcome
 from tests.toy.links import Links
 from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import M_P, ToyPlant

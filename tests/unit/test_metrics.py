@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios import metrics
-from scenarios.history import History, Plates
-from scenarios.metrics import Window
+from scenarios.results import metrics
+from scenarios.results.history import History, Plates
+from scenarios.results.metrics import Window
 
 F_NOM = 60.0
 PLATES = Plates(

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.image import imread
 
 from plant.tables import read_feeder
-from scenarios.history import History, Plates
-from scenarios.plots import CASE_STYLES, Drawing, case_style, draw_all, overview
+from scenarios.results.history import History, Plates
+from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, overview
 
 
 def drawing(*cases: str) -> Drawing:

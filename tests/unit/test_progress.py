@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from scenarios import progress
-from scenarios.ports import PortError, check_port
+from scenarios.drivers.ports import PortError, check_port
 
 
 def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.history import History, read_history
-from scenarios.record import PARTIAL, Recorder, RecordError
+from scenarios.results.history import History, read_history
+from scenarios.results.record import PARTIAL, Recorder, RecordError
 from wire.messages import PlantEvent, Telemetry
 
 Rows = tuple[tuple[float, ...], ...]

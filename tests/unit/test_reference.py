@@ -10,7 +10,7 @@ import pytest
 from agents.config import Gains
 from plant.config import GflParameters, GfmParameters
 from scenarios.field_docs import field_docs
-from scenarios.reference import TOPICS, page
+from scenarios.results.reference import TOPICS, page
 from scenarios.spec.model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
 from wire import keys, messages
 

@@ -5,10 +5,10 @@ import io
 import pytest
 from rich.console import Console
 
-from scenarios.claims import Start, judge
-from scenarios.metrics import Steady
-from scenarios.paper_tables import ISLANDING
-from scenarios.report import Report, plain, show
+from scenarios.results.claims import Start, judge
+from scenarios.results.metrics import Steady
+from scenarios.results.paper_tables import ISLANDING
+from scenarios.results.report import Report, plain, show
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> Report:

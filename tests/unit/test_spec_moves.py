@@ -7,7 +7,7 @@ import pytest
 
 from plant.config import Move
 from scenarios.live.setup import Wishes, set_up
-from scenarios.moves import as_they_came, late_moves
+from scenarios.results.moves import as_they_came, late_moves
 from scenarios.spec import ScenarioError, load_scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.loading import CATALOGUE

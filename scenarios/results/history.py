@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import InverterRow
-from scenarios.record import QUANTITIES, header
+from scenarios.results.record import QUANTITIES, header
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios import metrics
-from scenarios.history import Floats, History, Plates
+from scenarios.results import metrics
+from scenarios.results.history import Floats, History, Plates
 
 Style = tuple[str, str, float]
 """Colour, dash pattern and line width."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.history import Flags, Floats, History, Plates
+from scenarios.results.history import Flags, Floats, History, Plates
 
 STEADY = 0.2
 """Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""

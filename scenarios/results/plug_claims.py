@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenarios.claims import Claim, Results, Start
-from scenarios.metrics import F_BAND, MPSI_BAND
+from scenarios.results.claims import Claim, Results, Start
+from scenarios.results.metrics import F_BAND, MPSI_BAND
 
 LEAVE, RETURN = "leave", "return"
 """Labels of the events in the scenario."""

@@ -15,8 +15,8 @@ import msgspec
 from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.runtime import READY
-from scenarios.children import Child, Children
-from scenarios.outcome import Outcome
+from scenarios.drivers.children import Child, Children
+from scenarios.drivers.outcome import Outcome
 from wire.codec import RejectedError, Rejects, decode
 from wire.keys import Keys
 from wire.messages import PLANT, PlantEvent, Telemetry

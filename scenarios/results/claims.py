@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from scenarios.metrics import F_BAND, Steady
-from scenarios.paper_tables import COLUMNS, ISLANDING, Column, Quantity
+from scenarios.results.metrics import F_BAND, Steady
+from scenarios.results.paper_tables import COLUMNS, ISLANDING, Column, Quantity
 
 Results = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""

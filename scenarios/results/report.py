@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.claims import Results, Verdict, within
-from scenarios.paper_tables import COLUMNS, ISLANDING, Column
+from scenarios.results.claims import Results, Verdict, within
+from scenarios.results.paper_tables import COLUMNS, ISLANDING, Column
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 

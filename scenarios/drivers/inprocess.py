@@ -18,7 +18,7 @@ from agents.lockstep import AgentSide
 from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.lockstep import PlantSide
-from scenarios.outcome import Outcome
+from scenarios.drivers.outcome import Outcome
 from wire.actions import Action, Fetch, Publish
 from wire.codec import decode
 from wire.messages import PlantEvent, Telemetry

@@ -1,0 +1,1 @@
+"""The drivers: one process, or one process per inverter over Zenoh, and what they hand over."""
