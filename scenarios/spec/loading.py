@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -15,6 +17,9 @@ from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.reading import read_tables
+
+ReadFeeder = Callable[[str, str], Feeder]
+"""Reads a feeder, given its name or path and its load set."""
 
 CATALOGUE = Path(__file__).parents[1] / "catalogue"
 """Folder of the scenarios that come with gridpeers."""
@@ -65,25 +70,56 @@ def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
     (['I', 'II', 'III', 'IV'], 9)
     """
     path = find_scenario(str(name))
-    text = _text_of(path)
+    text, data = read_toml(path)
     mistakes = Mistakes(path.name, text)
+    scenario, feeder = check_tables(data, path, mistakes)
+    mistakes.raise_if_any()
+    assert feeder is not None
+    return scenario, feeder
+
+
+def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text and tables of a file.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read or is no TOML.
+    """
+    text = _text_of(path)
     try:
-        data = tomllib.loads(text)
+        return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError([_malformed(path.name, text, str(error))]) from None
+
+
+def check_tables(
+    data: Mapping[str, Any], path: Path, mistakes: Mistakes, read_feeder: ReadFeeder = read_feeder
+) -> tuple[Scenario, Feeder | None]:
+    """Read the tables of a scenario and note every mistake in them.
+
+    Parameters
+    ----------
+    data : Mapping[str, Any]
+        Parsed TOML.
+    path : Path
+        Its file: a relative path of a feeder starts there, and a scenario without a name has its name.
+    mistakes : Mistakes
+        Takes the mistakes; the scenario is of use only when it stays empty.
+    read_feeder : Callable[[str, str], Feeder], optional
+        Reads a feeder by name or path and load set; who checks many scenarios keeps what was read.
+    """
     scenario = read_tables(data, mistakes)
     if not scenario.name:
         scenario = msgspec.structs.replace(scenario, name=path.stem)
     check_times(scenario, mistakes)
     check_names(scenario, mistakes)
     scenario = _with_feeder_path(scenario, path.parent)
-    feeder = _feeder_of(scenario, mistakes)
+    feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
     if feeder:
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
-    mistakes.raise_if_any()
-    assert feeder is not None
     return scenario, feeder
 
 
@@ -115,7 +151,7 @@ def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
     return scenario
 
 
-def _feeder_of(scenario: Scenario, mistakes: Mistakes) -> Feeder | None:
+def _feeder_of(scenario: Scenario, mistakes: Mistakes, read_feeder: ReadFeeder) -> Feeder | None:
     """The feeder's tables, or None after noting what is wrong with them."""
     if mistakes.touch("plant.feeder"):
         return None

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 _TABLE = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
 _ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
-_KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."' ]+?)\s*=""")
+_KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
 
 
 class ScenarioError(ValueError):

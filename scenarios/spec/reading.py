@@ -7,7 +7,7 @@ import math
 import types
 import typing
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -17,6 +17,8 @@ from scenarios.spec.ranges import number_in, objection, range_of
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is read over, so that the copy can be run again."""
+
+T = TypeVar("T", bound=msgspec.Struct)
 
 _UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
 _KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", "mHz", "Hz")
@@ -28,10 +30,14 @@ def read_tables(data: Mapping[str, Any], mistakes: Mistakes) -> Scenario:
     A key with a mistake takes its default, so that the checks that follow find the other mistakes; the result is of
     use only when `mistakes` stays empty.
     """
-    data = {key: value for key, value in data.items() if key != AS_RUN}
-    scenario = _struct(Scenario, data, "", mistakes, {})
-    assert isinstance(scenario, Scenario)
-    return scenario
+    return read_struct(Scenario, {key: value for key, value in data.items() if key != AS_RUN}, mistakes)
+
+
+def read_struct(cls: type[T], data: Mapping[str, Any], mistakes: Mistakes) -> T:
+    """Build any file's top table in the same manner; a `dict[str, Any]` in it is left as it is written."""
+    read = _struct(cls, data, "", mistakes, {})
+    assert isinstance(read, cls)
+    return read
 
 
 def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[str, Any]) -> Any:
@@ -76,7 +82,7 @@ def _value(
             return tuple(_struct(inner[0], item, f"{path}[{i}]", mistakes, bases) for i, item in enumerate(raw))
         mistakes.add(path, f"must be written as [[{path}]], got {_shown(raw)}")
         return ()
-    if typing.get_origin(kind) is dict:
+    if typing.get_origin(kind) is dict and isinstance(inner[1], type) and issubclass(inner[1], msgspec.Struct):
         if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
             return {name: _struct(inner[1], item, f"{path}.{name}", mistakes, bases) for name, item in raw.items()}
         mistakes.add(path, f"must be written as tables [{path}.NAME], got {_shown(raw)}")
@@ -105,7 +111,8 @@ def _unknown_key(key: str, cls: type, known: list[str]) -> str:
                 return f"unknown key; write {stem}_{right}, {word}"
         if stem in known and stem != key:
             return f"unknown key; write {stem}"
-    for where, table in _tables().items():
+    tables = _tables()
+    for where, table in tables.items() if cls in tables.values() else ():
         if table is not cls and any(key == key_of(table, field) for field in msgspec.structs.fields(table)):
             return f"unknown key here; it belongs {where}"
     return f"unknown key; {suggestion(key, known, 'keys')}"
@@ -155,8 +162,12 @@ def _named(kind: Any) -> str:
         return "a text in quotes"
     if typing.get_origin(kind) is typing.Literal:
         return "one of " + ", ".join(_shown(option) for option in typing.get_args(kind))
+    if typing.get_origin(kind) is dict:
+        return "a table"
     if typing.get_origin(kind) is tuple:
         inner = typing.get_args(kind)[0]
+        if inner in (int, float):
+            return "a list of numbers"
         return 'a list of pairs such as [["inv1", "inv4"]]' if typing.get_origin(inner) else 'a list such as ["13-152"]'
     return getattr(kind, "__name__", str(kind))
 
