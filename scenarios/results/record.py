@@ -52,40 +52,23 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
     return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
 
 
-class Recorder:
-    """Takes the telemetry of one case and writes it down as it comes.
+class Tape:
+    """Takes the telemetry of one case as it comes, and keeps the hash of the bytes of its history.csv.
 
     Call it with every `Telemetry`, then `finish()`. Floats are written as the shortest text that reads back to the
     same number, and lines end in a line feed on every system, so equal runs give equal bytes.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the case; it is made.
     """
 
-    def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True)
-        self._folder = folder
-        self._file = (folder / PARTIAL).open("wb")
+    def __init__(self) -> None:
         self._hash = hashlib.sha256()
         self._inverters: tuple[str, ...] = ()
-        self._finished = False
         self.rows: list[tuple[float, ...]] = []
         self.events: list[PlantEvent] = []
         self.reproducible = True
         """False once something unscripted, as a dead agent, has entered the run."""
 
-    def __enter__(self) -> Recorder:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def __call__(self, telemetry: Telemetry) -> None:
-        """Write the rows of one telemetry message."""
+        """Take the rows of one telemetry message."""
         if not self._inverters:
             self._inverters = telemetry.inverters
             self._write(",".join(header(telemetry.inverters)) + "\n")
@@ -98,7 +81,7 @@ class Recorder:
         self.reproducible = self.reproducible and telemetry.reproducible
 
     def finish(self, end: float, record_step: float) -> Recorded:
-        """Check that the whole run is there, and give the files their names.
+        """Check that the whole run is there.
 
         Parameters
         ----------
@@ -110,18 +93,14 @@ class Recorder:
         Raises
         ------
         RecordError
-            If rows are missing; `history.partial.csv` then holds what came.
+            If rows are missing.
         """
-        self._file.close()
         expected = round(end / record_step) + 1
         if len(self.rows) != expected:
             last = f"the last one is of {self.rows[-1][0]:g} s" if self.rows else "none came"
             raise RecordError(
                 f"history has {len(self.rows)} rows, but {end:g} s in steps of {record_step:g} s are {expected}; {last}"
             )
-        self._write_events()
-        (self._folder / PARTIAL).rename(self._folder / "history.csv")
-        self._finished = True
         return Recorded(
             inverters=self._inverters,
             rows=self.rows,
@@ -130,16 +109,55 @@ class Recorder:
             reproducible=self.reproducible,
         )
 
+    def _write(self, text: str) -> bytes:
+        bytes_ = text.encode("ascii")
+        self._hash.update(bytes_)
+        return bytes_
+
+
+class Recorder(Tape):
+    """A tape that writes down what it takes: history.csv and events.csv.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the case; it is made.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        folder.mkdir(parents=True)
+        self._folder = folder
+        self._file = (folder / PARTIAL).open("wb")
+        self._finished = False
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def finish(self, end: float, record_step: float) -> Recorded:
+        """Check that the whole run is there, and give the files their names; if not, they keep the partial one."""
+        self._file.close()
+        recorded = super().finish(end, record_step)
+        self._write_events()
+        (self._folder / PARTIAL).rename(self._folder / "history.csv")
+        self._finished = True
+        return recorded
+
     def close(self) -> None:
         """End the record. What came of a case that was not finished stays, under the partial name."""
         if not self._finished:
             self._file.close()
             self._write_events()
 
-    def _write(self, text: str) -> None:
-        bytes_ = text.encode("ascii")
-        self._hash.update(bytes_)
+    def _write(self, text: str) -> bytes:
+        bytes_ = super()._write(text)
         self._file.write(bytes_)
+        return bytes_
 
     def _write_events(self) -> None:
         partial = self._folder / "events.partial.csv"
