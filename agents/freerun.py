@@ -26,6 +26,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import AgentConfig
+from agents.hearing import PATIENCE, Hearing
 from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import RejectedError, Rejects, decode, encode
 from wire.keys import Keys
@@ -37,15 +38,8 @@ Phase = Literal["seeking", "waiting", "running"]
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
 
-ASTRAY = 3.5
-"""Time (s, wall) without a measurement, though the plant is there and has sent some before, after which the session is
-opened anew. Longer than Zenoh's lease, after which the plant has forgotten the old one.
-
-After a cut that heals just as the lease runs out, Zenoh can add the new link to the transport of which the other side
-has closed its end. The two then disagree on what the numbers of keys mean, and messages go astray for good."""
-
-CROSSED = 10
-"""Messages under another's key after which the same is done, without waiting, whether or not the plant is seen."""
+SILENT = 1.0
+"""Time (s, wall) without a state of a neighbour that the plant hears, after which it counts as silent."""
 
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
@@ -60,9 +54,13 @@ class FreeAgent:
         Who it is and the run's rule.
     instance : str
         Which process this is, unique in the run; part of the agent's token.
+    patience : float, optional
+        Longest silence (s, wall) of somebody who should be heard, before another session is asked for.
+    again : bool, optional
+        Whether this goes on after a session that had gone astray.
     """
 
-    def __init__(self, config: AgentConfig, instance: str) -> None:
+    def __init__(self, config: AgentConfig, instance: str, *, patience: float = PATIENCE, again: bool = False) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
         self.keys = Keys(config.run)
@@ -72,7 +70,7 @@ class FreeAgent:
         self.failed = ""
         """Why this agent could never take part; empty unless so."""
         self.phase: Phase = "seeking"
-        self._crossed = 0
+        self._hearing = Hearing(patience)
         self.astray = False
         """Whether it closes only to begin again with a new session."""
         self.plant_seen = False
@@ -89,8 +87,7 @@ class FreeAgent:
             self.keys.measurement(config.name): (PLANT, self._on_measurement),
         }
         self._plant_there = False
-        self._ran = False
-        self._waiting_since: float | None = None
+        self._ran = again
         self._plant_incarnation = 0
         self._measurement: Measurement | None = None
         self._measured_at = 0.0
@@ -192,15 +189,35 @@ class FreeAgent:
             self._publish_status(now)
 
     def _note_astray(self, now: float) -> None:
-        if self.phase == "running":
-            self._ran = True
-        if self.phase != "waiting" or not self._ran:
-            self._waiting_since = None
-        elif self._waiting_since is None:
-            self._waiting_since = now
-        elif now - self._waiting_since >= ASTRAY:
-            self.astray = True
-            self._say(f"the plant is there, but nothing has come for {ASTRAY:g} s; opens a new session")
+        """Ask for a new session if this one has not brought what it should, or not taken it, for too long."""
+        lost = self._hearing.lost(self._unheard(now), now)
+        if not lost:
+            return
+        what = {
+            PLANT: "the plant is there, but nothing comes from it",
+            self._name: "the plant is heard, but does not hear this agent",
+        }
+        self._go_astray(what.get(lost, f"the plant hears {lost}, but nothing comes from it here"))
+
+    def _unheard(self, now: float) -> tuple[str, ...]:
+        """Who should be heard and is not: the plant, a neighbour that the plant hears, or oneself, by the plant."""
+        if self.phase == "waiting" and self._ran:
+            return (PLANT,)
+        if self.phase != "running" or self._measurement is None:
+            return ()
+        self._ran = True
+        roster = self._measurement.roster
+        mute = () if self._name in roster else (self._name,)
+        return *mute, *(name for name in roster if name != self._name and self._is_silent(name, now))
+
+    def _is_silent(self, name: str, now: float) -> bool:
+        if name not in self._met:
+            return True
+        return name in self._neighbours and (name not in self._heard or now - self._heard[name][1] > SILENT)
+
+    def _go_astray(self, why: str) -> None:
+        self.astray = True
+        self._say(f"{why}; opens a new session")
 
     def leave(self, reason: str) -> None:
         """Leave properly: have the own inverter taken off the network, then close."""
@@ -290,10 +307,8 @@ class FreeAgent:
 
     def _misled(self, expected: str, sender: str) -> None:
         """Note a message that came under another's key; many of them prove that key numbers are confused."""
-        self._crossed += 1
-        if self._crossed == CROSSED and self._ran and not self.astray:
-            self.astray = True
-            self._say(f"messages of {sender} come under the key of {expected}; opens a new session")
+        if self._hearing.crossed() and self._ran and not self.astray:
+            self._go_astray(f"messages of {sender} come under the key of {expected}")
 
     def _on_control(self, message: AnyMessage, now: float) -> None:
         if not isinstance(message, Stop):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from time import time_ns
+from time import monotonic, time_ns
 
 from msgspec.structs import replace
 
 from agents.config import AgentConfig
 from agents.freerun import FreeAgent
+from agents.hearing import PATIENCE, patience_after
 from agents.lockstep import AgentSide
 from wire.drive import StoppedError, drive, perform
 from wire.keys import check_name
@@ -42,9 +43,12 @@ def run_agent(config: AgentConfig) -> str:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
-    side = _take_part(config, log)
+    began, patience = monotonic(), PATIENCE
+    side = _take_part(config, log, patience)
     while isinstance(side, FreeAgent) and side.astray:
-        side = _take_part(config, log)
+        patience = patience_after(patience, monotonic() - began)
+        began = monotonic()
+        side = _take_part(config, log, patience, again=True)
     if side.rejects.counts:
         log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
     if not side.failed:
@@ -58,15 +62,19 @@ def run_agent(config: AgentConfig) -> str:
     return failed
 
 
-def _take_part(config: AgentConfig, log: logging.Logger) -> FreeAgent | AgentSide:
-    """Take part with one session; what decided, when it is over."""
+def _take_part(
+    config: AgentConfig, log: logging.Logger, patience: float, *, again: bool = False
+) -> FreeAgent | AgentSide:
+    """Take part with one session; what decided, when it is over. The patience (s, wall) is of wall-clock time."""
     wall = config.clock == "wall"
     if wall:  # an agent that is started again is told from its ghost by its later start
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
     session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
     try:
         try:
-            side = FreeAgent(config, session.id) if wall else AgentSide(config, session.id)
+            side = (
+                FreeAgent(config, session.id, patience=patience, again=again) if wall else AgentSide(config, session.id)
+            )
         except ValueError as error:
             raise ConfigurationError(str(error)) from None
         session.answer(*side.nameplate)

@@ -42,6 +42,9 @@ CLOSING = 2.0
 LEAD = 0.25
 """Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
 
+HEARD = 1.0
+"""Time (s, wall) after its last state for which an agent is told to the others as one that is heard."""
+
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
@@ -87,6 +90,8 @@ class FreePlant:
         self._states: dict[str, State] = {}
         self._last: dict[str, int] = {}
         """Number of the last state of each agent."""
+        self._heard: dict[str, float] = {}
+        """When the last state of each agent came."""
         self._step_due = False
         self._deadline = 0.0
         self._complained = False
@@ -221,7 +226,7 @@ class FreePlant:
 
     def _drop(self, name: str) -> None:
         del self.instances[name]
-        for known in (self.plates, self._states, self._last):
+        for known in (self.plates, self._states, self._last, self._heard):
             known.pop(name, None)
 
     # ---------------------------------------------------------------- messages
@@ -235,7 +240,7 @@ class FreePlant:
                 self._check_sender(self._state_keys[key], message)
                 if message.seq <= self._last.get(name, -1):
                     raise RejectedError("stale", f"State({message.seq}) of {name} after {self._last[name]}")
-                self._last[name] = message.seq
+                self._last[name], self._heard[name] = message.seq, now
                 self._states[name] = message
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
@@ -330,7 +335,7 @@ class FreePlant:
             self._keep_pace(now)
             if self.phase == "running":
                 self._move()
-                self._measure()
+                self._measure(now)
 
     def _move(self) -> None:
         """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""
@@ -360,11 +365,12 @@ class FreePlant:
         if self.config.strict:
             self.abort(f"plant: {text}", now)
 
-    def _measure(self) -> None:
-        """Send every agent that is present its measurement."""
-        readings, t = self.plant.measure(), self.t
+    def _measure(self, now: float) -> None:
+        """Send every agent that is present its measurement, and who is heard."""
+        readings, t, tick, incarnation = self.plant.measure(), self.t, self.tick, self.config.incarnation
+        roster = tuple(name for name in self.plant.inverters if now - self._heard.get(name, -HEARD) < HEARD)
         for name in self.plates:
-            message = measurement_of(name, readings[name], incarnation=self.config.incarnation, tick=self.tick, t=t)
+            message = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
             self._actions.append(Publish(self.keys.measurement(name), encode(message)))
         self._step_due = True
 

@@ -56,7 +56,7 @@ def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] =
     wall = config.clock == "wall"
     if wall:  # a plant that is started again is told from its ghost by its later start
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
-    session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock)
+    session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
     try:
         tell(LISTENING)
         try:

@@ -81,7 +81,7 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     island: Name
     """Name of the island: "grid", or the first inverter in it."""
     roster: tuple[Name, ...]
-    """Agents of this tick, in the order of the inverters. Empty in wall-clock time."""
+    """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 
 
 class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -51,6 +52,9 @@ _PROFILES: dict[Clock, _Profile] = {
     "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, may_drop=True),
 }
 
+FIRST_LINK = 0.5
+"""Longest wait (s) for the first link, to see whether a router or a peer answers; on one host it comes after 20 ms."""
+
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which a query is forgotten; deadlines are kept by who asked."""
 
@@ -74,6 +78,10 @@ class Session:
         Whether to be told of the other peers by those connected to, and to connect to them in turn.
     clock : {"simulated", "wall"}, optional
         Which kind of time the run has.
+    rendezvous : bool, optional
+        Whether others are told to connect to this one. In wall-clock time whoever is not becomes the client of a router
+        that answers: between two peers that know each other both directly and through a router, Zenoh changes the way
+        of their declarations while these are on it, and loses some.
 
     Raises
     ------
@@ -89,6 +97,7 @@ class Session:
         connect: tuple[str, ...] = (),
         gossip: bool = True,
         clock: Clock = "simulated",
+        rendezvous: bool = False,
     ) -> None:
         os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
         try:
@@ -105,12 +114,38 @@ class Session:
         self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
-        try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_config(listen, connect, gossip, profile))))
-        except zenoh.ZError as error:
-            raise SessionError(_explain(who, listen, str(error))) from None
+        config = _config(listen, connect, gossip, profile)
+        self._session = self._open(who, config)
+        self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
+        if self._changeable and self._meets_router():
+            self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
+            self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
+            self._changeable = False
         self.id = str(self._session.zid())
         """Unique id of this session: the instance of who holds it."""
+
+    def _open(self, who: str, config: dict[str, Any]) -> zenoh.Session:
+        try:
+            return self._zenoh.open(self._zenoh.Config.from_json5(json.dumps(config)))
+        except self._zenoh.ZError as error:
+            raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
+
+    def _meets_router(self) -> bool:
+        """Wait for the first link; whether it leads to a router."""
+        linked = threading.Event()
+
+        def on_event(event: zenoh.TransportEvent) -> None:
+            linked.set()
+
+        listener = self._session.info.declare_transport_events_listener(on_event, history=True)
+        linked.wait(FIRST_LINK)
+        listener.undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
+        return bool(self._session.info.routers_zid())
+
+    @property
+    def misplaced(self) -> bool:
+        """Whether a router has answered too late for this session to be its client: another one should be opened."""
+        return self._changeable and bool(self._session.info.routers_zid())
 
     def subscribe(self, key: str) -> None:
         """Have messages on a key, without wildcards, put into the inbox."""

@@ -8,11 +8,12 @@ from typing import Literal
 import msgspec
 
 from agents.config import AgentConfig
+from agents.hearing import LONGEST, PATIENCE, Hearing
 from scenarios.live.show.look import Look, in_order
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
 from wire.codec import RejectedError, decode, encode
-from wire.messages import AgentStatus, Answer, Command, Telemetry
+from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
 
 Verb = Literal["open", "close", "stop", "down", "status"]
 
@@ -27,6 +28,9 @@ AGAIN = 0.1
 
 LOOK = 1.2
 """Longest wait (s) for one look: two periods of an agent's status, and a bit."""
+
+SILENT = 1.0
+"""Time (s) without a word after which somebody counts as silent: two periods of an agent's status."""
 
 LEAVING = 10.0
 """Longest wait (s) for those who were told to leave."""
@@ -123,6 +127,10 @@ class Watching:
         self._visit, self._picture = visit, picture
         self._subscribed: set[str] = set()
         self._plant = visit.plant
+        self._told: dict[str, float] = {}
+        """When who last told anything."""
+        self._patience = PATIENCE
+        self._hearing = Hearing(PATIENCE)
         visit.listen(visit.keys.telemetry)
         visit.fetch(visit.keys.config("*"))
 
@@ -138,16 +146,27 @@ class Watching:
             if isinstance(message, Telemetry):
                 self._picture.telemetry(message, monotonic())
                 told.append(message)
+                self._told[PLANT] = monotonic()
             elif isinstance(message, AgentStatus):
                 self._picture.status(message, monotonic())
                 told.append(message)
+                self._told[message.sender] = monotonic()
         if self._visit.plant and not self._plant:  # it was restarted, perhaps with other inverters
             self._visit.fetch(self._visit.keys.config("*"))
         self._plant = self._visit.plant
         for name in {*self._picture.inverters, *self._visit.agents} - self._subscribed:
             self._subscribed.add(name)
             self._visit.listen(self._visit.keys.status(name))
+        self._renew(monotonic())
         return told
+
+    def _renew(self, now: float) -> None:
+        """Come again if somebody whose token is there has told nothing for too long: the session has gone astray."""
+        there = [*([PLANT] if self._visit.plant else []), *present(self._visit)]
+        if self._hearing.lost([name for name in there if now - self._told.get(name, 0.0) > SILENT], now):
+            self._patience = min(2.0 * self._patience, LONGEST)
+            self._hearing = Hearing(self._patience)
+            self._visit.renew()
 
 
 def _plate(payload: bytes) -> AgentConfig | None:

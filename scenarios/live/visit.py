@@ -36,17 +36,28 @@ class Visit:
 
     def __init__(self, where: Place, *, meet_agents: bool = False) -> None:
         self.where, self.keys = where, Keys(where.run)
-        listen = return_path(where.connect) if meet_agents else ()
-        self._session = Session(VISITOR, listen=listen, connect=where.connect, clock="wall")
+        self._listen = return_path(where.connect) if meet_agents else ()
+        self._heard: list[str] = []
+        """Keys that are listened to."""
+        self._runs: set[str] = set()
+        self._open()
+
+    def _open(self) -> None:
         self.plant = False
         """Whether the plant's token is there."""
         self.agents: dict[str, set[str]] = {}
         """Tokens of agents: inverter -> its instances."""
-        self._runs: set[str] = set()
-        self._answers = self.keys.answer(self._session.id)
-        self._session.subscribe(self._answers)
+        self._runs.clear()
+        self._session = Session(VISITOR, listen=self._listen, connect=self.where.connect, clock="wall")
+        for key in (self.keys.answer(self._session.id), *self._heard):
+            self._session.subscribe(key)
         self._session.watch(self.keys.any_alive)
         self._session.watch(ANY_ALIVE_PLANT)
+
+    def renew(self) -> None:
+        """Come again with a new session, as the old one does not hear what it should."""
+        self._session.close()
+        self._open()
 
     def __enter__(self) -> Visit:
         return self
@@ -63,6 +74,7 @@ class Visit:
 
     def listen(self, key: str) -> None:
         """Have messages on a key come in."""
+        self._heard.append(key)
         self._session.subscribe(key)
 
     def fetch(self, key: str) -> None:
@@ -124,6 +136,8 @@ class Visit:
             waited = monotonic() - began
             if waited >= wait:
                 raise NobodyError(self._nobody(wait))
+            if self._session.misplaced:
+                self.renew()
             if tell is not None:
                 tell(f"no plant yet of {self.where}; {waited:.0f} of {wait:g} s waited")
 

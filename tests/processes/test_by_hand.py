@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
@@ -169,38 +168,6 @@ def test_two_runs_side_by_side_do_not_meet(desk: Desk, tmp_path: Path) -> None:
         assert re.search(r"\ninv1 .* inv2 ", there)
         assert mixed.end() == 2
         assert f"no plant of run lab at {endpoint} within 1 s (runs there: other)" in mixed.text
-
-
-@pytest.fixture
-def router() -> Iterator[str]:
-    """Endpoint of a Zenoh router, as on a site where plant and agents do not know each other's addresses."""
-    zenoh = pytest.importorskip("zenoh")
-    endpoint = free_endpoint()
-    config = {"mode": "router", "listen": {"endpoints": [endpoint]}, "scouting": {"multicast": {"enabled": False}}}
-    with zenoh.open(zenoh.Config.from_json5(json.dumps(config))):
-        yield endpoint
-
-
-@pytest.mark.site
-def test_plant_agents_and_commands_meet_at_a_router(tmp_path: Path, router: str) -> None:
-    """All know the router alone."""
-    (tmp_path / "calm.toml").write_text(CALM)
-    with Desk(tmp_path, "--run", "site", "--connect", router) as desk:
-        plant = desk.open("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0", "--wait", "0")
-        plant.expect("t = 0; speed")
-        for name in ("inv1", "inv2"):
-            desk.open("agent", name).expect(f"{name}: joins at t = ")
-        desk.open("watch").expect(r"inv1 .* inv2 ")
-        second, said = desk.type("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0")
-        code, _ = desk.type("stop", "inv2")
-
-        assert second == 2
-        assert f"--run: a plant of run site is there already, at {router}; end it" in said
-
-        assert code == 0
-        plant.expect("inv2 left; its inverter is off the network")
-        assert desk.type("down")[0] == 0
-        assert plant.end() == 0
 
 
 def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:

@@ -23,7 +23,6 @@ def hosts() -> Iterator[Hosts]:
         pytest.skip(f"network namespaces cannot be made here: {error}")
 
 
-@pytest.mark.site
 def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Path) -> None:
     """All nine share; without the third host six do, at 60 Hz; healed, nine again, without anybody's help."""
     (tmp_path / "calm.toml").write_text(CALM)

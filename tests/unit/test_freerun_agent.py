@@ -359,6 +359,43 @@ def test_messages_under_others_keys_prove_a_confused_session() -> None:
     assert lab.said[-1] == "inv1: messages of plant come under the key of inv2; opens a new session"
 
 
+@pytest.mark.parametrize(
+    ("roster", "heard", "why"),
+    [
+        (("inv1", "inv2", "inv3"), ("inv2",), "the plant hears inv3, but nothing comes from it here"),
+        (("inv1", "inv2", "inv7"), ("inv2", "inv3"), "the plant hears inv7, but nothing comes from it here"),
+        (("inv2", "inv3"), ("inv2", "inv3"), "the plant is heard, but does not hear this agent"),
+    ],
+)
+def test_whoever_hears_less_than_the_plant_opens_a_new_session(
+    roster: tuple[str, ...], heard: tuple[str, ...], why: str
+) -> None:
+    """The plant hears a neighbour, met or not, and the agent does not; or the plant does not hear the agent."""
+    lab = running("inv2", "inv3")
+    k = 0
+    while not lab.side.over and k < 400:
+        k += 1
+        lab.measure(k, roster=roster)
+        for name in heard:
+            lab.state(name, k, k * T_C)
+        lab.go(T_C)
+
+    assert lab.side.astray
+    assert lab.said[-1] == f"inv1: {why}; opens a new session"
+    assert 3.4 < k * T_C < 4.7
+
+
+def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_session() -> None:
+    """Who is frozen, dead or waiting is silent for everybody."""
+    lab = running("inv2", "inv3")
+    for k in range(1, 400):
+        lab.measure(k, roster=("inv1", "inv2"))
+        lab.state("inv2", k, k * T_C)
+        lab.go(T_C)
+
+    assert not lab.side.over
+
+
 def test_an_agent_without_a_plant_keeps_its_session() -> None:
     """What is not there cannot be found by another session either."""
     lab = Lab()

@@ -1,0 +1,63 @@
+"""Whether an agent hears whom it should, and is heard: what a session that has gone astray is known by. Pure.
+
+After a cut that heals just as Zenoh's lease runs out, Zenoh can add the new link to a transport of which the other side
+has closed its end: messages then go astray for good. And a link between two agents that ended while both kept theirs to
+the plant is not made again by anybody. Both are seen from outside only: the plant hears a neighbour that the agent does
+not, or does not hear the agent itself. A new session has a new id, for which nobody keeps a stale end of a link.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+PATIENCE = 3.5
+"""Time (s, wall) that somebody has not been heard who should be, after which the session is opened anew. Longer than
+Zenoh's lease, after which the others have forgotten the old one. Doubled with every new session, to `LONGEST`."""
+
+LONGEST = 60.0
+"""Longest patience (s, wall): a path that stays cut must not keep an agent busy with sessions."""
+
+CROSSED = 10
+"""Messages under another's key after which the same is done, without waiting, whether or not the plant is seen."""
+
+
+def patience_after(patience: float, lasted: float) -> float:
+    """Patience (s) of the next session, after one that lasted so long (s); both are wall time.
+
+    Examples
+    --------
+    >>> patience_after(3.5, 4.0), patience_after(56.0, 60.0), patience_after(7.0, 3600.0)
+    (7.0, 60.0, 3.5)
+    """
+    return PATIENCE if lasted > 2.0 * LONGEST else min(2.0 * patience, LONGEST)
+
+
+class Hearing:
+    """Whether the session brings what it should.
+
+    Parameters
+    ----------
+    patience : float
+        Longest silence (s, wall).
+
+    Examples
+    --------
+    >>> hearing = Hearing(3.5)
+    >>> [hearing.lost(names, now) for names, now in [(("inv2", "inv3"), 0.0), (("inv3",), 3.0), (("inv3",), 3.5)]]
+    ['', '', 'inv3']
+    """
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
+        self._since: dict[str, float] = {}
+        self._crossed = 0
+
+    def lost(self, silent: Iterable[str], now: float) -> str:
+        """Note who is silent now and should not be; the first of whom this has lasted too long, else nothing."""
+        self._since = {name: self._since.get(name, now) for name in silent}
+        return next((name for name, since in self._since.items() if now - since >= self._patience), "")
+
+    def crossed(self) -> bool:
+        """Note a message that came under another's key; whether that proves key numbers to be confused."""
+        self._crossed += 1
+        return self._crossed == CROSSED
