@@ -57,6 +57,11 @@ class Mistakes:
         """Whether a mistake was noted at one of these keys, which makes a check that relates them idle."""
         return any(path in self._paths for path in paths)
 
+    @property
+    def any(self) -> bool:
+        """Whether anything was noted."""
+        return bool(self._found)
+
     def raise_if_any(self) -> None:
         """Raise `ScenarioError` with all mistakes in the order of their lines."""
         if self._found:

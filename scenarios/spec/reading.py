@@ -63,6 +63,8 @@ def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[
             values[field.name] = bases[key]
         elif field.default is not msgspec.NODEFAULT:
             values[field.name] = field.default
+        elif field.default_factory is not msgspec.NODEFAULT:
+            values[field.name] = field.default_factory()
         else:
             mistakes.add(below, f"is missing; {_expected(field)}")
             values[field.name] = _placeholder(field.type)

@@ -1,0 +1,154 @@
+"""The axes of a sweep: each is a list of settings, and every combination of them is a sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, TypeGuard
+
+from scenarios.spec import suggestion
+from scenarios.spec.mistakes import Mistakes
+from scenarios.sweep.file.graphs import algebraic_connectivity, connected_graphs
+from scenarios.sweep.file.model import GraphAxis
+from scenarios.sweep.file.paths import flatten
+
+MOST_POINTS = 1_000_000
+"""Most values of one range: more are a slip, and would fill the memory before anybody could be told."""
+
+_RANGE = ("from", "to", "count", "spacing")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One point of an axis."""
+
+    shown: Mapping[str, Any]
+    """Columns of the table."""
+    put: Mapping[str, Any]
+    """Keys of the scenario, by path."""
+
+
+Axis = Sequence[Setting]
+
+
+def size(axes: Sequence[Axis]) -> int:
+    """How many samples there are."""
+    return math.prod(len(axis) for axis in axes)
+
+
+def samples(axes: Sequence[Axis]) -> Iterator[Setting]:
+    """Every combination, the last axis fastest."""
+    for settings in product(*axes):
+        shown: dict[str, Any] = {}
+        put: dict[str, Any] = {}
+        for setting in settings:
+            shown |= setting.shown
+            put |= setting.put
+        yield Setting(shown, put)
+
+
+def of_values(values: Mapping[str, Sequence[Any]]) -> Axis:
+    """Keys that go together, first values with first.
+
+    Examples
+    --------
+    >>> [dict(setting.put) for setting in of_values({"gains.k_p": [1, 2], "gains.k_q": [3, 4]})]
+    [{'gains.k_p': 1, 'gains.k_q': 3}, {'gains.k_p': 2, 'gains.k_q': 4}]
+    """
+    rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return [Setting(row, row) for row in rows]
+
+
+def of_graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Axis:
+    """Random connected graphs of the inverters, each put into every case as its listed links."""
+    n = len(inverters)
+    points = []
+    for links in axis.links:
+        for number, edges in enumerate(connected_graphs(n, links, axis.per_count, axis.seed)):
+            pairs = [[inverters[i], inverters[j]] for i, j in edges]
+            shown = {
+                "graph.links": links,
+                "graph.number": number,
+                "graph.lambda_2": algebraic_connectivity(n, edges),
+                "graph.edges": " ".join("-".join(pair) for pair in pairs),
+            }
+            put = {f"case.{case}.graph": "links" for case in cases} | {f"case.{case}.links": pairs for case in cases}
+            points.append(Setting(shown, put))
+    return points
+
+
+def values_of(table: Mapping[str, Any], where: str, mistakes: Mistakes) -> dict[str, list[Any]]:
+    """Values of each key of `[grid]` or `[zip]`, mistakes noted."""
+    found = {}
+    for path, value in flatten(table, _is_range):
+        at = f"{where}.{path}"
+        if isinstance(value, Mapping) and _is_range(value):
+            values = _spread(value, at, mistakes)
+        elif isinstance(value, list):
+            values = value
+            if not value:
+                mistakes.add(at, "has no value; list at least one")
+            elif any(repr(item) in map(repr, value[:i]) for i, item in enumerate(value)):
+                mistakes.add(at, "lists a value twice, which would be run twice; for more seeds write seeds = n")
+        else:
+            mistakes.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
+            values = []
+        found[path] = values
+    return found
+
+
+def check_zip(values: Mapping[str, Sequence[Any]], mistakes: Mistakes) -> None:
+    """Keys that go together have equally many values."""
+    counts = {path: len(items) for path, items in values.items()}
+    if len(set(counts.values())) > 1 and all(counts.values()):
+        listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
+        mistakes.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
+
+
+def check_graph(axis: GraphAxis, inverters: Sequence[str], mistakes: Mistakes) -> None:
+    """Each number of links can join the inverters, and is no more than all pairs."""
+    n = len(inverters)
+    low, high = n - 1, n * (n - 1) // 2
+    for i, links in enumerate(axis.links):
+        if not low <= links <= high:
+            why = "fewer cannot join them" if links < low else "there are no more pairs"
+            mistakes.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
+        elif links in axis.links[:i]:
+            mistakes.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
+    if not 1 <= axis.per_count <= 10_000:
+        mistakes.add("graph.per_count", f"must be from 1 to 10000 graphs, got {axis.per_count}")
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Whether a value of the file is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_range(value: Any) -> bool:
+    return isinstance(value, Mapping) and "from" in value
+
+
+def _spread(value: Mapping[str, Any], at: str, mistakes: Mistakes) -> list[float]:
+    """Values of a range, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
+    for key in value:
+        if key not in _RANGE:
+            mistakes.add(at, f'unknown key "{key}"; {suggestion(key, _RANGE, "keys of a range")}')
+    low, high, count = value.get("from"), value.get("to"), value.get("count")
+    spacing = value.get("spacing", "lin")
+    if not (is_number(low) and is_number(high)):
+        mistakes.add(at, f"a range needs two numbers, got from = {low!r}, to = {high!r}")
+    elif not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST_POINTS:
+        mistakes.add(at, f"a range needs count, a whole number from 2 to {MOST_POINTS}, got {count!r}")
+    elif spacing not in ("lin", "log"):
+        mistakes.add(at, f"there is no spacing {spacing!r}; {suggestion(str(spacing), ('lin', 'log'), 'spacings')}")
+    elif low == high:
+        mistakes.add(at, f"a range goes from one number to another, got {low:g} twice")
+    elif spacing == "log" and min(low, high) <= 0:
+        mistakes.add(at, f"spacing log needs two numbers above 0, got {low:g} and {high:g}; or use spacing lin")
+    else:
+        fractions = [i / (count - 1) for i in range(count)]
+        raw = (low * (high / low) ** x if spacing == "log" else low + (high - low) * x for x in fractions)
+        return [float(f"{x:.12g}") for x in raw]
+    return []

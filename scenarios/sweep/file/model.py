@@ -1,0 +1,58 @@
+"""A sweep file as types: what may be written, and what holds when nothing is written."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+
+class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[random]`: keys that are drawn together, once per sample."""
+
+    samples: int = 0
+    """How many samples are drawn."""
+    seed: int = 1
+    """Seed of the draws; it has nothing to do with the seed of the scenario."""
+    method: Literal["latin-hypercube", "plain"] = "latin-hypercube"
+    """How: "latin-hypercube" spreads each key's samples evenly over its law, "plain" draws them independently."""
+    keys: dict[str, Any] = {}
+    """Table `[random.keys]`: a law per key: {uniform = [low, high]}, {loguniform = [low, high]}, {choice = [...]}."""
+
+
+class GraphAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Table `[graph]`: random connected communication graphs of all inverters, for every case of the sweep."""
+
+    links: tuple[int, ...] = ()
+    """Numbers of links, e.g. [8, 12, 36]."""
+    per_count: int = 10
+    """Different graphs for each number of links; fewer where there are no more."""
+    seed: int = 1
+    """Seed of the graphs. A graph depends on it, its number of links and its own number, and on nothing else here."""
+
+
+class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The keys outside any table come first in the file."""
+
+    name: str = ""
+    """Name of the results' folder; without it, that of the file."""
+    title: str = ""
+    """One line on what is studied."""
+    scenario: str
+    """What is varied: a scenario of the catalogue, or the path of a file, seen from this one."""
+    cases: tuple[str, ...] = ()
+    """Cases that are run for every sample; all when left out."""
+    seeds: int = 1
+    """How many seeds every point is run with: the scenario's, and those that follow it."""
+    max_runs: int = 20_000
+    """A sweep with more runs than this is refused as a slip; raise it when it is meant."""
+    set: dict[str, Any] = {}
+    """Table `[set]`: keys of the scenario that are other than there, the same in every run."""
+    grid: dict[str, Any] = {}
+    """Table `[grid]`: every combination of these keys' values: [...] or {from, to, count, spacing = "lin" | "log"}."""
+    zip: dict[str, Any] = {}
+    """Table `[zip]`: keys that go together, first values with first, so all of one length."""
+    random: RandomAxis = RandomAxis()
+    """Table `[random]`."""
+    graph: GraphAxis = GraphAxis()
+    """Table `[graph]`."""

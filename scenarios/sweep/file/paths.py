@@ -1,0 +1,101 @@
+"""Keys of a scenario file by their dotted path, as `gains.k_p` or `link[0].delay`, in its tree of tables."""
+
+from __future__ import annotations
+
+import re
+import typing
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import msgspec
+
+from scenarios.spec.mistakes import suggestion
+from scenarios.spec.model import Scenario
+
+_STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"
+_PATH = re.compile(rf"{_STEP}(?:\.{_STEP})*")
+
+Tree = dict[str, Any]
+
+
+class PathError(ValueError):
+    """A path that leads nowhere in this scenario."""
+
+
+def steps(path: str) -> list[str | int]:
+    """Steps of a path through tables (by name) and lists (by number).
+
+    Raises
+    ------
+    PathError
+        If it is no path.
+
+    Examples
+    --------
+    >>> steps("event[0].t_s")
+    ['event', 0, 't_s']
+    """
+    if not _PATH.fullmatch(path):
+        raise PathError("is no path of a key; write it as gains.k_p, case.IV.graph or event[0].t_s")
+    return [int(part) if part.isdigit() and bracket else part for bracket, part in _parts(path)]
+
+
+def put(tree: Tree, path: str, value: Any) -> None:
+    """Set a key in the tables of a scenario, making a table that is left to its defaults.
+
+    Raises
+    ------
+    PathError
+        If a list has no such entry, or a table that the user names (a case) is not there.
+    """
+    node: Any = tree
+    way = steps(path)
+    for depth, (step, following) in enumerate(zip(way, [*way[1:], None], strict=True)):
+        here = _written(way[: depth + 1])
+        if isinstance(step, int):
+            if not isinstance(node, list) or step >= len(node):
+                count = len(node) if isinstance(node, list) else 0
+                raise PathError(f"there is no {here}; the scenario writes {count} of them, counted from 0")
+        elif not isinstance(node, dict):
+            raise PathError(f"{_written(way[:depth])} is no table, so that it has no key {step}")
+        elif depth == 1 and way[0] in _named_tables() and step not in node:
+            raise PathError(f"there is no {here}; {suggestion(step, node, f'tables of {way[0]}')}")
+        if following is None:
+            node[step] = value
+        else:
+            node = node[step] if isinstance(step, int) else node.setdefault(step, [] if _numbered(following) else {})
+
+
+def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys with their values, whether the path was written in quotes or is nested tables of TOML.
+
+    Examples
+    --------
+    >>> list(flatten({"gains.k_p": [1], "time": {"T_c_s": [2]}}, lambda value: isinstance(value, list)))
+    [('gains.k_p', [1]), ('time.T_c_s', [2])]
+    """
+    for key, value in table.items():
+        below = f"{path}.{key}" if path else key
+        if isinstance(value, Mapping) and value and not is_leaf(value):
+            yield from flatten(value, is_leaf, below)
+        else:
+            yield below, value
+
+
+def _parts(path: str) -> Iterator[tuple[bool, str]]:
+    for match in re.finditer(r"\[(\d+)\]|([^.\[\]]+)", path):
+        yield match[1] is not None, match[1] or match[2]
+
+
+def _written(way: list[str | int]) -> str:
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in way)
+    return text.removeprefix(".")
+
+
+def _numbered(step: str | int | None) -> bool:
+    return isinstance(step, int)
+
+
+def _named_tables() -> set[str]:
+    """Keys of the scenario below which the user names the tables himself; a new name there is a slip."""
+    return {field.encode_name for field in msgspec.structs.fields(Scenario) if typing.get_origin(field.type) is dict}

@@ -1,0 +1,77 @@
+"""What a sweep comes to: every run of it, checked, in order."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from plant.equipment import Feeder
+from scenarios.spec import Scenario
+
+SECONDS_PER_SECOND = 0.05
+"""Roughly what a second of the nine-inverter feeder costs (s on one core, bench/sweep.py); only for saying "2 h"."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One case of one sample."""
+
+    sample: int
+    """Number of the sample, from 0, in the order of the axes."""
+    case: str
+    """Case that is run."""
+    scenario: Scenario
+    """The sample's scenario, checked."""
+    shown: Mapping[str, Any]
+    """The sample's value of each parameter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """A checked sweep."""
+
+    name: str
+    """Name of the results' folder."""
+    title: str
+    """One line on what is studied."""
+    text: str
+    """The sweep file."""
+    base: Scenario
+    """The scenario as it is without the sweep."""
+    runs: Sequence[Run]
+    """All runs: sample by sample, case by case."""
+    fingerprint: str
+    """SHA-256 of everything that decides the runs: scenarios, feeders, order. Two sweeps with one are the same."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Columns of what is varied, in the order of the file."""
+        return tuple(self.runs[0].shown)
+
+
+def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
+    """Hash of what decides the runs. Comments and layout of the files do not; the feeders' tables do."""
+    whole = hashlib.sha256()
+    for run in runs:
+        whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
+    for text in sorted(map(repr, feeders)):
+        whole.update(text.encode())
+    return whole.hexdigest()
+
+
+def duration(seconds: float) -> str:
+    """A length of time in words.
+
+    Examples
+    --------
+    >>> duration(45), duration(600), duration(20_000), duration(400_000)
+    ('45 s', '10 min', '5.6 h', '4.6 days')
+    """
+    for bound, unit, name in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h")):
+        if seconds < bound:
+            return f"{seconds / unit:.2g} {name}"
+    return f"{seconds / 86_400:.2g} days"
