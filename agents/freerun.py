@@ -154,7 +154,6 @@ class FreeAgent:
         self._status = Timer(STATUS_PERIOD, now)
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
-        self._say(f"seeks the plant of run {self._config.run}")
 
     def take_actions(self) -> list[Action | Say]:
         """What is to be done now, in this order."""

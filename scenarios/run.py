@@ -124,7 +124,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         )
     plates = Plates.of(inverters_of(scenario, request.feeder))
     histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
-    events = [(event.label, event.t_s) for event in scenario.events]
+    events = as_they_came(scenario, recorded[list(recorded)[-1]].events)  # in wall-clock time each case has its own
     results = {
         case: {
             window.label: metrics.measure(history, plates, window, F_NOM)
