@@ -248,9 +248,12 @@ def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
 
 
 def _as_run(request: Request) -> dict[str, Any]:
-    return {"driver": request.driver, "python": platform.python_version()} | {
-        name: _version(name) for name in _VERSIONS
-    }
+    return {"driver": request.driver} | versions()
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that has a part in the numbers of a run."""
+    return {"python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
 
 
 def _version(package: str) -> str:
