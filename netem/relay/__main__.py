@@ -1,0 +1,78 @@
+"""``python -m netem.relay tcp/127.0.0.1:7500 tcp/127.0.0.1:7447 --delay 0.1``: a relay by hand."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from types import FrameType
+
+from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
+from netem.relay.faults import UNITS
+from netem.relay.words import HELP
+
+OK, USAGE = 0, 2
+
+
+class _EndError(Exception):
+    """Somebody wants it to end."""
+
+
+def main(arguments: list[str]) -> int:
+    """Relay until the word "end", Ctrl-C or SIGTERM; exit status 2 if it cannot be."""
+    options = _parser().parse_args(arguments)
+    given = {name: getattr(options, name) for name in UNITS}
+    returning = {name: value for name in UNITS if (value := getattr(options, f"back_{name}")) is not None}
+    try:
+        there, back = Faults(**given), Faults(**{**given, **returning})
+        relay = Relay(options.listen, options.connect, there=there, back=back, seed=options.seed)
+    except (EndpointError, FaultsError, RelayError) as error:
+        sys.stderr.write(f"{error}\n")
+        return USAGE
+    signal.signal(signal.SIGTERM, _end)
+    try:
+        with relay:
+            print(relay.do("show"), flush=True)
+            for line in sys.stdin:
+                print(_answer(relay, line), flush=True)
+                if line.strip() == "end":
+                    return OK
+            while True:  # no more lines, as in the background: go on until told to end
+                signal.pause()
+    except (KeyboardInterrupt, _EndError):
+        return OK
+
+
+def _answer(relay: Relay, line: str) -> str:
+    try:
+        return relay.do(line)
+    except (WordError, FaultsError) as error:
+        return "refused: " + "; ".join(str(error).splitlines())
+
+
+def _end(signum: int, frame: FrameType | None) -> None:
+    raise _EndError
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m netem.relay",
+        description="Relay Zenoh's traffic between two endpoints, and hurt it on the way.",
+        epilog="Lines on standard input change it while it runs; each is answered by one line:\n\n" + HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("listen", help="where peers connect to, e.g. tcp/127.0.0.1:7500; port 0 for any free one")
+    parser.add_argument("connect", help="where it goes on to, e.g. tcp/127.0.0.1:7447")
+    blank = Faults()
+    for name, unit in UNITS.items():
+        default = getattr(blank, name)
+        metavar = unit.strip() or "P"
+        both = parser.add_argument(f"--{name}", type=float, default=default, metavar=metavar)
+        both.help = f"both ways (default {default:g})"
+        parser.add_argument(f"--back-{name}", type=float, metavar=metavar, help="only from the target back")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import pytest
+from scipy.stats import binom, kstest
+
+from netem.relay.bottleneck import NEVER
+from netem.relay.datagrams import Datagrams
+from netem.relay.direction import Direction
+from netem.relay.draws import Draws
+from netem.relay.faults import Faults, FaultsError
+from netem.relay.words import WordError, read
+
+N = 4000
+SURE = 1e-4
+"""Chance that a sound link would fail a test, were the seed not fixed."""
+
+
+def carried(faults: Faults, count: int = N, gap: float = 1.0, *, size: int = 4, seed: int = 1) -> dict[int, float]:
+    """Delay of each datagram that arrived, in the order of arrival."""
+    line, delays = Datagrams(Direction("there", faults), Draws(seed, "1/there")), {}
+
+    def take(now: float) -> None:
+        for data in line.take(now):
+            number = int.from_bytes(data[:4], "big")
+            delays[number] = now - number * gap
+
+    for number in range(count):
+        while line.until <= number * gap:
+            take(line.until)
+        line.send(number.to_bytes(4, "big") + bytes(size - 4), number * gap)
+    while line.until < NEVER:
+        take(line.until)
+    return delays
+
+
+def test_datagrams_are_lost_as_often_as_told() -> None:
+    """The number of lost datagrams is one that the binomial law gives."""
+    lost = N - len(carried(Faults(loss=0.02)))
+
+    assert binom.ppf(SURE / 2, N, 0.02) <= lost <= binom.isf(SURE / 2, N, 0.02)
+
+
+def test_delays_are_uniform_about_the_mean() -> None:
+    """Delays follow the uniform law of delay and jitter (Kolmogorov-Smirnov)."""
+    delays = list(carried(Faults(delay=0.3, jitter=0.1)).values())
+
+    assert kstest(delays, "uniform", args=(0.2, 0.2)).pvalue > SURE
+
+
+def test_the_fate_of_a_datagram_depends_on_its_number_alone() -> None:
+    """Other times and sizes, the same datagrams lost; another seed, others."""
+    faults = Faults(delay=0.1, jitter=0.1, loss=0.2)
+    first, slower = carried(faults, 300), carried(faults, 300, 0.01, size=900)
+
+    assert sorted(first) == sorted(slower)
+    assert sorted(first) != sorted(carried(faults, 300, seed=2))
+
+
+def test_reordered_datagrams_skip_the_delay() -> None:
+    """As many as told arrive at once, before those sent earlier."""
+    delays = carried(Faults(delay=2.5, reorder=0.25), gap=1.0)
+    early = sum(delay == 0.0 for delay in delays.values())
+
+    assert binom.ppf(SURE / 2, N, 0.25) <= early <= binom.isf(SURE / 2, N, 0.25)
+    assert list(delays) != sorted(delays)
+    assert len(delays) == N
+
+
+def test_a_full_queue_drops_what_comes_and_the_rate_is_kept() -> None:
+    """Offered twice the rate, half gets through, and none waits longer than the queue is long."""
+    faults = Faults(rate=1000.0, queue=2000)
+    delays = carried(faults, 1000, 0.05, size=100)
+
+    assert 1000 * 0.5 <= len(delays) <= 1000 * 0.5 + 2000 / 100
+    assert max(delays.values()) == pytest.approx(2000 / 1000.0, abs=0.11)
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("", "begins with one of delay, jitter"),
+        ("delay", "begins with one of delay"),
+        ("delay 0.1 0.2", "begins with one of delay"),
+        ("slow 3", "begins with one of delay"),
+        ("stall -1", "a duration is positive, got -1 s"),
+        ("loss much", '"much" is no number'),
+    ],
+)
+def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -> None:
+    """Whoever types something else is told what there is."""
+    with pytest.raises(WordError, match=complaint):
+        read(line)
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"delay": -0.1}, r"delay: -0.1 s is not plausible"),
+        ({"delay": 100.0}, r"did you mean 0.1 \(100 ms\)\?"),
+        ({"loss": 2.0}, r"did you mean 0.02 \(2 %\)\?"),
+        ({"delay": float("nan")}, "delay: nan s"),
+        ({"queue": float("nan")}, "queue: nan bytes"),
+        ({"jitter": 0.1}, "nothing arrives early"),
+        ({"reorder": 0.1}, "needs a delay"),
+        ({"rate": -1.0, "loss": -1.0}, "(?s)loss: .*rate: "),
+    ],
+)
+def test_values_that_cannot_be_meant_are_refused(values: dict[str, float], complaint: str) -> None:
+    """Milliseconds, percents and the impossible are named, all at once, with what would be right."""
+    with pytest.raises(FaultsError, match=complaint):
+        Faults(**values)
