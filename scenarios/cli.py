@@ -14,6 +14,8 @@ from typing import Annotated, NoReturn
 import typer
 
 from scenarios.live.commands import register
+from scenarios.predict.command import predict
+from scenarios.sweep.command import sweep
 from scenarios.usage import (
     BAD_INPUT,
     BROKEN,
@@ -217,4 +219,6 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
     typer.echo(page(topic.value), nl=False)
 
 
+app.command()(sweep)
+app.command()(predict)
 register(app)

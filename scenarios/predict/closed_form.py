@@ -1,0 +1,191 @@
+r"""What follows from the graph alone, in continuous time: rates, settling times, step limits, limits of delay.
+
+With y = m_p P_set, K = diag(kappa), the Laplacian L, leaders g and the quasi-steady plant e = w y + const, the paper's
+(12), (13) are
+
+.. math:: \dot y = -K (L + g w^T) y + \mathrm{const}
+
+Equations and limits are those of docs/theory.md, which has the sources.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from scenarios.predict.fleet import Fleet
+from scenarios.results.history import Floats
+
+SETTLING = 4.0
+"""Time constants after which a mode counts as settled to 2 %, as control texts have it (exactly: 1.8 %)."""
+
+ZERO = 1e-9
+"""Rates and eigenvalues below this are zeros with rounding (1/s)."""
+
+Kind = Literal["neighbours", "disagreement", "local loop"]
+"""What comes late: the neighbours' values alone; own and neighbours' values alike; measurement or set-point."""
+
+
+def laplacian(fleet: Fleet) -> Floats:
+    """Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only.
+
+    Examples
+    --------
+    >>> laplacian(Fleet(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))).tolist()
+    [[1.0, -1.0], [-1.0, 1.0]]
+    """
+    A = fleet.A[np.ix_(fleet.acts, fleet.acts)]
+    return np.asarray(np.diag(A.sum(axis=1)) - A)
+
+
+def groups(fleet: Fleet) -> tuple[tuple[str, ...], ...]:
+    """Who is connected with whom by links, among those that run the law, in the order of the names.
+
+    Examples
+    --------
+    >>> groups(Fleet(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=np.diag([1.0, 0.0], k=1)))
+    (('a', 'b'), ('c',))
+    """
+    acting = [name for name, acts in zip(fleet.names, fleet.acts.tolist(), strict=True) if acts]
+    count, label = connected_components(fleet.A[np.ix_(fleet.acts, fleet.acts)], directed=False)
+    return tuple(tuple(name for name, of in zip(acting, label.tolist(), strict=True) if of == k) for k in range(count))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modes:
+    """Rates of the two slow modes and what follows from them. Infinite where there is no such mode."""
+
+    links: int
+    """Number of links among those that run the law."""
+    lambda_2: float
+    """Second smallest eigenvalue of L (1), the Fiedler value; 0 when the graph is not connected."""
+    lambda_max: float
+    """Largest eigenvalue of L (1)."""
+    kappa: float
+    """m_p / k_p (1/s), the mean where droops differ."""
+    frequency_rate: float
+    """kappa n_L / N (1/s): how fast the frequency comes back when all that run the law share at once."""
+    sharing_rate: float
+    """kappa lambda_2 (1/s): how fast set-points come together."""
+    slowest_rate: float
+    """Smallest real part of an eigenvalue of K (L + g w^T) (1/s), zeros left out: the exact slower one of the two."""
+    fastest_rate: float
+    """Largest real part of the same (1/s)."""
+
+    @property
+    def frequency_settling_s(self) -> float:
+        """Time (s) to 2 % of the slowest mode, by its exact rate."""
+        return settling(self.slowest_rate)
+
+    @property
+    def sharing_settling_s(self) -> float:
+        """Time (s) to 2 % of the sharing mode."""
+        return settling(self.sharing_rate)
+
+    @property
+    def euler_step_s(self) -> float:
+        """Largest control period (s) with which explicit Euler would be stable, 2 / fastest rate. Our law has none."""
+        return math.inf if self.fastest_rate <= 0.0 else 2.0 / self.fastest_rate
+
+
+def settling(rate: float) -> float:
+    """Time (s) in which a mode falls to 2 %; infinite when it does not fall.
+
+    Examples
+    --------
+    >>> round(settling(4.0), 2)
+    1.0
+    """
+    return math.inf if rate <= ZERO else SETTLING / rate
+
+
+def modes(fleet: Fleet) -> Modes:
+    """Modes of a fleet's secondary law by the continuous equations.
+
+    Raises
+    ------
+    ValueError
+        If nobody runs the law.
+
+    Notes
+    -----
+    With unequal droops kappa n_L / N becomes n_L / sum(1/kappa_i), and kappa lambda the eigenvalues of K L: the left
+    null vector of K L weighs each set-point with 1/kappa_i. Where some do not run the law, the frequency answers to
+    the others by the sum of their w_i only.
+
+    Examples
+    --------
+    Nine alike, three leaders, everybody hears everybody:
+
+    >>> from agents.config import Gains
+    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
+    >>> found = modes(nine)
+    >>> round(found.lambda_2, 6), round(found.frequency_rate, 6), round(found.slowest_rate, 6)
+    (9.0, 4.0, 4.0)
+    """
+    acts = fleet.acts
+    if not acts.any():
+        raise ValueError("nobody runs the secondary law, so it has no modes; take a case with secondary control")
+    L, kappa = laplacian(fleet), fleet.kappa[acts]
+    lambdas = np.sort(np.linalg.eigvals(L).real)
+    sharing = np.sort(np.linalg.eigvals(kappa[:, None] * L).real)
+    combined = kappa[:, None] * (L + np.outer(fleet.leads[acts], fleet.weight[acts]))
+    rates = np.sort(np.linalg.eigvals(combined).real)
+    alone = len(kappa) == 1
+    return Modes(
+        links=round(float(fleet.A[np.ix_(acts, acts)].sum()) / 2.0),
+        lambda_2=math.inf if alone else _zeroed(lambdas[1]),
+        lambda_max=_zeroed(lambdas[-1]),
+        kappa=float(kappa.mean()),
+        frequency_rate=float(fleet.weight[acts].sum() * fleet.leads.sum() / (1.0 / kappa).sum()),
+        sharing_rate=math.inf if alone else _zeroed(sharing[1]),
+        slowest_rate=float(min((rate for rate in rates if abs(rate) > ZERO), default=0.0)),
+        fastest_rate=_zeroed(rates[-1]),
+    )
+
+
+def _zeroed(value: float) -> float:
+    """An eigenvalue without the rounding that makes 0 a little more or less."""
+    return 0.0 if abs(value) < ZERO else float(value)
+
+
+def delay_limit_closed(fleet: Fleet, kind: Kind) -> float:
+    """Longest delay (s) with which the continuous law is stable, the same on every link.
+
+    - "neighbours": infinite on every graph (Atay 2013 without leaders; with them docs/theory.md).
+    - "disagreement": pi / (2 kappa lambda_max), Olfati-Saber and Murray (2004).
+    - "local loop": about pi / (2 slowest rate), as of one integrator with delay; pi N / (2 kappa n_L) when sharing is
+      fast.
+
+    Examples
+    --------
+    >>> from agents.config import Gains
+    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
+    >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)
+    (0.0145, 0.3927)
+    """
+    found = modes(fleet)
+    if kind == "neighbours":
+        return math.inf
+    if kind == "disagreement":
+        rate = float(np.linalg.eigvals(fleet.kappa[fleet.acts][:, None] * laplacian(fleet)).real.max())
+    else:
+        rate = found.frequency_rate
+    return math.inf if rate <= ZERO else math.pi / (2.0 * rate)
+
+
+def equivalent_delay(T: float, loss: float) -> float:
+    """Mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
+
+    Examples
+    --------
+    >>> [round(equivalent_delay(0.02, p), 4) for p in (0.5, 0.7, 0.9)]
+    [0.02, 0.0467, 0.18]
+    """
+    if not 0.0 <= loss < 1.0:
+        raise ValueError(f"loss is a probability from 0 to below 1, got {loss:g}; write 0.3 for 30 %")
+    return T * loss / (1.0 - loss)

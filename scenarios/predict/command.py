@@ -1,0 +1,53 @@
+"""`gridpeers predict`: what theory says of a scenario. What it needs is imported when it is used."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from scenarios.usage import BAD_INPUT, BROKEN, chosen, fail, load, require
+
+
+def predict(
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
+    ],
+    case: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Cases to predict, e.g. III,IV; all when left out.")
+    ] = None,
+    vars_: Annotated[
+        bool, typer.Option("--vars", help="Also the modes of voltage and vars, from the plant's sensitivities.")
+    ] = False,
+) -> None:
+    """Predict modes, settling times, limits of step and delay, and times to restore after each event, from theory.
+
+    Nothing is run but the plant on droop alone, once, to learn the load of each event. docs/theory.md has the
+    equations and how far they met the plant.
+
+    Exit code: 0 all is well, 2 bad usage or a bad file, 3 the plant has no solution.
+
+    Example:  gridpeers predict islanding --case IV
+    """
+    spec, feeder = load(scenario)
+    spec = chosen(spec, case, None)
+    require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
+
+    from scenarios.predict.fleet import fleet_of
+    from scenarios.predict.loads import LoadError, load_steps
+    from scenarios.predict.sensitivity import sensitivity
+    from scenarios.predict.table import case_text
+
+    if not feeder.inverters:
+        fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
+    try:
+        steps = load_steps(spec, feeder)
+        plant = sensitivity(spec, feeder) if vars_ else None
+    except LoadError as error:
+        fail([f"{scenario}: {error}"], BROKEN)
+    for number, (name, rule) in enumerate(spec.cases.items()):
+        if number:
+            typer.echo()
+        islands = [(step, fleet_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps]
+        title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
+        typer.echo(case_text(title, fleet_of(spec, feeder, name), islands, plant))

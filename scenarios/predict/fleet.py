@@ -1,0 +1,163 @@
+"""What a prediction is made for: the inverters of one island under one rule of control, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.config import Control, Gains
+from agents.topology import adjacency
+from plant.config import GflParameters, GfmParameters
+from plant.equipment import Feeder
+from scenarios.results.history import Flags, Floats
+from scenarios.spec import Scenario
+from scenarios.spec.moves import inverters_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fleet:
+    """N inverters that share one frequency.
+
+    Examples
+    --------
+    Three alike, one of them a leader, on a path:
+
+    >>> A = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    >>> fleet = Fleet(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
+    >>> fleet.kappa.round(2).tolist(), fleet.weight.round(2).tolist()
+    ([14.29, 14.29, 14.29], [0.33, 0.33, 0.33])
+    """
+
+    names: tuple[str, ...]
+    """Names, order of all arrays."""
+    GFM: Flags
+    """Which are grid-forming: the leaders, g_i = 1."""
+    A: Floats
+    """Adjacency c_ij (1), row = receiver, as `agents.topology.adjacency` gives it."""
+    acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """Which run the secondary law; the others keep their set-points. All, if left out."""
+    s: Floats = field(default_factory=lambda: np.zeros(0))
+    """Ratings (W); all alike, if left out."""
+    m_p: Floats = field(default_factory=lambda: np.zeros(0))
+    """P-f droops (pu per pu); 0.01, if left out."""
+    m_q: Floats = field(default_factory=lambda: np.zeros(0))
+    """Q-V droops (pu per pu); 0.05, if left out."""
+    gains: Gains = field(default_factory=Gains)
+    """Of the law; its limits are not part of a linear model."""
+    T_c: float = 0.02
+    """Control period (s)."""
+    gfm: GfmParameters = field(default_factory=GfmParameters)
+    """Of the plant's GFM."""
+    gfl: GflParameters = field(default_factory=GflParameters)
+    """Of the plant's GFL."""
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        for name, value in (("acts", np.ones(n, bool)), ("s", np.ones(n)), ("m_p", np.full(n, 0.01))):
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, value)
+        if not self.m_q.size:
+            object.__setattr__(self, "m_q", np.full(n, 0.05))
+        if self.A.shape != (n, n):
+            raise ValueError(f"A must be {n} x {n}, one row per name, got {self.A.shape}")
+
+    @property
+    def n(self) -> int:
+        """Number N of inverters."""
+        return len(self.names)
+
+    @property
+    def leads(self) -> Flags:
+        """Who integrates the frequency error: GFM that run the law."""
+        leads: Flags = self.GFM & self.acts
+        return leads
+
+    @property
+    def kappa(self) -> Floats:
+        """Rates m_p / k_p (1/s)."""
+        return self.m_p / self.gains.k_p
+
+    @property
+    def weight(self) -> Floats:
+        """Part w_i of each inverter in the frequency, (s_i/m_i) / sum (s_j/m_j): e = sum w_i y_i - load."""
+        part = self.s / self.m_p
+        return np.asarray(part / part.sum())
+
+    @property
+    def heard(self) -> Floats:
+        """Links that carry something into the law: rows of those that run it."""
+        return np.where(self.acts[:, None], self.A, 0.0)
+
+    @property
+    def degree(self) -> Floats:
+        """Number d_i of neighbours that each listens to."""
+        return np.asarray(self.heard.sum(axis=1))
+
+    def part(self, which: NDArray[np.bool_]) -> Fleet:
+        """The fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
+        at = np.flatnonzero(which)
+        arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "s", "m_p", "m_q")}
+        return Fleet(
+            names=tuple(self.names[i] for i in at.tolist()),
+            A=self.A[np.ix_(at, at)],
+            gains=self.gains,
+            T_c=self.T_c,
+            gfm=self.gfm,
+            gfl=self.gfl,
+            **arrays,
+        )
+
+
+def fleet_of(
+    scenario: Scenario,
+    feeder: Feeder,
+    case: str,
+    *,
+    roster: Collection[str] | None = None,
+    island: Collection[str] | None = None,
+) -> Fleet:
+    """The inverters of one case of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Checked.
+    feeder : Feeder
+        Its feeder.
+    case : str
+        Name of the case.
+    roster : Collection[str], optional
+        Who takes part in the run; the graph's rule is applied to these. Those of the start, if left out.
+    island : Collection[str], optional
+        Who stands in the island; the others are not heard. All of the roster, if left out.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> fleet = fleet_of(*load_scenario("islanding"), "IV")
+    >>> fleet.n, fleet.A.sum(), fleet.leads.sum()
+    (9, np.float64(72.0), np.int64(3))
+    """
+    rule = scenario.cases[case]
+    present = {row.name for row in feeder.inverters} if roster is None else set(roster)
+    rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
+    control = Control(secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains)
+    GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
+    everybody = np.full(len(rows), rule.secondary == "all")
+    fleet = Fleet(
+        names=tuple(rows),
+        GFM=GFM,
+        A=np.array(adjacency(control, rows)).reshape(len(rows), len(rows)),
+        acts=GFM if rule.secondary == "GFM" else everybody,
+        s=np.array([row.P_rated for row in rows.values()]),
+        m_p=np.array([row.m_p for row in rows.values()]),
+        m_q=np.array([row.m_q for row in rows.values()]),
+        gains=rule.gains,
+        T_c=scenario.time.T_c_s,
+        gfm=scenario.plant.gfm,
+        gfl=scenario.plant.gfl,
+    )
+    return fleet if island is None else fleet.part(np.array([name in island for name in rows], bool))

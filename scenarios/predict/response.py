@@ -1,0 +1,139 @@
+r"""The plant as the secondary law feels it: one frequency per island, droops, and the lags between them. Linear.
+
+Everything is a pu frequency: set-points y = m_p P_set, powers pi = m_p p, the load l = P_load / sum (s_i/m_i). With w_i
+as `Fleet.weight`, the GFM (set F) share the rest of the load so that all have the same frequency:
+
+.. math:: w_F e = \sum_F w_i y_i - u, \qquad T_p \dot u = l - \sum_{GFL} w_j \pi_j - u
+
+where u is what the GFM's filtered powers add up to. A GFL sees e through its PLL and its frequency filter, and its
+power lags (inverter-models.md sections 3 and 4):
+
+.. math:: \dot\delta = e - f, \quad f = k_p \delta + \zeta, \quad \dot\zeta = k_i \delta, \quad
+          T_{ff} \dot\phi = f - \phi, \quad T_{pf} \dot\pi_j = y_j - \phi - \pi_j
+
+Left out: power limits, voltages (loads are constant power), the angles' swing among the GFM, current controllers,
+dead bands. Without the lags ("quasi-steady") e = sum w_i y_i - l, docs/theory.md's plant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import expm
+
+from scenarios.predict.fleet import Fleet
+from scenarios.results.history import Floats
+
+PlantModel = Literal["lagged", "quasi-steady"]
+"""With the inverters' filters, or as if they had none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """Plant between two ticks: x(k+1) = A x(k) + B u(k) + E l, and at tick k e = C x + D u + F l with u of before.
+
+    Powers: pi = C_p x + D_p u + F_p l in the same way. N inverters, n states.
+    """
+
+    A: Floats
+    """n x n."""
+    B: Floats
+    """n x N."""
+    E: Floats
+    """n."""
+    C: Floats
+    """n."""
+    D: Floats
+    """N."""
+    F: float
+    C_p: Floats
+    """N x n."""
+    D_p: Floats
+    """N x N."""
+    F_p: Floats
+    """N."""
+
+    def rest(self, u: Floats, load: float) -> Floats:
+        """State in which the plant stands still under set-points u and a load (both pu frequency)."""
+        return np.asarray(np.linalg.solve(np.eye(len(self.A)) - self.A, self.B @ u + self.E * load))
+
+
+def response(fleet: Fleet, plant: PlantModel = "lagged") -> Response:
+    """The plant of a fleet, over one control period with set-points held.
+
+    Raises
+    ------
+    ValueError
+        If no inverter is grid-forming: such an island has no voltage.
+    """
+    if not fleet.GFM.any():
+        raise ValueError(f"no GFM among {', '.join(fleet.names)}: their island has no voltage; give it one")
+    return _quasi_steady(fleet) if plant == "quasi-steady" else _lagged(fleet)
+
+
+def _follows(fleet: Fleet) -> Floats:
+    """1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
+    return np.where(fleet.GFM | fleet.gfl.frequency_watt, 1.0, 0.0)
+
+
+def _quasi_steady(fleet: Fleet) -> Response:
+    n, w, follows = fleet.n, fleet.weight, _follows(fleet)
+    stiffness = float(w @ follows)
+    D, F = w / stiffness, -1.0 / stiffness
+    return Response(
+        A=np.zeros((0, 0)),
+        B=np.zeros((0, n)),
+        E=np.zeros(0),
+        C=np.zeros(0),
+        D=D,
+        F=F,
+        C_p=np.zeros((n, 0)),
+        D_p=np.eye(n) - np.outer(follows, D),
+        F_p=-follows * F,
+    )
+
+
+def _lagged(fleet: Fleet) -> Response:
+    n, w, gfl = fleet.n, fleet.weight, fleet.gfl
+    forming, following = np.flatnonzero(fleet.GFM), np.flatnonzero(~fleet.GFM)
+    w_F = float(w[forming].sum())
+    u, delta, zeta, phi, first = 0, 1, 2, 3, 4
+    size = first + following.size
+    powers = first + np.arange(following.size)
+
+    C, D = np.zeros(size), np.zeros(n)
+    C[u], D[forming] = -1.0 / w_F, w[forming] / w_F
+
+    A, B, E = np.zeros((size, size)), np.zeros((size, n)), np.zeros(size)
+    A[u, u], A[u, powers], E[u] = -1.0, -w[following], 1.0
+    A[u], E[u] = A[u] / fleet.gfm.T_p, E[u] / fleet.gfm.T_p
+    A[delta], B[delta] = C, D
+    A[delta, delta] -= gfl.k_pPLL
+    A[delta, zeta] -= 1.0
+    A[zeta, delta] = gfl.k_iPLL
+    A[phi, [delta, zeta, phi]] = gfl.k_pPLL / gfl.T_ff, 1.0 / gfl.T_ff, -1.0 / gfl.T_ff
+    A[powers, phi] = -1.0 / gfl.T_pf if gfl.frequency_watt else 0.0
+    A[powers, powers] = -1.0 / gfl.T_pf
+    B[powers, following] = 1.0 / gfl.T_pf
+
+    whole = np.zeros((size + n + 1, size + n + 1))
+    whole[:size] = np.hstack([A, B, E[:, None]])
+    held = expm(whole * fleet.T_c)[:size]
+
+    C_p, D_p = np.zeros((n, size)), np.zeros((n, n))
+    C_p[forming], D_p[forming] = -C, -D
+    D_p[forming, forming] += 1.0
+    C_p[following, powers] = 1.0
+    return Response(
+        A=held[:, :size],
+        B=held[:, size:-1],
+        E=held[:, -1],
+        C=C,
+        D=D,
+        F=0.0,
+        C_p=C_p,
+        D_p=D_p,
+        F_p=np.zeros(n),
+    )

@@ -1,0 +1,204 @@
+"""What experiments draw beside their measurements: times to restore and to share.
+
+All of it comes from `scenarios.predict.model`, law and plant in discrete time, and is exact for that model. Delays are
+in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used from the first
+tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or after t_k + d.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from scenarios.predict.closed_form import groups
+from scenarios.predict.fleet import Fleet
+from scenarios.predict.model import Link, Loop, Path, Ticks
+from scenarios.predict.response import PlantModel
+from scenarios.results.history import Flags, Floats
+from scenarios.results.metrics import F_BAND, MPSI_BAND
+from scenarios.spec.configs import F_NOM
+
+Key = TypeVar("Key")
+
+HORIZON = 120.0
+"""Longest time (s) for which a step is followed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadStep:
+    """What the inverters of an island carry, mean p (pu of the ratings), before and after an event."""
+
+    start_pu: float = 0.647
+    """At the start all stand at it, at nominal frequency. The paper's start."""
+    load_pu: float = 0.880
+    """From the event on. The paper's event 1."""
+    joining: tuple[str, ...] = ()
+    """Who comes with the event, at no load."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Times:
+    """Times (s) after a step of the load, by the bands of `scenarios.results.metrics`; None: not within 120 s."""
+
+    restore_s: float | None
+    """Until abs(f - f_nom) < 0.01 Hz for good."""
+    share_s: float | None
+    """Until MPSI < 0.01 for good."""
+    stable: bool
+    """Whether every mode that the law moves decays."""
+    note: str = ""
+    """In words, why a time is None; empty if none is."""
+
+    @property
+    def report_s(self) -> float | None:
+        """The report's "restored in" (s): both for good."""
+        both = self.restore_s, self.share_s
+        return None if both[0] is None or both[1] is None else max(both[0], both[1])
+
+
+def ticks_of(
+    fleet: Fleet,
+    *,
+    link_delay_s: float | Mapping[Link, float] = 0.0,
+    measurement_delay_s: float | Mapping[str, float] = 0.0,
+    setpoint_delay_s: float | Mapping[str, float] = 0.0,
+    loss: float | Mapping[Link, float] = 0.0,
+) -> Ticks:
+    """Delays in seconds as control periods of a fleet.
+
+    Raises
+    ------
+    ValueError
+        If a delay is negative or a loss no probability.
+
+    Examples
+    --------
+    >>> alone = Fleet(names=("a",), GFM=np.array([True]), A=np.zeros((1, 1)))
+    >>> found = ticks_of(alone, link_delay_s=0.03, measurement_delay_s=0.03)
+    >>> found.link, found.measurement
+    (1, 2)
+    """
+
+    def whole(delay: float, least: int = 0) -> int:
+        if not (math.isfinite(delay) and delay >= 0.0):
+            raise ValueError(f"a delay must be 0 s or more, got {delay:g} s")
+        return max(least, math.ceil(delay / fleet.T_c - 1e-9)) - least
+
+    return Ticks(
+        link=_each(link_delay_s, lambda delay: whole(delay, 1)),
+        measurement=_each(measurement_delay_s, whole),
+        setpoint=_each(setpoint_delay_s, whole),
+        loss=loss,
+    )
+
+
+def predicted_times(
+    case: Fleet,
+    *,
+    link_delay_s: float | Mapping[Link, float] = 0.0,
+    measurement_delay_s: float | Mapping[str, float] = 0.0,
+    setpoint_delay_s: float | Mapping[str, float] = 0.0,
+    loss: float | Mapping[Link, float] = 0.0,
+    load: LoadStep | None = None,
+    plant: PlantModel = "lagged",
+) -> Times:
+    """Times to restore and to share after a step of the load, and whether the loop is stable.
+
+    Parameters
+    ----------
+    case : Fleet
+        From `fleet_of(scenario, feeder, case)`.
+    link_delay_s : float or Mapping[(src, dst), float], optional
+        Delay of the states from agent to agent (s); links that a mapping leaves out have none.
+    measurement_delay_s, setpoint_delay_s : float or Mapping[name, float], optional
+        Delay from the plant to an agent, and back (s).
+    loss : float or Mapping[(src, dst), float], optional
+        Probability that a state is lost; the last one is held.
+    load : LoadStep, optional
+        The event; the paper's event 1 if left out. `scenarios.predict.loads.load_steps` has those of a scenario.
+    plant : {"lagged", "quasi-steady"}, optional
+        With the inverters' filters, or as docs/theory.md has it.
+
+    Raises
+    ------
+    ValueError
+        If a delay is negative, a loss no probability, or the island without GFM.
+
+    Examples
+    --------
+    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
+    >>> predicted_times(nine).stable, predicted_times(nine, measurement_delay_s=1.0).stable
+    (True, False)
+    """
+    step = LoadStep() if load is None else load
+    ticks = ticks_of(
+        case,
+        link_delay_s=link_delay_s,
+        measurement_delay_s=measurement_delay_s,
+        setpoint_delay_s=setpoint_delay_s,
+        loss=loss,
+    )
+    loop = Loop(fleet=case, ticks=ticks, plant=plant)
+    if not loop.stable:
+        return Times(restore_s=None, share_s=None, stable=False, note="unstable: oscillations grow")
+    # until the slowest mode has fallen to 1e-5, but no longer than anybody would wait
+    slowest = max(loop.spectral_radius, 1e-3)
+    count = math.ceil(math.log(1e-5) / math.log(slowest)) + sum(loop.matrix.shape) // max(case.n, 1)
+    count = min(max(count, round(2.0 / case.T_c)), round(HORIZON / case.T_c))
+    weight = case.weight
+    nominal = step.load_pu * float(weight @ case.m_p)
+    start = np.where([name in step.joining for name in case.names], 0.0, step.start_pu * case.m_p)
+    path = loop.run(count, start, nominal)
+    restore = _for_good(path.t, np.abs(path.e) * F_NOM < F_BAND)
+    share = _for_good(path.t, sharing_index(path, weight) < MPSI_BAND)
+    short = _beyond_limits(case, path)
+    if short:
+        return Times(restore_s=None, share_s=None, stable=True, note=short)
+    return Times(restore_s=restore, share_s=share, stable=True, note=_note(case, restore, share))
+
+
+def sharing_index(path: Path, weight: Floats) -> Floats:
+    """MPSI of each tick, (16)."""
+    eta = path.power @ weight
+    return np.asarray(np.mean(np.abs(path.power / eta[:, None] - 1.0), axis=1))
+
+
+def _each(value: float | Mapping[Key, float], rule: Callable[[float], int]) -> int | dict[Key, int]:
+    return {key: rule(number) for key, number in value.items()} if isinstance(value, Mapping) else rule(value)
+
+
+def _for_good(t: Floats, holds: Flags) -> float | None:
+    failing = np.flatnonzero(~holds)
+    first = 0 if failing.size == 0 else int(failing[-1]) + 1
+    return None if first >= t.size else round(float(t[first]), 9)
+
+
+def _beyond_limits(case: Fleet, path: Path) -> str:
+    """What those who run the law would have to carry in the end, if that is beyond their limits; else empty."""
+    acts, s, gains = case.acts, case.s, case.gains
+    if not acts.any():
+        return ""
+    highest = np.minimum(gains.P_set_max, np.where(case.GFM, case.gfm.P_max, case.gfl.P_max))
+    needed = float((path.power[-1] / case.m_p * s)[acts].sum() / s[acts].sum())
+    limit = float((highest * s)[acts].sum() / s[acts].sum())
+    if needed <= limit:
+        return ""
+    return f"those that run the law would have to carry {needed:.2f} pu each, their limit is {limit:.2f} pu"
+
+
+def _note(case: Fleet, restore: float | None, share: float | None) -> str:
+    if restore is not None and share is not None:
+        return ""
+    if not case.acts.any():
+        return "no secondary control: droop alone keeps its error"
+    if restore is None and not case.leads.any():
+        return "no leader: nobody corrects the frequency"
+    if share is None and not case.acts.all():
+        return f"{int((~case.acts).sum())} of {case.n} run no secondary law: their power stays"
+    if share is None and len(groups(case)) > 1:
+        return f"the graph falls into {len(groups(case))} groups, which do not agree on a share"
+    return f"not within {HORIZON:g} s"
