@@ -46,7 +46,7 @@ MOVER: Style = ("#d55e00", "-", 2.2)
 STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "--", 1.2)}
 """Styles of the others: grid-forming, or not."""
 
-_PAGE: Any = {
+PAGE: Any = {
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titlepad": 14,
@@ -62,6 +62,7 @@ _PAGE: Any = {
     "figure.dpi": 150,
     "savefig.dpi": 150,
 }
+"""Layout of every figure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +92,7 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with mpl.rc_context(_PAGE):
+    with mpl.rc_context(PAGE):
         figures = {
             "frequency.png": _single(drawing, _frequency),
             "MPSI.png": _single(drawing, _MPSI),
@@ -112,7 +113,7 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
 
 def overview(drawing: Drawing) -> Figure:
     """All four measures of all cases on one page."""
-    with mpl.rc_context(_PAGE):
+    with mpl.rc_context(PAGE):
         figure = Figure(figsize=(9.0, 5.2), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
         for panel, draw in zip(axes.flat, (_frequency, _MPSI, _voltage, _MQSI), strict=True):
@@ -127,7 +128,7 @@ def overview(drawing: Drawing) -> Figure:
 
 def plug_and_play(drawing: Drawing) -> Figure:
     """P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
-    with mpl.rc_context(_PAGE):
+    with mpl.rc_context(PAGE):
         count = len(drawing.histories)
         figure = Figure(figsize=(5.2 * count + 1.2, 6.4), layout="constrained")
         grid = figure.subplots(3, count, sharex=True, sharey="row", squeeze=False)

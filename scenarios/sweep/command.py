@@ -1,0 +1,126 @@
+"""The command `gridpeers sweep`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, fail
+
+if TYPE_CHECKING:
+    from scenarios.sweep.file import Plan
+    from scenarios.sweep.study import Summary
+
+_PACKAGES = {"joblib": "the runs over all cores", "pyarrow": "the table", "matplotlib": "the plots"}
+
+
+def sweep(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a sweep file, or a name: gains, topology.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, e.g. tcp://10.0.0.1:8786.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
+    ] = False,
+) -> None:
+    """Run a scenario many times over values of its keys, into one table with plots. The same command resumes it.
+
+    Exit code: 0 done (runs that broke are rows of the table), 2 bad usage or a bad file, 3 every run broke or the
+    workers went, 130 interrupted by Ctrl-C: what is done is kept.
+
+    Example:  gridpeers sweep topology --jobs 2
+    """
+    from scenarios.spec import ScenarioError
+
+    _require(_PACKAGES | ({"distributed": "--dask"} if dask else {}))
+    from scenarios.sweep.file import read_sweep
+
+    try:
+        plan = read_sweep(file)
+    except ScenarioError as error:
+        head = [] if len(error.mistakes) == 1 else [f"{len(error.mistakes)} mistakes:"]
+        fail([*head, *error.mistakes], BAD_INPUT)
+    if dry_run:
+        typer.echo(_size(file, plan))
+        return
+    _run(file, plan, out, jobs, dask or "")
+
+
+def _run(file: str, plan: Plan, out: Path | None, jobs: int | None, dask: str) -> None:
+    import shlex
+    import signal
+
+    from rich.console import Console
+
+    from scenarios.results.folder import FolderError, shown
+    from scenarios.run import TerminatedError
+    from scenarios.sweep.folder import SweepFolder, folder_of
+    from scenarios.sweep.progress import progress
+    from scenarios.sweep.study import study
+    from scenarios.sweep.workers import WorkersError, cores
+
+    def terminate(*_: object) -> NoReturn:
+        raise TerminatedError
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    path = folder_of(out, plan.name)
+    again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    console = Console()
+    try:
+        with SweepFolder(path, plan) as folder:
+            console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
+            try:
+                with progress(console, len(plan.runs)) as tell:
+                    summary = study(plan, folder, tell, jobs=jobs or cores(), dask=dask)
+            except (KeyboardInterrupt, WorkersError) as error:
+                kept = f"{len(folder.done)} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
+                if isinstance(error, WorkersError):
+                    fail([str(error), kept], BROKEN)
+                fail([f"interrupted; {kept}"], TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    for line in _told(summary):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
+
+
+def _told(summary: Summary) -> list[str]:
+    """What a sweep came to, in lines."""
+    from scenarios.results.folder import shown
+
+    broke = sum(summary.broke.values())
+    lines = [f"{summary.runs - broke} runs reached their end" + (f", {broke} broke:" if broke else "")]
+    lines += [f"  {count} x {why}" for why, count in summary.broke.most_common(3)]
+    if len(summary.broke) > 3:
+        lines.append(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
+    lines.append(f"table: {shown(summary.table)}")
+    if summary.plots:
+        lines.append(f"plots: {shown(summary.plots[0].parent)}/ ({len(summary.plots)})")
+    return lines
+
+
+def _size(file: str, plan: Plan, done: int = 0) -> str:
+    samples = plan.runs[-1].sample + 1
+    left = f"; {done} are done already" if done else ""
+    varied = ", ".join(plan.parameters)
+    return f"{file}: {len(plan.runs)} runs ({samples} samples of {plan.base.name}) over {varied}{left}"
+
+
+def _require(modules: dict[str, str]) -> None:
+    """End with what to install when a package of the extra `sweep` is missing."""
+    from importlib.util import find_spec
+
+    missing = [
+        f"{name} is not installed; {what} cannot do without" for name, what in modules.items() if not find_spec(name)
+    ]
+    if missing:
+        fail([*missing, "install what sweeps need: pip install 'gridpeers[sweep]'"], BAD_INPUT)

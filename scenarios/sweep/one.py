@@ -1,0 +1,115 @@
+"""One run of a sweep, in whatever process it is done: from a checked scenario to a row of numbers.
+
+Nothing that a run can do ends the sweep: a plant without solution, and an error of the program too, is a row that
+says why.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import threading
+from collections import OrderedDict
+from dataclasses import asdict
+from functools import lru_cache
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from plant.build import build_plant
+from plant.config import PlantConfig
+from plant.feeder import Plant
+from plant.tables import read_feeder
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results import metrics
+from scenarios.results.history import History, Plates
+from scenarios.results.moves import as_they_came
+from scenarios.results.record import Tape
+from scenarios.spec import Scenario
+from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.moves import inverters_of
+
+KEPT_PLANTS = 4
+"""Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
+
+_kept = threading.local()  # a worker of Dask may be a thread among others
+
+_feeder = lru_cache(maxsize=8)(read_feeder)
+
+
+class Done(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a run."""
+
+    number: int
+    """Its place in the plan, from 0."""
+    status: Literal["ran", "broke"]
+    """Whether it reached its end."""
+    why: str = ""
+    """Why it broke."""
+    sha256: str = ""
+    """Of the bytes that history.csv would have."""
+    measures: dict[str, float | None] = {}
+    """Every index of every event's window, e.g. "event1.MPSI"; None where it is not a number, or never came to be."""
+
+
+def run_one(number: int, scenario: Scenario, case: str) -> Done:
+    """Run one case in this thread and measure it."""
+    try:
+        return _run(number, scenario, case)
+    except Exception as error:
+        text = str(error)
+        known = type(error).__name__ in ("PlantError", "RecordError")
+        return Done(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}")
+
+
+def _run(number: int, scenario: Scenario, case: str) -> Done:
+    feeder = _feeder(scenario.plant.feeder, scenario.plant.load_set)
+    plant, agents = configs(scenario, feeder, case)
+    tape = Tape()
+    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant))
+    if outcome.broke:
+        return Done(number=number, status="broke", why=outcome.broke)
+    recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
+    history = History.of(recorded.inverters, recorded.rows)
+    plates = Plates.of(inverters_of(scenario, feeder))
+    measures: dict[str, float | None] = {}
+    with np.errstate(all="ignore"):  # what is no number is told as such
+        for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
+            measures |= flat(window.label, asdict(metrics.measure(history, plates, window, F_NOM)))
+    return Done(number=number, status="ran", sha256=recorded.sha256, measures=measures)
+
+
+def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
+    """Measures of one window as columns.
+
+    Examples
+    --------
+    >>> flat("event1", {"MPSI": 0.25, "t_restore_s": None, "p": {"inv1": 0.5}})
+    {'event1.MPSI': 0.25, 'event1.t_restore_s': None, 'event1.p.inv1': 0.5}
+    """
+    found: dict[str, float | None] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found |= flat(f"{label}.{name}", value)
+        else:
+            found[f"{label}.{name}"] = value if value is not None and math.isfinite(value) else None
+    return found
+
+
+def plant_at_start(config: PlantConfig) -> Plant:
+    """A plant at t = 0, copied from one that this thread has built before for the same settings.
+
+    To factor the network and find the operating point is a fifth of a run, and what agents are told is no part of it.
+    A copy gives the same bytes as a new plant: a test holds it to that.
+    """
+    if not hasattr(_kept, "plants"):
+        _kept.plants = OrderedDict()
+    plants: OrderedDict[Any, Plant] = _kept.plants
+    key = (config.settings, config.T_c, config.record_step)
+    if key not in plants:
+        plants[key] = build_plant(config)
+        if len(plants) > KEPT_PLANTS:
+            plants.popitem(last=False)
+    plants.move_to_end(key)
+    return copy.deepcopy(plants[key])

@@ -1,0 +1,169 @@
+"""Plots of a sweep, chosen by what is varied.
+
+One parameter: each index against it, median and range over all the rest (seeds, graphs). Two on a grid: a heat map of
+the medians. More, or drawn at random: each parameter by itself, with a point per run. Where the axis is a text, its
+values stand side by side. A case is a colour and a dash of Okabe and Ito's palette; heat maps are in cividis, made for
+colour-blind readers. What never came to be (a time) counts as later than all others, and how often is written down;
+other indexes of runs that broke are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pyarrow as pa
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scenarios.results.history import Floats
+from scenarios.results.plots import PAGE, case_style
+from scenarios.sweep.choice import Choice, choose, values
+from scenarios.sweep.statistics import Spread, spread_of
+from scenarios.sweep.words import label_of
+
+BINS = 12
+"""Groups of equally many runs that a parameter drawn at random is cut into for its median."""
+
+MOST_TICKS = 12
+"""Most values of a parameter that are written at an axis."""
+
+_NEVER = "#b0b0b0"
+"""Colour of a cell of a heat map whose median never came to be."""
+
+
+def draw_all(table: pa.Table, folder: Path) -> tuple[Path, ...]:
+    """Draw every figure of a sweep into a folder.
+
+    Returns
+    -------
+    tuple of Path
+        The files; none when no run reached its end, or nothing but seeds is varied.
+    """
+    choice = choose(table)
+    drawn = []
+    with mpl.rc_context(PAGE):
+        for window in choice.indexes:
+            if choice.map_of is not None:
+                x, y = choice.map_of
+                for case in choice.cases:
+                    figure = _heat_maps(choice, window, x, y, case)
+                    drawn.append(_save(figure, folder, f"{window}_{x}_{y}_{case}"))
+            for x in choice.alone:
+                drawn.append(_save(_curves(choice, window, x), folder, f"{window}_{x}"))
+    return tuple(drawn)
+
+
+def _curves(choice: Choice, window: str, x: str) -> Figure:
+    """Every index of a window against one parameter, a curve for each case."""
+    figure, panels = _page(choice.indexes[window])
+    for panel, index in zip(panels, choice.indexes[window], strict=True):
+        never = []
+        for number, case in enumerate(choice.cases):
+            rows = choice.rows(case)
+            at, y = rows[x], values(rows, f"{window}.{index}")
+            spread = spread_of(at, y, BINS)
+            _curve(panel, spread, case, number, at, y)
+            never += [count for count in spread.never if count]
+        if never:
+            panel.set_title(f"never in {sum(never)} of {choice.runs} runs", loc="right", fontsize=7)
+        _name_axis(panel, choice, x)
+        panel.set_ylabel(label_of(index))
+        _frame(panel)
+    _legend(figure, panels[0], choice)
+    figure.suptitle(f"{window}: median and range over all other parameters", fontsize=10)
+    return figure
+
+
+def _curve(panel: Axes, spread: Spread, case: str, number: int, at: Sequence[Any], y: Floats) -> None:
+    colour, dashes, width = case_style(case, number)
+    x = spread.x if spread.numeric else list(range(len(spread.x)))
+    finite = np.isfinite(spread.median)
+    median = np.where(finite, spread.median, np.nan)
+    top = np.where(np.isfinite(spread.high), spread.high, np.nan)
+    if spread.numeric:
+        panel.fill_between(x, spread.low, top, color=colour, alpha=0.18, linewidth=0)
+        panel.plot(x, median, linestyle=dashes, color=colour, lw=width, marker="o", ms=3.5, label=f"case {case}")
+        if spread.binned:
+            shown = np.isfinite(y)
+            panel.plot(np.asarray(at, float)[shown], y[shown], ".", color=colour, ms=2.5, alpha=0.5)
+        return
+    shift = 0.12 * number
+    panel.vlines([i + shift for i in x], spread.low, top, color=colour, alpha=0.5, lw=3)
+    panel.plot([i + shift for i in x], median, "o", color=colour, label=f"case {case}")
+    panel.set_xticks(x, [str(value) for value in spread.x], rotation=30, ha="right")
+
+
+def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure:
+    """Median of every index of a window over two parameters."""
+    figure, panels = _page(choice.indexes[window])
+    rows = choice.rows(case)
+    xs, ys = (sorted(set(rows[name])) for name in (x, y))
+    for panel, index in zip(panels, choice.indexes[window], strict=True):
+        z = values(rows, f"{window}.{index}")
+        medians = np.full((len(ys), len(xs)), np.nan)
+        for (i, b), (j, a) in product(enumerate(ys), enumerate(xs)):
+            here = np.array([(p, q) == (a, b) for p, q in zip(rows[x], rows[y], strict=True)], dtype=bool)
+            medians[i, j] = spread_of([0] * int(here.sum()), z[here], BINS).median[0] if here.any() else np.nan
+        masked = np.ma.masked_invalid(medians)
+        colours = mpl.colormaps["cividis"].with_extremes(bad=_NEVER)
+        mesh = panel.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap=colours)
+        figure.colorbar(mesh, ax=panel, label=label_of(index))
+        for axis, positions, label in ((panel.xaxis, xs, x), (panel.yaxis, ys, y)):
+            every = -(-len(positions) // MOST_TICKS)
+            ticks = range(0, len(positions), every)
+            axis.set_ticks([i + 0.5 for i in ticks], [_short(positions[i]) for i in ticks])
+            axis.set_label_text(label_of(label))
+        panel.tick_params(axis="x", rotation=45)
+        panel.grid(visible=False)
+    grey = "; grey: never, or broke, in half of the runs or more"
+    figure.suptitle(f"{window}, case {case}: medians over all other parameters{grey}", fontsize=10)
+    return figure
+
+
+def _page(indexes: Sequence[str]) -> tuple[Figure, list[Axes]]:
+    columns = min(len(indexes), 3)
+    rows = -(-len(indexes) // columns)
+    figure = Figure(figsize=(3.9 * columns, 2.9 * rows + 0.5), layout="constrained")
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for panel in panels[len(indexes) :]:
+        panel.set_visible(False)
+    return figure, panels[: len(indexes)]
+
+
+def _name_axis(panel: Axes, choice: Choice, x: str) -> None:
+    panel.set_xlabel(label_of(x))
+    numbers = choice.columns[x]
+    if all(isinstance(number, int | float) for number in numbers):
+        if min(numbers) > 0 and max(numbers) / min(numbers) > 30:
+            panel.set_xscale("log")
+        elif len(set(numbers)) <= MOST_TICKS and all(isinstance(number, int) for number in numbers):
+            panel.set_xticks(sorted(set(numbers)))
+
+
+def _frame(panel: Axes) -> None:
+    """All indexes are magnitudes: their axes begin at 0."""
+    panel.set_ylim(bottom=0.0)
+
+
+def _legend(figure: Figure, panel: Axes, choice: Choice) -> None:
+    if len(choice.cases) > 1:
+        handles, labels = panel.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _save(figure: Figure, folder: Path, name: str) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{''.join(c if c.isalnum() or c in '._-' else '_' for c in name)}.png"
+    partial = path.with_name(f".{path.name}")
+    figure.savefig(partial, format="png")
+    partial.replace(path)
+    return path

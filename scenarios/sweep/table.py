@@ -1,0 +1,86 @@
+"""The table of a sweep: one Parquet file with every parameter, every index and the fate of every run.
+
+Rows are in the order of the plan whatever order they were finished in, and columns depend on the plan and the rows
+alone; so the same sweep gives an equal table, undisturbed or resumed, here or on a cluster.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from scenarios.run import versions
+from scenarios.spec.writing import to_toml
+from scenarios.sweep.file import Plan
+from scenarios.sweep.one import Done
+from scenarios.sweep.words import unit_of
+
+FILE = "results.parquet"
+
+FATE = ("status", "why", "history_sha256")
+"""Columns between parameters and indexes."""
+
+
+def table_of(plan: Plan, done: Mapping[int, Done]) -> pa.Table:
+    """Rows of the runs that are done.
+
+    Columns: `sample`, `case`, `seed`, the parameters by their path, `status` ("ran" or "broke"), `why`,
+    `history_sha256`, and the indexes as "WINDOW.INDEX". The metadata holds the sweep file, the base scenario with all
+    defaults, and the versions; each column's has its unit.
+    """
+    numbers = sorted(done)
+    rows, ends = [plan.runs[i] for i in numbers], [done[i] for i in numbers]
+    columns: dict[str, pa.Array] = {
+        "sample": pa.array([row.sample for row in rows], pa.int64()),
+        "case": pa.array([row.case for row in rows], pa.string()),
+        "seed": pa.array([row.scenario.seed for row in rows], pa.int64()),
+    }
+    for name in plan.parameters:
+        if name not in columns:
+            columns[name] = _column([row.shown[name] for row in rows])
+    columns["status"] = pa.array([end.status for end in ends], pa.string())
+    columns["why"] = pa.array([end.why or None for end in ends], pa.string())
+    columns["history_sha256"] = pa.array([end.sha256 or None for end in ends], pa.string())
+    for name in dict.fromkeys(name for end in ends for name in end.measures):
+        columns[name] = pa.array([end.measures.get(name) for end in ends], pa.float64())
+    fields = [pa.field(name, column.type, metadata=_metadata(name)) for name, column in columns.items()]
+    about = {
+        "gridpeers.sweep": plan.text,
+        "gridpeers.scenario": to_toml(plan.base, {}),
+        "gridpeers.fingerprint": plan.fingerprint,
+        "gridpeers.versions": json.dumps(versions()),
+    }
+    return pa.table(list(columns.values()), schema=pa.schema(fields, metadata=about))
+
+
+def write_table(table: pa.Table, folder: Path) -> Path:
+    """Write the table at once or not at all."""
+    path = folder / FILE
+    partial = path.with_name(FILE + ".partial")
+    pq.write_table(table, partial)
+    partial.replace(path)
+    return path
+
+
+def _column(values: Sequence[Any]) -> pa.Array:
+    """Values of a parameter: numbers and texts as such, what is neither as JSON."""
+    kinds = {type(value) for value in values}
+    if kinds <= {bool}:
+        return pa.array(values, pa.bool_())
+    if kinds <= {int}:
+        return pa.array(values, pa.int64())
+    if kinds <= {int, float}:
+        return pa.array(values, pa.float64())
+    if kinds <= {str}:
+        return pa.array(values, pa.string())
+    return pa.array([json.dumps(value, default=str) for value in values], pa.string())
+
+
+def _metadata(name: str) -> dict[str, str] | None:
+    unit = unit_of(name)
+    return {"unit": unit} if unit else None

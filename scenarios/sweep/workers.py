@@ -1,0 +1,119 @@
+"""The runs of a sweep over all cores of this machine, or over a Dask cluster: the same tasks through joblib.
+
+Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, so that none of them writes
+a traceback over the terminal, and they are ended when the command leaves.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky import get_reusable_executor
+
+from scenarios.sweep.file import Run
+from scenarios.sweep.one import Done, run_one
+
+DASK_PATIENCE = 10.0
+"""Longest wait for a scheduler, and for its first worker (s)."""
+
+
+class WorkersError(RuntimeError):
+    """The workers cannot be had, or have gone."""
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return int(cpu_count())
+
+
+def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[Done, None, None]:
+    """Do the runs in `jobs` processes; each comes back as soon as it is done, in whatever order.
+
+    Close the iterator to end the workers early.
+    """
+    if jobs == 1:
+        for number, run in runs:
+            yield run_one(number, run.scenario, run.case)
+        return
+    with parallel_config(backend="loky", n_jobs=jobs, initializer=_end_with, initargs=(os.getpid(),)):
+        try:
+            yield from _parallel(runs)
+        finally:
+            get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
+
+
+def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[Done, None, None]:
+    """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders.
+
+    Raises
+    ------
+    WorkersError
+        If there is no scheduler at the address, or it has no worker.
+    """
+    from distributed import Client
+
+    connect: Any = Client  # it has no types
+
+    try:
+        client: Any = connect(address, timeout=DASK_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise WorkersError(
+            f"--dask {address}: no Dask scheduler answers there ({type(error).__name__}); start one by `dask "
+            "scheduler`, workers by `dask worker ADDRESS`, and give its address, e.g. tcp://127.0.0.1:8786"
+        ) from None
+    with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
+        try:
+            yield from _parallel(runs)
+        except TimeoutError:
+            raise WorkersError(f"--dask {address}: the scheduler has no worker; start some by `dask worker`") from None
+
+
+def _parallel(runs: Sequence[tuple[int, Run]]) -> Generator[Done, None, None]:
+    tasks = (delayed(run_one)(number, run.scenario, run.case) for number, run in runs)
+    with _without_interrupts():
+        # one run a batch: what is done is kept at once
+        results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)
+    try:
+        yield from results
+    except GeneratorExit:
+        _close(results)
+        raise
+    except (OSError, RuntimeError) as error:  # joblib's TerminatedWorkerError is a BrokenProcessPool, a RuntimeError
+        first = str(error).partition("\n")[0]
+        raise WorkersError(f"a worker has gone ({type(error).__name__}: {first})") from error
+
+
+def _close(results: Any) -> None:
+    """End the dispatch; joblib warns that results are lost, which is what was asked for."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        results.close()
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Hold Ctrl-C back in this thread and in what it starts; one that came meanwhile comes after."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with(parent: int) -> None:
+    """End this worker when the command is killed: nobody else would, for minutes."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            threading.Event().wait(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
