@@ -19,17 +19,16 @@ plant holds for it. An agent that finds itself woken late (frozen, or starved) d
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
 from agents.config import AgentConfig
-from agents.hearing import PATIENCE, Hearing
-from wire.actions import Action, Fetch, Listen, Publish, Say
-from wire.codec import RejectedError, Rejects, decode, encode
-from wire.keys import Keys
+from agents.hearing import PATIENCE, Hearing, patience_after
+from agents.side import Side
+from wire.actions import Fetch, Listen, Say
+from wire.codec import RejectedError, encode
+from wire.links import Links
 from wire.messages import PLANT, AgentStatus, AnyMessage, Leave, Measurement, Nameplate, State, Stop
 from wire.timer import Timer
 
@@ -39,14 +38,14 @@ STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
 
 SILENT = 1.0
-"""Time (s, wall) without a state of a neighbour that the plant hears, after which it counts as silent."""
+"""Time (s, wall) without a message of the plant, or of a neighbour whom it hears, after which that one is silent."""
 
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
 
 
-class FreeAgent:
-    """One agent in wall-clock time.
+class FreeAgent(Side):
+    """One agent in wall-clock time, on one session after the other if need be.
 
     Parameters
     ----------
@@ -54,74 +53,50 @@ class FreeAgent:
         Who it is and the run's rule.
     instance : str
         Which process this is, unique in the run; part of the agent's token.
-    patience : float, optional
-        Longest silence (s, wall) of somebody who should be heard, before another session is asked for.
-    again : bool, optional
-        Whether this goes on after a session that had gone astray.
+    links : Links, optional
+        What the links to it do to its messages.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, *, patience: float = PATIENCE, again: bool = False) -> None:
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(config.name)
-        self.stopped = ""
-        """Why it closes; empty as long as it goes on."""
-        self.failed = ""
-        """Why this agent could never take part; empty unless so."""
+        super().__init__(config, instance, links)
         self.phase: Phase = "seeking"
-        self._hearing = Hearing(patience)
         self.astray = False
         """Whether it closes only to begin again with a new session."""
-        self.plant_seen = False
-        """Whether the plant's token was ever there."""
         self.missed = 0
         """Ticks skipped, as their time was over."""
         self.ticks = self.sent = self.used = self.lost = 0
-        self._config, self._name, self._instance = config, config.name, instance
-        self._agent = Agent(config)
-        self._actions: list[Action | Say] = []
-        self._routes: dict[str, tuple[str, Callable[[AnyMessage, float], None]]] = {
-            self.keys.control: (PLANT, self._on_control),
-            self.keys.dismissal(config.name, instance): (PLANT, self._on_control),
-            self.keys.measurement(config.name): (PLANT, self._on_measurement),
-        }
+        self._first_routes = dict(self._routes)
+        self._timer = Timer(config.T_c / config.speed, 0.0)
+        self._status = Timer(STATUS_PERIOD, 0.0)
+        self._give_up: float | None = None
+        self._lateness = 0.0
+        self._ran = False
+        self._patience, self._began = PATIENCE / 2.0, 0.0
+        self._forget_everybody()
+
+    def _forget_everybody(self) -> None:
+        """Know nothing of the others, as before the first session."""
+        self.phase = "seeking"
+        self._routes = dict(self._first_routes)
         self._plant_there = False
-        self._ran = again
-        self._plant_incarnation = 0
         self._measurement: Measurement | None = None
         self._measured_at = 0.0
+        """When the last measurement arrived, over the links."""
         self._claims: dict[str, list[str]] = {}
         """Tokens that are there: name -> its instances, the one that counts first."""
         self._met: set[str] = set()
         """Names whose nameplate is known."""
         self._neighbours: tuple[str, ...] = ()
-        self._listening: set[str] = set()
+        self._came: dict[str, tuple[int, float]] = {}
+        """Number of the last message of each that came off the wire, and when."""
         self._heard: dict[str, tuple[State, float]] = {}
-        """Last state of each agent, and when it came."""
-        self._timer = Timer(config.T_c / config.speed, 0.0)
-        self._status = Timer(STATUS_PERIOD, 0.0)
-        self._give_up: float | None = None
-        self._lateness = 0.0
+        """Last state of each agent that the links let through, and when."""
         self._in_sums: tuple[str, ...] = ()
         """Neighbours in the sums of the last tick."""
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def token(self) -> str:
-        """Key of the own liveliness token."""
-        return self.keys.alive_agent(self._name, self._instance)
-
-    @property
-    def nameplate(self) -> tuple[str, bytes]:
-        """Key of the own queryable, and its answer."""
-        return self.keys.nameplate(self._name, self._instance), encode(self._agent.nameplate)
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
-        return tuple(self._routes)
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -129,14 +104,9 @@ class FreeAgent:
         return self.keys.state(self._name), self.keys.leave(self._name), self.keys.status(self._name)
 
     @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
-
-    @property
     def over(self) -> bool:
         """Whether the driver should close."""
-        return bool(self.stopped or self.failed or self.astray)
+        return super().over or self.astray
 
     @property
     def wanted(self) -> int:
@@ -149,20 +119,19 @@ class FreeAgent:
         return self._timer.due
 
     def start(self, now: float) -> None:
-        """Begin to tick; there is nothing to do yet."""
+        """Begin to tick, or begin again after a session that had gone astray; there is nothing to do yet."""
         self._timer = Timer(self._timer.period, now)
         self._status = Timer(STATUS_PERIOD, now)
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
-
-    def take_actions(self) -> list[Action | Say]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
-    def work(self, now: float) -> bool:
-        """Nothing: an agent works when its tick is due."""
-        return False
+        self._patience = patience_after(self._patience, now - self._began)
+        self._began, self._hearing = now, Hearing(self._patience)
+        if self.astray:
+            self.astray = False
+            for name in self._met:
+                self._agent.forget(name)
+            self._agent.let_go()
+            self._forget_everybody()
 
     def expire(self, now: float) -> None:
         """Tick, if it is time."""
@@ -178,6 +147,7 @@ class FreeAgent:
             self._lateness = max(self._lateness, late)
             if late * self._config.speed > self._config.max_age:
                 self._hold(f"woken {late:.2f} s late; waits for news")
+        self._take_arrived(now)
         before = self.phase, self._in_sums
         self._tick(now)
         self._note_astray(now)
@@ -200,7 +170,7 @@ class FreeAgent:
 
     def _unheard(self, now: float) -> tuple[str, ...]:
         """Who should be heard and is not: the plant, a neighbour that the plant hears, or oneself, by the plant."""
-        if self.phase == "waiting" and self._ran:
+        if self._ran and self._plant_there and (PLANT not in self._came or now - self._came[PLANT][1] > SILENT):
             return (PLANT,)
         if self.phase != "running" or self._measurement is None:
             return ()
@@ -212,7 +182,7 @@ class FreeAgent:
     def _is_silent(self, name: str, now: float) -> bool:
         if name not in self._met:
             return True
-        return name in self._neighbours and (name not in self._heard or now - self._heard[name][1] > SILENT)
+        return name in self._neighbours and (name not in self._came or now - self._came[name][1] > SILENT)
 
     def _go_astray(self, why: str) -> None:
         self.astray = True
@@ -226,7 +196,7 @@ class FreeAgent:
 
     def _leave(self) -> None:
         message = Leave(sender=self._name, incarnation=self._config.incarnation, seq=self.sent, t=self._t)
-        self._actions.append(Publish(self.keys.leave(self._name), encode(message)))
+        self._publish(self.keys.leave(self._name), encode(message))
 
     def _say(self, text: str) -> None:
         self._actions.append(Say(f"{self._name}: {text}"))
@@ -269,11 +239,12 @@ class FreeAgent:
 
     def _fetch_nameplate(self, name: str, instance: str) -> None:
         key = self.keys.nameplate(name, instance)
-        self._routes[key] = (name, lambda message, now: self._on_nameplate(name, message))
+        self._routes[key] = (name, lambda message, payload, now: self._on_nameplate(name, message))
         self._actions.append(Fetch(key))
 
     def _forget(self, name: str) -> None:
         self._met.discard(name)
+        self._came.pop(name, None)
         self._heard.pop(name, None)
         self._agent.forget(name)
         self._meet_neighbours()
@@ -289,27 +260,15 @@ class FreeAgent:
 
     # ---------------------------------------------------------------- messages
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped."""
-        try:
-            if key not in self._routes:
-                raise RejectedError("foreign", "nothing was asked for on this key")
-            sender, handler = self._routes[key]
-            message = decode(payload)
-            if message.sender != sender:
-                self._misled(sender, message.sender)
-                raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
-            handler(message, now)
-            self.used += 1
-        except RejectedError as rejected:
-            self.rejects.add(rejected.kind, key, rejected.text)
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self.used += 1
 
     def _misled(self, expected: str, sender: str) -> None:
         """Note a message that came under another's key; many of them prove that key numbers are confused."""
         if self._hearing.crossed() and self._ran and not self.astray:
             self._go_astray(f"messages of {sender} come under the key of {expected}")
 
-    def _on_control(self, message: AnyMessage, now: float) -> None:
+    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, Stop):
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
         if message.refused:
@@ -317,22 +276,41 @@ class FreeAgent:
         else:
             self.leave(message.reason)
 
-    def _on_measurement(self, message: AnyMessage, now: float) -> None:
+    _on_dismissal = _on_control
+
+    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
         life = self._plant_incarnation
         if message.incarnation < life:
             raise RejectedError("ghost", f"life {message.incarnation} of the plant, now it lives {life}")
-        last = self._measurement
         if message.incarnation > life:
             if life:
                 self._hold("the plant has a new life; starts from what it measures")
             self._plant_incarnation = message.incarnation
-        elif last is not None:
-            if message.seq <= last.seq:
-                raise RejectedError("stale", f"Measurement({message.seq}) after {last.seq}")
-            self.lost += message.seq - last.seq - 1
-        self._measurement, self._measured_at = message, now
+            self._came.pop(PLANT, None)
+        self._count(message, now)
+        if not self._is_offered(message, payload, now * self._config.speed):
+            self._measurement, self._measured_at = message, now
+
+    def _count(self, message: AnyMessage, now: float) -> None:
+        """Note what came off the wire, and how many did not."""
+        name, seq = message.sender, message.seq
+        if name in self._came:
+            last = self._came[name][0]
+            if seq <= last:
+                raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
+            self.lost += seq - last - 1
+        self._came[name] = seq, now
+
+    def _take_arrived(self, now: float) -> None:
+        """Use what the emulated links have let through by now; what was overtaken is of no use."""
+        for message in self._arrived(now * self._config.speed):
+            if isinstance(message, Measurement) and message.incarnation == self._plant_incarnation:
+                if self._measurement is None or message.seq > self._measurement.seq:
+                    self._measurement, self._measured_at = message, now
+            elif isinstance(message, State) and message.sender in self._met and not self._agent.hear(message):
+                self._heard[message.sender] = message, now
 
     def _on_nameplate(self, name: str, message: AnyMessage) -> None:
         if not isinstance(message, Nameplate):
@@ -342,24 +320,23 @@ class FreeAgent:
         self._met.add(name)
         self._meet_neighbours()
 
-    def _on_state(self, message: AnyMessage, now: float) -> None:
+    def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, State):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
-        name = message.sender
-        reason = self._agent.hear(message)
+        reason = self._agent.judge(message)
         if reason:
-            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {name}")
-        if name in self._heard:
-            self.lost += message.seq - self._heard[name][0].seq - 1
-        self._heard[name] = message, now
+            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
+        self._count(message, now)
+        if not self._is_offered(message, payload, now * self._config.speed):
+            self._agent.hear(message)
+            self._heard[message.sender] = message, now
 
     def _meet_neighbours(self) -> None:
         """Apply the rule to who is present, and listen to whom it names."""
         self._neighbours = self._agent.in_neighbours((self._name, *sorted(self._met)))
         for name in self._neighbours:
-            if name not in self._listening:
-                self._listening.add(name)
-                key = self.keys.state(name)
+            key = self.keys.state(name)
+            if key not in self._routes:
                 self._routes[key] = (name, self._on_state)
                 self._actions.append(Listen(key))
 
@@ -395,7 +372,7 @@ class FreeAgent:
         self._in_sums = tuple(name for name in young if self._agent.shares_island(name))
         self.ticks += 1
         self.sent += 1
-        self._actions.append(Publish(self.keys.state(self._name), encode(state)))
+        self._publish(self.keys.state(self._name), encode(state))
 
     def _publish_status(self, now: float) -> None:
         awaited = {
@@ -424,4 +401,4 @@ class FreeAgent:
             lateness=self._lateness,
         )
         self._lateness = 0.0
-        self._actions.append(Publish(self.keys.status(self._name), encode(status)))
+        self._publish(self.keys.status(self._name), encode(status))

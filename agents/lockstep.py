@@ -31,16 +31,16 @@ the culprit. Receivers only enqueue, without bound, so nobody blocks a sender.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from msgspec.structs import replace
 
-from agents.agent import Agent
 from agents.config import AgentConfig
+from agents.side import Side
 from agents.topology import is_pairwise
-from wire.actions import Action, Fetch, Listen, Publish
+from wire.actions import Fetch, Listen
 from wire.clock import time_of
-from wire.codec import RejectedError, Rejects, decode, encode
-from wire.keys import Keys
-from wire.messages import PLANT, AnyMessage, Measurement, Message, Nameplate, Prepare, Ready, State, Stop
+from wire.codec import RejectedError, encode
+from wire.links import Links
+from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
 
 Peer = tuple[str, str]
@@ -50,7 +50,7 @@ PATIENCE = 2.0
 """An agent waits this many deadlines, so that the plant complains first."""
 
 
-class AgentSide:
+class AgentSide(Side):
     """One agent in simulated time.
 
     Parameters
@@ -59,29 +59,15 @@ class AgentSide:
         Who it is and the run's rule.
     instance : str
         Which process this is, unique in the run; part of the agent's token.
+    links : Links, optional
+        What the links to it do to its messages.
     """
 
-    def __init__(self, config: AgentConfig, instance: str) -> None:
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(config.name)
-        self.stopped = ""
-        """Why the run ended; empty as long as it goes on."""
-        self.failed = ""
-        """Why this agent could not go on; empty unless it failed."""
-        self._name, self._T_c, self._incarnation = config.name, config.T_c, config.incarnation
-        self._instance = instance
-        self._agent = Agent(config)
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
+        super().__init__(config, instance, links)
+        self._T_c, self._incarnation = config.T_c, config.incarnation
         self._pairwise = is_pairwise(config.control)
         self._patience = Patience(config.name, PATIENCE * config.deadline)
-        self._actions: list[Action] = []
-        self._routes: dict[str, tuple[str, Callable[[AnyMessage, float], None]]] = {
-            self.keys.control: (PLANT, self._on_control),
-            self.keys.dismissal(config.name, instance): (PLANT, self._on_dismissal),
-            self.keys.measurement(config.name): (PLANT, self._on_measurement),
-        }
-        self.plant_seen = False
-        """Whether the plant's token was ever there."""
-        self._plant_incarnation = 0
         self._known: dict[Peer, bool] = {}
         """Peers whose nameplate is known; True once they have proven to hear our subscription."""
         self._proving: set[Peer] = set()
@@ -96,39 +82,16 @@ class AgentSide:
         self._neighbours: tuple[str, ...] = ()
         self._waiting: dict[str, str] = {}
         """In-neighbours, and their instances, whose state of the tick before has not come yet."""
-        self._ahead: dict[str, State] = {}
+        self._ahead: dict[str, tuple[State, bytes]] = {}
+        self._sensed: Measurement | None = None
+        """The last measurement that the link from the plant let through."""
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def token(self) -> str:
-        """Key of the own liveliness token."""
-        return self.keys.alive_agent(self._name, self._instance)
-
-    @property
-    def nameplate(self) -> tuple[str, bytes]:
-        """Key of the own queryable, and its answer."""
-        return self.keys.nameplate(self._name, self._instance), encode(self._agent.nameplate)
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
-        return tuple(self._routes)
 
     @property
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         return self.keys.ready(self._name), self.keys.state(self._name)
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
-
-    @property
-    def over(self) -> bool:
-        """Whether the driver should close."""
-        return bool(self.stopped or self.failed)
 
     @property
     def wanted(self) -> int:
@@ -145,15 +108,6 @@ class AgentSide:
     def start(self, now: float) -> None:
         """Begin to wait for the plant."""
         self._patience.renew(now)
-
-    def take_actions(self) -> list[Action]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
-    def work(self, now: float) -> bool:
-        """Nothing: an agent computes as soon as a message makes it possible."""
-        return False
 
     def missing(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
@@ -204,32 +158,18 @@ class AgentSide:
 
     # ---------------------------------------------------------------- messages
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
-        if self.over:
-            return
-        try:
-            if key not in self._routes:
-                raise RejectedError("foreign", "nothing was asked for on this key")
-            sender, handler = self._routes[key]
-            message = decode(payload)
-            if message.sender != sender:
-                raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
-            if sender == PLANT:
-                self._check_plant(message)
-            handler(message, now)
-            self._patience.heard(sender, message.seq, now)
-        except RejectedError as rejected:
-            self.rejects.add(rejected.kind, key, rejected.text)
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self._patience.heard(message.sender, message.seq, now)
 
-    def _check_plant(self, message: Message) -> None:
+    def _check_plant(self, message: AnyMessage) -> None:
         if message.incarnation < self._plant_incarnation:
             raise RejectedError(
                 "ghost", f"life {message.incarnation} of the plant, now it lives {self._plant_incarnation}"
             )
         self._plant_incarnation = message.incarnation
 
-    def _on_control(self, message: AnyMessage, now: float) -> None:
+    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        self._check_plant(message)
         if isinstance(message, Stop):
             self.stopped = message.reason
         elif isinstance(message, Prepare):
@@ -237,7 +177,8 @@ class AgentSide:
         else:
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
 
-    def _on_dismissal(self, message: AnyMessage, now: float) -> None:
+    def _on_dismissal(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        self._check_plant(message)
         if not isinstance(message, Stop):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Stop")
         if message.refused:
@@ -260,7 +201,7 @@ class AgentSide:
     def _fetch_nameplate(self, peer: Peer) -> None:
         key = self.keys.nameplate(*peer)
         if key not in self._routes:
-            self._routes[key] = (peer[0], lambda message, now: self._on_nameplate(peer, message, now))
+            self._routes[key] = (peer[0], lambda message, payload, now: self._on_nameplate(peer, message, now))
             self._actions.append(Fetch(key))
 
     def _on_nameplate(self, peer: Peer, message: AnyMessage, now: float) -> None:
@@ -311,26 +252,29 @@ class AgentSide:
                 seq=self._prepare.seq,
                 t=time_of(self._tick or 0, self._T_c),
             )
-            self._actions.append(Publish(self.keys.ready(self._name), encode(ready)))
+            self._publish(self.keys.ready(self._name), encode(ready))
 
     # ---------------------------------------------------------------- ticks
 
-    def _on_measurement(self, message: AnyMessage, now: float) -> None:
+    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        self._check_plant(message)
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
         if not self._ready_sent:
             raise RejectedError("unexpected", "no roster has this process on it")
         if self._tick is None:
             self._tick = message.seq
-            self._ahead = {name: state for name, state in self._ahead.items() if state.seq == message.seq}
+            self._ahead = {name: early for name, early in self._ahead.items() if early[0].seq == message.seq}
         if message.seq != self._tick or self._measurement is not None:
             kind = "unexpected" if message.seq > self._tick else "stale"
             raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
         self._measurement = message
+        if not self._is_offered(message, payload, message.t):
+            self._sensed = message
         self._patience.renew(now)
         self._compute(now)
 
-    def _on_state(self, message: AnyMessage, now: float) -> None:
+    def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, State):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
         name, seq = message.sender, message.seq
@@ -338,14 +282,26 @@ class AgentSide:
         if reason:
             raise RejectedError(reason, f"State({seq}) of life {message.incarnation} of {name}")
         if self._tick is None or seq == self._tick:
-            self._ahead[name] = message
+            self._ahead[name] = message, payload
         elif seq == self._tick - 1:
-            self._agent.hear(message)
+            self._hear(message, payload)
             self._waiting.pop(name, None)
             self._compute(now)
         else:
             kind = "stale" if seq < self._tick else "unexpected"
             raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
+
+    def _hear(self, state: State, payload: bytes) -> None:
+        if not self._is_offered(state, payload, state.t):
+            self._agent.hear(state)
+
+    def _take_arrived(self, t: float) -> None:
+        """Use what the emulated links have let through by t (s); what was overtaken is of no use."""
+        for message in self._arrived(t):
+            if isinstance(message, State):
+                self._agent.hear(message)
+            elif isinstance(message, Measurement) and (self._sensed is None or message.seq > self._sensed.seq):
+                self._sensed = message
 
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if all that it needs is here."""
@@ -357,8 +313,12 @@ class AgentSide:
         if self._waiting:
             return
         neighbours = tuple(name for name in self._neighbours if name in measurement.roster)
-        state = self._agent.tick(measurement, neighbours)
-        self._actions.append(Publish(self.keys.state(self._name), encode(state)))
+        self._take_arrived(measurement.t)
+        sensed = self._sensed or measurement  # the first one is how the agent is set up, and always there
+        if sensed is not measurement:
+            sensed = replace(sensed, seq=tick, t=measurement.t)
+        state = self._agent.tick(sensed, neighbours)
+        self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)
         self._tick, self._measurement = tick + 1, None
         if measurement.roster != self._roster:
@@ -367,6 +327,6 @@ class AgentSide:
         members = ((name, self._members.get(name, "")) for name in self._neighbours)
         self._waiting = {name: instance for name, instance in members if (name, instance) not in self._vanished}
         for name, early in self._ahead.items():
-            self._agent.hear(early)
+            self._hear(*early)
             self._waiting.pop(name, None)
         self._ahead = {}

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import logging
-from time import monotonic, time_ns
+from time import time_ns
 
 from msgspec.structs import replace
 
 from agents.config import AgentConfig
 from agents.freerun import FreeAgent
-from agents.hearing import PATIENCE, patience_after
 from agents.lockstep import AgentSide
 from wire.drive import StoppedError, drive, perform
 from wire.keys import check_name
@@ -43,12 +42,20 @@ def run_agent(config: AgentConfig) -> str:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
-    began, patience = monotonic(), PATIENCE
-    side = _take_part(config, log, patience)
-    while isinstance(side, FreeAgent) and side.astray:
-        patience = patience_after(patience, monotonic() - began)
-        began = monotonic()
-        side = _take_part(config, log, patience, again=True)
+    if wall:  # an agent that is started again is told from its ghost by its later start
+        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+    side: FreeAgent | AgentSide | None = None
+    while side is None or (isinstance(side, FreeAgent) and side.astray):
+        session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
+        try:
+            if side is None:
+                try:
+                    side = (FreeAgent if wall else AgentSide)(config, session.id)
+                except ValueError as error:
+                    raise ConfigurationError(str(error)) from None
+            _take_part(side, session, log)
+        finally:
+            session.close()
     if side.rejects.counts:
         log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
     if not side.failed:
@@ -62,31 +69,15 @@ def run_agent(config: AgentConfig) -> str:
     return failed
 
 
-def _take_part(
-    config: AgentConfig, log: logging.Logger, patience: float, *, again: bool = False
-) -> FreeAgent | AgentSide:
-    """Take part with one session; what decided, when it is over. The patience (s, wall) is of wall-clock time."""
-    wall = config.clock == "wall"
-    if wall:  # an agent that is started again is told from its ghost by its later start
-        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
-    session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
+def _take_part(side: FreeAgent | AgentSide, session: Session, log: logging.Logger) -> None:
+    """Take part with one session. All of an agent's sessions hold one token: for the others it is one agent."""
+    session.answer(*side.nameplate)
+    for key in side.publications:
+        session.prepare(key)
     try:
-        try:
-            side = (
-                FreeAgent(config, session.id, patience=patience, again=again) if wall else AgentSide(config, session.id)
-            )
-        except ValueError as error:
-            raise ConfigurationError(str(error)) from None
-        session.answer(*side.nameplate)
-        for key in side.publications:
-            session.prepare(key)
-        try:
-            drive(side, session, log)
-        except (StoppedError, KeyboardInterrupt) as stop:
-            if isinstance(side, FreeAgent):
-                side.leave(f"asked to leave: {stop}")
-                perform(side.take_actions(), session, log)
-            raise
-    finally:
-        session.close()
-    return side
+        drive(side, session, log)
+    except (StoppedError, KeyboardInterrupt) as stop:
+        if isinstance(side, FreeAgent):
+            side.leave(f"asked to leave: {stop}")
+            perform(side.take_actions(), session, log)
+        raise

@@ -7,7 +7,7 @@ Every message is encoded and decoded, and discovery, roster and ticks are those 
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from time import perf_counter
 from typing import NamedTuple, cast
 
@@ -19,7 +19,7 @@ from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.lockstep import PlantSide
 from scenarios.drivers.outcome import Outcome
-from wire.actions import Action, Fetch, Publish
+from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import decode
 from wire.messages import PlantEvent, Telemetry
 
@@ -110,7 +110,7 @@ class Bus:
             self._do(other, other.take_actions())
         self._do(agent, agent.take_actions())
 
-    def _do(self, side: PlantSide | AgentSide, actions: list[Action]) -> None:
+    def _do(self, side: PlantSide | AgentSide, actions: Sequence[Action | Say]) -> None:
         for action in actions:
             if isinstance(action, Publish):
                 key, payload = action
@@ -123,7 +123,7 @@ class Bus:
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
-            else:
+            elif isinstance(action, Listen):
                 self._subscribers[action.key].append(side)
 
     def _end_the_stopped(self) -> None:

@@ -129,6 +129,8 @@ class Watching:
         self._plant = visit.plant
         self._told: dict[str, float] = {}
         """When who last told anything."""
+        self._used: dict[str, tuple[str, ...]] = {}
+        """Whom each agent has in its sums."""
         self._patience = PATIENCE
         self._hearing = Hearing(PATIENCE)
         visit.listen(visit.keys.telemetry)
@@ -151,6 +153,7 @@ class Watching:
                 self._picture.status(message, monotonic())
                 told.append(message)
                 self._told[message.sender] = monotonic()
+                self._used[message.sender] = message.used
         if self._visit.plant and not self._plant:  # it was restarted, perhaps with other inverters
             self._visit.fetch(self._visit.keys.config("*"))
         self._plant = self._visit.plant
@@ -161,9 +164,14 @@ class Watching:
         return told
 
     def _renew(self, now: float) -> None:
-        """Come again if somebody whose token is there has told nothing for too long: the session has gone astray."""
-        there = [*([PLANT] if self._visit.plant else []), *present(self._visit)]
-        if self._hearing.lost([name for name in there if now - self._told.get(name, 0.0) > SILENT], now):
+        """Come again if somebody who is there has told nothing for too long: the session has gone astray.
+
+        There is whose token is there, and whom somebody who tells has in its sums.
+        """
+        telling = {name for name, at in self._told.items() if now - at <= SILENT}
+        there = {*([PLANT] if self._visit.plant else []), *present(self._visit)}
+        there.update(*(self._used.get(name, ()) for name in telling))
+        if self._hearing.lost(sorted(there - telling), now):
             self._patience = min(2.0 * self._patience, LONGEST)
             self._hearing = Hearing(self._patience)
             self._visit.renew()

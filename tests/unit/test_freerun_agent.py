@@ -333,7 +333,7 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
     lab.measure(1)
     lab.go(T_C)
     assert lab.side.phase == "running"
-    for _ in range(7):
+    for _ in range(8):
         lab.go(0.5)
     assert not lab.side.over
     lab.go(0.5)

@@ -1,0 +1,138 @@
+"""What an agent's side of simulated and of wall-clock time have in common: who it is, its routes, its actions. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from agents.agent import Agent
+from agents.config import AgentConfig
+from wire.actions import Action, Publish, Say
+from wire.codec import RejectedError, Rejects, decode, encode
+from wire.keys import Keys
+from wire.links import Links
+from wire.messages import PLANT, AnyMessage
+
+Handler = Callable[[AnyMessage, bytes, float], None]
+"""Takes a message, its bytes, and the time."""
+
+
+class Side:
+    """One agent on a wire.
+
+    Parameters
+    ----------
+    config : AgentConfig
+        Who it is and the run's rule.
+    instance : str
+        Which process this is, unique in the run; part of the agent's token.
+    links : Links or None
+        What the links to it do to its messages.
+    """
+
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None) -> None:
+        self.keys = Keys(config.run)
+        self.rejects = Rejects(config.name)
+        self.stopped = ""
+        """Why it closes; empty as long as it goes on."""
+        self.failed = ""
+        """Why this agent could not go on, or take part at all; empty unless so."""
+        self.plant_seen = False
+        """Whether the plant's token was ever there."""
+        self._config, self._name, self._instance = config, config.name, instance
+        self._agent = Agent(config)
+        self._links = links
+        self._actions: list[Action | Say] = []
+        self._routes: dict[str, tuple[str, Handler]] = {
+            self.keys.control: (PLANT, self._on_control),
+            self.keys.dismissal(config.name, instance): (PLANT, self._on_dismissal),
+            self.keys.measurement(config.name): (PLANT, self._on_measurement),
+        }
+        self._plant_incarnation = 0
+
+    @property
+    def token(self) -> str:
+        """Key of the own liveliness token."""
+        return self.keys.alive_agent(self._name, self._instance)
+
+    @property
+    def nameplate(self) -> tuple[str, bytes]:
+        """Key of the own queryable, and its answer."""
+        return self.keys.nameplate(self._name, self._instance), encode(self._agent.nameplate)
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the token is declared."""
+        return tuple(self._routes)
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+        return self.keys.any_alive
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return bool(self.stopped or self.failed)
+
+    def take_actions(self) -> list[Action | Say]:
+        """What is to be done now, in this order."""
+        actions, self._actions = self._actions, []
+        return actions
+
+    def work(self, now: float) -> bool:
+        """Nothing: an agent computes when a message makes it possible, or its tick is due."""
+        return False
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
+        if self.over:
+            return
+        try:
+            if key not in self._routes:
+                raise RejectedError("foreign", "nothing was asked for on this key")
+            sender, handler = self._routes[key]
+            message = decode(payload)
+            if message.sender != sender:
+                self._misled(sender, message.sender)
+                raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
+            handler(message, payload, now)
+            self._used(message, now)
+        except RejectedError as rejected:
+            self.rejects.add(rejected.kind, key, rejected.text)
+
+    def _misled(self, expected: str, sender: str) -> None:
+        """Note a message that came under another's key."""
+
+    def _used(self, message: AnyMessage, now: float) -> None:
+        """Note a message that was of use."""
+
+    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        raise NotImplementedError
+
+    def _on_dismissal(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        raise NotImplementedError
+
+    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        raise NotImplementedError
+
+    def _is_offered(self, message: AnyMessage, payload: bytes, at: float) -> bool:
+        """Give a message to the link that it came over, if that is an emulated one; whether it was."""
+        if self._links is None or not self._links.touched(message.sender):
+            return False
+        self._links.offer(message.sender, message.seq, message.t, at, payload)
+        return True
+
+    def _arrived(self, now: float) -> list[AnyMessage]:
+        """What the emulated links have let through by now (s of run time), but for what they have garbled."""
+        messages: list[AnyMessage] = []
+        if self._links is None:
+            return messages
+        for src, payload in self._links.due(now):
+            try:
+                messages.append(decode(payload))
+            except RejectedError as rejected:
+                self.rejects.add(rejected.kind, f"the link from {src}", rejected.text)
+        return messages
+
+    def _publish(self, key: str, payload: bytes) -> None:
+        self._actions.append(Publish(key, payload))

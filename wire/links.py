@@ -1,0 +1,55 @@
+"""What may stand between the wire and a core: emulated links, of which the cores know only this. Pure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+
+class Arrival(NamedTuple):
+    """A message that a link has let through."""
+
+    src: str
+    """Who sent it."""
+    payload: bytes
+    """Its bytes, as the link left them."""
+
+
+class Links(Protocol):
+    """All links into one receiver. Times are run time (s), on whichever clock the receiver uses throughout.
+
+    `netem` has the real one; without any (None) a core takes messages as they come.
+    """
+
+    def touched(self, src: str) -> bool:
+        """Whether anything might ever happen to messages from there; else they need not be offered."""
+        ...
+
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+        """Take a message off the wire.
+
+        Parameters
+        ----------
+        src : str
+            Who sent it.
+        seq : int
+            Its number, by which its fate is drawn.
+        t : float
+            When it was sent, for what the links do at certain times.
+        at : float
+            When it would be here if the link did nothing: now.
+        payload : bytes
+            The message.
+        """
+        ...
+
+    def due(self, now: float) -> list[Arrival]:
+        """Take out what has arrived by now, in the order of arrival."""
+        ...
+
+    def order(self, text: str, t: float) -> str:
+        """Change what the links do from t on, as a person said; what was changed, or nothing if it is not for here."""
+        ...
+
+    def report(self) -> tuple[bytes, ...]:
+        """Take out what the links did since last asked, for the record."""
+        ...
