@@ -1,0 +1,140 @@
+"""What became of the messages of one link: counts that close, and the verdicts with their hash."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from hashlib import sha256
+
+import msgspec
+
+from netem.channel import Fate
+
+Outcome = float | str | tuple[tuple[float, int | None], ...]
+"""Delay (s) of one sound copy; or why it was dropped; or delay and flipped bit of each copy."""
+
+
+class LinkTrace(msgspec.Struct, frozen=True, array_like=True):
+    """Verdicts of one link, in the order in which they fell.
+
+    A message that was judged anew, because the cut that kept it was healed early, has a second row, which counts.
+    """
+
+    src: str
+    """Who sent."""
+    dst: str
+    """Who received."""
+    seq: tuple[int, ...]
+    """Numbers of the messages."""
+    t: tuple[float, ...]
+    """When each was sent (s of run time)."""
+    outcome: tuple[Outcome, ...]
+    """What became of each."""
+
+
+class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
+    """How many messages of one link fared how: sent + duplicated = delivered + dropped + in_flight."""
+
+    sent: int
+    """Messages that were judged here."""
+    duplicated: int
+    """Copies made of them."""
+    delivered: int
+    """Handed to the receiver, copies included."""
+    dropped: dict[str, int]
+    """Not delivered, by reason."""
+    corrupted: int
+    """Arrived with a flipped bit; delivered, or dropped by "checksum"."""
+    in_flight: int
+    """Not arrived yet."""
+
+    @property
+    def closes(self) -> bool:
+        """Whether nothing is unaccounted for."""
+        return self.sent + self.duplicated == self.delivered + sum(self.dropped.values()) + self.in_flight
+
+
+class Ledger:
+    """Book of one link.
+
+    Parameters
+    ----------
+    keep : bool
+        Whether the verdicts are kept until they are taken; their hash is kept in any case.
+    """
+
+    __slots__ = ("_keep", "_kept", "_new", "_sha", "corrupted", "delivered", "dropped", "duplicated", "sent")
+
+    def __init__(self, *, keep: bool) -> None:
+        self.sent = self.duplicated = self.delivered = self.corrupted = 0
+        self.dropped: Counter[str] = Counter()
+        self._keep = keep
+        self._new: list[tuple[int, float, Outcome]] = []
+        self._kept: list[tuple[int, float, Outcome]] = []
+        self._sha = sha256()
+
+    def note(self, seq: int, t: float, fate: Fate) -> None:
+        """Write a verdict down."""
+        deliveries = fate.deliveries
+        outcome: Outcome
+        if not deliveries:
+            self.dropped[fate.reason] += 1
+            outcome = fate.reason
+        elif len(deliveries) == 1 and deliveries[0][1] is None:
+            outcome = deliveries[0][0]
+        else:
+            self.duplicated += len(deliveries) - 1
+            outcome = deliveries
+        self._new.append((seq, t, outcome))
+        if len(self._new) >= _BATCH:
+            self._fold()
+
+    def counts(self, in_flight: int) -> LinkCounts:
+        """The counts, with what somebody counted in flight."""
+        return LinkCounts(
+            sent=self.sent,
+            duplicated=self.duplicated,
+            delivered=self.delivered,
+            dropped=dict(self.dropped),
+            corrupted=self.corrupted,
+            in_flight=in_flight,
+        )
+
+    def take(self, src: str, dst: str) -> LinkTrace | None:
+        """Verdicts since last taken, None if there were none."""
+        self._fold()
+        rows, self._kept = self._kept, []
+        if not rows:
+            return None
+        seq, t, outcome = zip(*rows, strict=True)
+        return LinkTrace(src, dst, seq, t, outcome)
+
+    def digest(self) -> bytes:
+        """Hash of all verdicts so far, whenever they were taken; empty if there were none."""
+        self._fold()
+        return self._sha.digest() if self._sha.digest() != _NOTHING else b""
+
+    def _fold(self) -> None:
+        """Hash what is new, row by row, so that it does not matter when."""
+        self._sha.update(b"".join(map(_encode, self._new)))
+        if self._keep:
+            self._kept += self._new
+        self._new.clear()
+
+
+def combined(digests: Mapping[str, str] | Iterable[tuple[str, str]]) -> str:
+    """One hash (hex) of several parts' hashes, whatever their order: of the receivers of a run, by their names.
+
+    Examples
+    --------
+    >>> combined({"inv1": "00", "inv2": "ff"}) == combined([("inv2", "ff"), ("inv1", "00")])
+    True
+    """
+    return sha256(_encode(sorted(dict(digests).items()))).hexdigest()
+
+
+_BATCH = 512
+"""Verdicts that are hashed at once."""
+
+_NOTHING = sha256().digest()
+_encode = msgspec.msgpack.Encoder().encode

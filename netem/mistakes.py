@@ -1,0 +1,100 @@
+"""What is wrong with a number or a name of a scenario's netem entries: where, what, the value, what was meant."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+LONGEST_DELAY = 10.0
+"""Delays above this (s) are taken for milliseconds by mistake: control over such a link is not what netem is for."""
+
+
+class Mistake(NamedTuple):
+    """One mistake."""
+
+    path: str
+    """Which key, e.g. `link[2].loss.p`; relative to the entry where a model finds it."""
+    text: str
+    """What is wrong, with the value and its unit, and what would be right."""
+
+
+def below(path: str, mistakes: Iterable[Mistake]) -> list[Mistake]:
+    """The same mistakes, seen from further up.
+
+    Examples
+    --------
+    >>> below("link[2]", [Mistake("loss.p", "wrong"), Mistake("", "empty")])
+    [Mistake(path='link[2].loss.p', text='wrong'), Mistake(path='link[2]', text='empty')]
+    """
+    return [Mistake(f"{path}.{mistake.path}" if mistake.path else path, mistake.text) for mistake in mistakes]
+
+
+def probability(path: str, value: float, what: str, *, above_zero: bool = False) -> list[Mistake]:
+    """A probability lies between 0 and 1.
+
+    Examples
+    --------
+    >>> probability("loss.p", 30.0, "a loss")[0].text
+    'a loss is a probability from 0 to 1, got 30; did you mean 0.3 (30 %)?'
+    """
+    if 0.0 < value <= 1.0 or (value == 0.0 and not above_zero):
+        return []
+    meant = f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
+    least = "above 0 and up to 1" if above_zero else "from 0 to 1"
+    return [Mistake(path, f"{what} is a probability {least}, got {value:g}{meant}")]
+
+
+def seconds(
+    path: str, value: float, what: str, *, high: float = LONGEST_DELAY, above_zero: bool = False
+) -> list[Mistake]:
+    """A time is finite, not negative, and no longer than makes sense.
+
+    Examples
+    --------
+    >>> seconds("delay", 250.0, "a delay")[0].text
+    '250 s is not plausible for a delay (0 to 10 s); did you mean 0.25 (250 ms)?'
+    >>> seconds("delay", -0.1, "a delay")[0].text
+    'a delay must not be negative, got -0.1 s; 0 to 10 s makes sense'
+    """
+    span = f"0 to {high:g} s"
+    if not math.isfinite(value):
+        return [Mistake(path, f"{what} must be a finite number of seconds, got {value}; {span} makes sense")]
+    if above_zero and value <= 0.0:
+        return [Mistake(path, f"{what} must be above 0, got {value:g} s; {span} makes sense")]
+    if value < 0.0:
+        return [Mistake(path, f"{what} must not be negative, got {value:g} s; {span} makes sense")]
+    if value <= high:
+        return []
+    meant = f"; did you mean {value / 1000.0:g} ({value:g} ms)?" if value / 1000.0 <= high else ""
+    return [Mistake(path, f"{value:g} s is not plausible for {what} ({span}){meant}")]
+
+
+def amount(path: str, value: float, what: str, unit: str, low: float, high: float, hint: str = "") -> list[Mistake]:
+    """A number lies within what makes sense.
+
+    Examples
+    --------
+    >>> amount("shape", 0.0, "a Pareto shape", "", 0.5, 50.0)[0].text
+    '0 is not plausible for a Pareto shape (0.5 to 50)'
+    """
+    if low <= value <= high:
+        return []
+    end = f" {unit}" if unit else ""
+    return [Mistake(path, f"{value:g}{end} is not plausible for {what} ({low:g} to {high:g}{end}){hint}")]
+
+
+def nearest(wrong: str, known: Iterable[str], what: str) -> str:
+    """End of a sentence about an unknown name: the nearest one, and all there are.
+
+    Examples
+    --------
+    >>> nearest("inv22", ["inv1", "inv2"], "agents")
+    'did you mean "inv2"? The agents are inv1, inv2'
+    """
+    names = list(known)
+    lower = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(wrong.lower(), lower, n=1)
+    listed = f"he {what} are {', '.join(names)}" if names else f"here are no {what}"
+    return f'did you mean "{lower[near[0]]}"? T{listed}' if near else f"t{listed}"

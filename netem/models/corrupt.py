@@ -1,0 +1,51 @@
+"""One bit of some messages is flipped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+
+from netem.draws import Stream
+from netem.mistakes import Mistake, probability
+
+_WHETHER, _WHICH, _PER_COPY = 0, 1, 2
+"""Indices of the draws of the first copy; those of the next follow."""
+
+
+class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
+
+    p: float
+    """Probability that an arriving copy of a message is corrupted."""
+    checksum: bool = False
+    """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
+    False: the copy is handed on, and whoever decodes it must cope."""
+
+    def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
+        """From message number, copy and size (bytes) to the bit that is flipped, None if none is."""
+        uniform, below, p = stream.uniform, stream.below, self.p
+
+        def bit(seq: int, copy: int, size: int) -> int | None:
+            index = copy * _PER_COPY
+            if size == 0 or uniform(seq, index + _WHETHER) >= p:
+                return None
+            return below(8 * size, seq, index + _WHICH)
+
+        return bit
+
+    def mistakes(self) -> list[Mistake]:
+        """Values that cannot be meant."""
+        return probability("p", self.p, "a corruption")
+
+
+def flip(payload: bytes, bit: int) -> bytes:
+    """The payload with one bit flipped; bit 0 is the lowest of the first byte.
+
+    Examples
+    --------
+    >>> flip(b"abc", 9)
+    b'a`c'
+    """
+    byte, place = divmod(bit, 8)
+    return payload[:byte] + bytes([payload[byte] ^ (1 << place)]) + payload[byte + 1 :]

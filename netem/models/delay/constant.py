@@ -1,0 +1,23 @@
+"""The same delay for every message."""
+
+from __future__ import annotations
+
+from netem.draws import Stream
+from netem.mistakes import Mistake, seconds
+from netem.models.delay.base import DelayModel, Sampler
+
+
+class Constant(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="constant"):
+    """Delay d for every message; in a file `delay = 0.1` says the same."""
+
+    delay_s: float
+    """d (s)."""
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """Draw nothing."""
+        delay_s = self.delay_s
+        return lambda seq: delay_s
+
+    def mistakes(self) -> list[Mistake]:
+        """Values that cannot be meant."""
+        return seconds("delay_s", self.delay_s, "a delay")

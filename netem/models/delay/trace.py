@@ -1,0 +1,46 @@
+"""Delays as somebody measured them, one after the other."""
+
+from __future__ import annotations
+
+from netem.draws import Stream
+from netem.mistakes import Mistake, below, seconds
+from netem.models.delay.base import DelayModel, Sampler
+
+MOST_SHOWN = 5
+"""So many wrong delays of a trace are named; a file in milliseconds has thousands."""
+
+
+class Trace(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="trace"):
+    """Message n has delay number (n + start) mod length of the trace.
+
+    In a scenario `file` names a CSV file with a column `delay_s`; `netem.spec.trace_file` reads it into `delays_s`, so
+    that what agents are told needs no file.
+    """
+
+    file: str = ""
+    """Path of the CSV file, seen from the scenario's."""
+    delays_s: tuple[float, ...] = ()
+    """The delays (s), in the order of the messages."""
+    spread: bool = True
+    """Whether each link starts at a place of its own, drawn once; else all links have the same delay at once."""
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """Draw where the link starts, once."""
+        delays, start = self.delays_s, self.start(stream)
+        return lambda seq: delays[(seq + start) % len(delays)]
+
+    def start(self, stream: Stream) -> int:
+        """Index of the delay that message 0 has."""
+        return stream.below(len(self.delays_s), 0) if self.spread else 0
+
+    def mistakes(self) -> list[Mistake]:
+        """Values that cannot be meant."""
+        if not self.delays_s:
+            return [] if self.file else [Mistake("", 'a trace needs delays: write file = "delays.csv"')]
+        wrong = [
+            mistake
+            for i, delay_s in enumerate(self.delays_s)
+            for mistake in below(f"delays_s[{i}]", seconds("", delay_s, "a delay"))
+        ]
+        more = len(wrong) - MOST_SHOWN
+        return wrong[:MOST_SHOWN] + ([Mistake("delays_s", f"{more} more like these")] if more > 0 else [])

@@ -1,0 +1,31 @@
+"""Delays between two bounds, all alike."""
+
+from __future__ import annotations
+
+from netem.mistakes import Mistake, seconds
+from netem.models.delay.base import RandomDelay
+
+
+class Uniform(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="uniform"):
+    """Delay uniform on (low, high): F^-1(u) = low + u (high - low)."""
+
+    low_s: float
+    """Shortest delay (s)."""
+    high_s: float
+    """Longest delay (s)."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) at share u."""
+        return self.low_s + u * (self.high_s - self.low_s)
+
+    def cdf(self, delay_s: float) -> float:
+        """Share up to a delay (s)."""
+        return min(max((delay_s - self.low_s) / (self.high_s - self.low_s), 0.0), 1.0)
+
+    def mistakes(self) -> list[Mistake]:
+        """Values that cannot be meant."""
+        found = seconds("low_s", self.low_s, "a delay") + seconds("high_s", self.high_s, "a delay")
+        if not found and self.low_s >= self.high_s:
+            text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
+            found.append(Mistake("low_s", text))
+        return found + self._wrong_correlation()

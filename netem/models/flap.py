@@ -1,0 +1,39 @@
+"""A link that goes up and down and up again."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from netem.mistakes import Mistake, seconds
+
+LONGEST_FLAP = 600.0
+"""Longest plausible up or down time (s)."""
+
+
+class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Up for up_s, down for down_s, and so on, beginning with up at the entry's from_s."""
+
+    up_s: float
+    """How long the link is up (s)."""
+    down_s: float
+    """How long it is down (s)."""
+    hold: bool = False
+    """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
+
+    def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
+        """Until when the link is down at t (s of run time), None if it is up."""
+        if not from_s <= t < to_s:
+            return None
+        period = self.up_s + self.down_s
+        number = math.floor((t - from_s) / period)
+        end = from_s + (number + 1) * period
+        if t < end - self.down_s:
+            return None
+        return min(end, to_s)
+
+    def mistakes(self) -> list[Mistake]:
+        """Values that cannot be meant."""
+        found = seconds("up_s", self.up_s, "the up time of a flap", high=LONGEST_FLAP, above_zero=True)
+        return found + seconds("down_s", self.down_s, "the down time of a flap", high=LONGEST_FLAP, above_zero=True)

@@ -1,0 +1,273 @@
+"""All links into one receiver: what is offered is judged, kept as long as it must, and handed out when it is due. Pure.
+
+A driver calls `offer` for each message that has come and `due` when the time is; both take times as arguments (s of run
+time). `until` says when the next message is due, so that a wall-clock driver can sleep until then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from heapq import heapify, heappop, heappush
+from typing import NamedTuple
+from zlib import crc32
+
+import msgspec
+
+from netem.channel import FOREVER, NEVER, Channel
+from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
+from netem.models.corrupt import flip
+from netem.spec.change import Change, Heal, changed, schedule_of
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from netem.spec.pattern import Link
+
+NANO = 1e9
+"""Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
+
+
+class Arrival(NamedTuple):
+    """A message that has arrived."""
+
+    src: str
+    """Who sent it."""
+    payload: bytes
+    """The message, with a flipped bit if it was corrupted."""
+    delay: float
+    """By how much netem delayed it (s)."""
+
+
+class _Special(NamedTuple):
+    """What few messages on their way have."""
+
+    copy: int
+    bit: int | None
+    checksum: bool
+    t: float
+    at: float
+    held_until: float
+
+
+_Waiting = tuple[float, int, str, int, bytes, float, _Special | None]
+"""A copy of a message on its way: when it arrives (ns of run time), its number and sender, a number of its own so that
+no two are compared further, the message, its delay (s). A plain tuple, as it is made for every message."""
+
+
+class _Inbound:
+    """One link into this receiver."""
+
+    __slots__ = ("channel", "due", "is_clear", "ledger", "story")
+
+    def __init__(self, channel: Channel, *, keep: bool) -> None:
+        self.channel, self.is_clear = channel, channel.is_clear
+        self.ledger = Ledger(keep=keep)
+        self.story = self.due = NEVER
+        """Latest arrival so far, as netem has it (s), and as it is (ns)."""
+
+
+class Receiver:
+    """All links into one receiver.
+
+    Parameters
+    ----------
+    name : str
+        The receiver: an inverter, or the plant.
+    netem : Netem
+        What the run's links do.
+    microgrids : Mapping[str, str]
+        Microgrid of every inverter that is known, in the order of their table; see `meet` for others.
+    keep_trace : bool
+        Whether verdicts are kept for `take_trace`; their hash is in any case.
+
+    Examples
+    --------
+    >>> netem = Netem(links=(Fault(on="inv1 -> inv2", delay=0.25),))
+    >>> receiver = Receiver("inv2", netem, {"inv1": "MG1", "inv2": "MG1"})
+    >>> receiver.offer("inv1", seq=0, t=0.0, at=0.0, payload=b"state")
+    >>> receiver.until, receiver.due(0.2), receiver.due(0.25)
+    (0.25, [], [Arrival(src='inv1', payload=b'state', delay=0.25)])
+    """
+
+    def __init__(self, name: str, netem: Netem, microgrids: Mapping[str, str], *, keep_trace: bool = True) -> None:
+        self.name = name
+        self._netem, self._microgrids, self._keep = netem, dict(microgrids), keep_trace
+        self._changes: list[Change] = []
+        self._links: dict[str, _Inbound] = {}
+        self._heap: list[_Waiting] = []
+        self._kept: list[_Waiting] = []
+        """Messages behind a cut without an end."""
+        self._number = 0
+
+    def meet(self, src: str, microgrid: str) -> None:
+        """Learn in which microgrid somebody stands, of whom nothing was offered yet."""
+        self._microgrids.setdefault(src, microgrid)
+
+    def touched(self, src: str) -> bool:
+        """Whether a fault may ever act on the link from somebody: if not, its messages need not come here at all."""
+        return not self._link(src).channel.is_clear
+
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+        """Judge a message.
+
+        Parameters
+        ----------
+        src : str
+            Who sent it.
+        seq : int
+            Its number: it finds its random numbers by it.
+        t : float
+            When it was sent (s of run time): what is scheduled counts then.
+        at : float
+            When it is here without faults (s of run time, on the receiver's clock); t in simulated time.
+        payload : bytes
+            The message.
+        """
+        inbound = self._links.get(src) or self._link(src)
+        inbound.ledger.sent += 1
+        if inbound.is_clear:
+            self._wait(inbound, src, seq, t, at, payload, 0.0, None)
+        else:
+            self._judge(inbound, src, seq, t, at, payload)
+
+    def due(self, now: float) -> list[Arrival]:
+        """What has arrived by `now` (s of run time), in the order of arrival; at one time, of number and sender."""
+        heap, limit = self._heap, round(now * NANO)
+        arrived = []
+        while heap and heap[0][0] <= limit:
+            _, _, src, _, payload, delay, special = heappop(heap)
+            ledger = self._links[src].ledger
+            if special is not None and special.bit is not None:
+                ledger.corrupted += 1
+                sound, payload = payload, flip(payload, special.bit)
+                if special.checksum and crc32(payload) != crc32(sound):
+                    ledger.dropped["checksum"] += 1
+                    continue
+            ledger.delivered += 1
+            arrived.append(Arrival(src, payload, delay))
+        return arrived
+
+    @property
+    def until(self) -> float | None:
+        """When the next message is due (s of run time), None if none is."""
+        return self._heap[0][0] / NANO if self._heap else None
+
+    # ---------------------------------------------------------------- live
+
+    def change(self, fault: Fault, t: float) -> tuple[str, ...]:
+        """Give links a fault, for messages sent at time t (s) or later.
+
+        Returns
+        -------
+        tuple[str, ...]
+            Senders whose links to this receiver it concerns, of those heard so far.
+        """
+        return self._apply(msgspec.structs.replace(fault, from_s=max(t, fault.from_s)), t)
+
+    def heal(self, on: str, t: float, kinds: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """End what holds on links at time t (s), or only some kinds of it; kept messages go on then.
+
+        Returns
+        -------
+        tuple[str, ...]
+            As `change` does.
+        """
+        return self._apply(Heal(on=on, from_s=t, kinds=kinds), t)
+
+    def _apply(self, change: Change, t: float) -> tuple[str, ...]:
+        self._changes.append(change)
+        concerned = []
+        for src, inbound in self._links.items():
+            channel = inbound.channel
+            schedule = changed(channel.schedule, change, channel.link, self._microgrids)
+            if schedule is not channel.schedule:
+                concerned.append(src)
+                kept = self._take_kept(src, t)
+                channel.reschedule(schedule, rewind=bool(kept))
+                inbound.is_clear = channel.is_clear
+                for seq, payload, special in kept:
+                    self._judge(inbound, src, seq, special.t, special.at, payload)
+        return tuple(concerned)
+
+    def _take_kept(self, src: str, t: float) -> list[tuple[int, bytes, _Special]]:
+        """Take back, to be judged anew, what a cut keeps beyond t: number, message and times."""
+        found = []
+        for waiting in (self._heap, self._kept):
+            for entry in sorted(waiting):
+                _, seq, sender, _, payload, _, special = entry
+                if sender == src and special is not None and special.held_until > t:
+                    waiting.remove(entry)
+                    if special.copy:
+                        self._links[src].ledger.duplicated -= 1
+                    else:
+                        found.append((seq, payload, special))
+        heapify(self._heap)
+        if found:
+            self._links[src].story = self._links[src].due = NEVER
+        return sorted(found, key=lambda entry: entry[2].t)
+
+    # ---------------------------------------------------------------- what was
+
+    def counts(self) -> dict[str, LinkCounts]:
+        """How the messages of each sender fared."""
+        flying = [entry[2] for entry in (*self._heap, *self._kept)]
+        return {src: inbound.ledger.counts(flying.count(src)) for src, inbound in sorted(self._links.items())}
+
+    def take_trace(self) -> tuple[LinkTrace, ...]:
+        """Verdicts since last taken, by sender; links that no fault ever touched have none."""
+        found = (inbound.ledger.take(src, self.name) for src, inbound in sorted(self._links.items()))
+        return tuple(trace for trace in found if trace is not None)
+
+    @property
+    def trace_sha256(self) -> str:
+        """Hash (hex) of all verdicts so far: the same in every process in which the same messages were judged."""
+        digests = ((src, inbound.ledger.digest().hex()) for src, inbound in self._links.items())
+        return combined((src, digest) for src, digest in digests if digest)
+
+    # ---------------------------------------------------------------- inside
+
+    def _link(self, src: str) -> _Inbound:
+        inbound = self._links.get(src)
+        if inbound is None:
+            link = Link(src, self.name)
+            schedule = schedule_of(link, self._netem, self._changes, self._microgrids)
+            inbound = _Inbound(Channel(link, schedule.spans, self._netem.seed), keep=self._keep)
+            self._links[src] = inbound
+        return inbound
+
+    def _judge(self, inbound: _Inbound, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+        channel = inbound.channel
+        fate = channel.judge(seq, t, len(payload))
+        inbound.ledger.note(seq, t, fate)
+        held_until, checksum, copy = fate.held_until, channel.checksum, 0
+        for delay, bit in fate.deliveries:
+            plain = copy == 0 and bit is None and held_until == NEVER
+            special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
+            self._wait(inbound, src, seq, t, at, payload, delay, special)
+            copy += 1  # noqa: SIM113  enumerate costs a tenth of a message
+
+    def _wait(
+        self,
+        inbound: _Inbound,
+        src: str,
+        seq: int,
+        t: float,
+        at: float,
+        payload: bytes,
+        delay: float,
+        special: _Special | None,
+    ) -> None:
+        """Keep a copy until it is due.
+
+        What netem leaves in order stays so: the way to this process, which a wall-clock `at` holds, never makes one
+        message overtake another.
+        """
+        self._number += 1
+        if delay == FOREVER:
+            self._kept.append((FOREVER, seq, src, self._number, payload, delay, special))
+            return
+        due: float = round((at + delay) * NANO)
+        story = t + delay
+        if story >= inbound.story and (special is None or special.copy == 0):
+            if due < inbound.due:
+                due = inbound.due
+            inbound.story, inbound.due = story, due
+        heappush(self._heap, (due, seq, src, self._number, payload, delay, special))

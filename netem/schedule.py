@@ -1,0 +1,108 @@
+"""All faults of one link in the order of their precedence, and what holds at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+from itertools import pairwise
+from typing import NamedTuple
+
+from netem.models.instant import INSTANT
+from netem.spec.fault import Span
+
+GATES = ("cut", "partition", "flap")
+"""Kinds that let nothing pass: all of them count at once, where of another kind only one entry can hold."""
+
+
+class Segment(NamedTuple):
+    """A stretch of time in which the same entries hold."""
+
+    from_s: float
+    """Its beginning (s of run time), early by an instant."""
+    to_s: float
+    """Its end (s), early by an instant."""
+    active: dict[str, Span]
+    """The entry that holds, by kind."""
+
+
+class Schedule:
+    """Faults of one link.
+
+    Parameters
+    ----------
+    spans : Iterable[Span]
+        Faults, those of a scenario first. Where two of one kind hold at once, the later one in this order counts; in
+        a scenario that is a mistake, but what somebody does live takes precedence over the scenario while it lasts.
+    """
+
+    def __init__(self, spans: Iterable[Span]) -> None:
+        self.spans = tuple(span for span in spans if span.to_s > span.from_s)
+
+    def at(self, t: float) -> Segment:
+        """What holds at time t (s)."""
+        now = t + INSTANT
+        bounds = [bound for span in self.spans for bound in (span.from_s, span.to_s)]
+        return Segment(
+            max((bound for bound in bounds if bound <= now), default=-math.inf) - INSTANT,
+            min((bound for bound in bounds if bound > now), default=math.inf) - INSTANT,
+            {span.kind: span for span in self.spans if span.from_s <= now < span.to_s},
+        )
+
+    def passes(self, t: float) -> tuple[float, str]:
+        """When a message of time t (s) gets past cuts, and "", or why it does not.
+
+        The time is infinite for a message kept by a cut without an end. A kept message is let go when nothing keeps
+        it any more, and meets whatever holds then.
+        """
+        while True:
+            down = [
+                (span.model.down_until(t + INSTANT, span.from_s, span.to_s), span)
+                for span in self.at(t).active.values()
+                if span.kind in GATES
+            ]
+            closed = [(until, span) for until, span in down if until is not None]
+            if not closed:
+                return t, ""
+            for _, span in closed:
+                if not span.model.hold:
+                    return t, span.kind
+            t = min(until for until, _ in closed)
+            if math.isinf(t):
+                return t, ""
+
+    def with_spans(self, spans: Iterable[Span]) -> Schedule:
+        """The schedule with more entries, which take precedence."""
+        return Schedule((*self.spans, *spans))
+
+    def healed(self, t: float, kinds: Collection[str] | None = None) -> Schedule:
+        """The schedule without what holds at time t (s), from then on; what is to begin later stays.
+
+        Parameters
+        ----------
+        kinds : Collection[str], optional
+            Kinds to be ended; without them, all.
+        """
+        return Schedule(
+            span._replace(to_s=t)
+            if span.from_s <= t + INSTANT < span.to_s and (kinds is None or span.kind in kinds)
+            else span
+            for span in self.spans
+        )
+
+    def flat(self) -> tuple[Span, ...]:
+        """The same without precedence: of each kind, spans that do not overlap, in the order of kind and time."""
+        found: list[Span] = []
+        for kind in sorted({span.kind for span in self.spans}):
+            own = [span for span in self.spans if span.kind == kind]
+            bounds = sorted({bound for span in own for bound in (span.from_s, span.to_s)})
+            for start, end in pairwise(bounds):
+                holds = [span for span in own if span.from_s <= start and end <= span.to_s]
+                if not holds:
+                    continue
+                last = found[-1] if found else None
+                # A flap counts from its own beginning, so pieces of one can be joined but never moved.
+                if last and last.kind == kind and last.to_s == start and last.model == holds[-1].model:
+                    found[-1] = last._replace(to_s=end)
+                else:
+                    found.append(Span(kind, start, end, holds[-1].model))
+        return tuple(found)

@@ -1,0 +1,143 @@
+"""Which links an entry is about: `"inv4 <-> inv7"`, `"MG1 -> MG2"`, `"* -> inv2"`, `"plant -> inv2"`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+from netem.mistakes import nearest
+from wire.messages import PLANT
+
+ANY = "*"
+"""All agents; the plant only where it is named."""
+
+_ARROW = re.compile(r"(.*?)\s*(<->|->)\s*(.*)")
+
+
+class Link(NamedTuple):
+    """A directed link; the plant is an end as the agents are."""
+
+    src: str
+    """Who sends."""
+    dst: str
+    """Who receives, and judges."""
+
+    def __str__(self) -> str:
+        return f"{self.src} -> {self.dst}"
+
+
+class Side(NamedTuple):
+    """One end of a pattern."""
+
+    names: tuple[str, ...]
+    """Inverters, microgrids, "plant" or "*"."""
+
+    def holds(self, name: str, microgrids: Mapping[str, str]) -> bool:
+        """Whether somebody stands on this side."""
+        if name in self.names or (ANY in self.names and name != PLANT):
+            return True
+        microgrid = microgrids.get(name)
+        return microgrid is not None and microgrid.lower() in (other.lower() for other in self.names)
+
+
+class Pattern(NamedTuple):
+    """A set of directed links, of those who are there and of those who are yet to come."""
+
+    left: Side
+    right: Side
+    both: bool
+    """Whether it also means the links back."""
+
+    def matches(self, src: str, dst: str, microgrids: Mapping[str, str]) -> bool:
+        """Whether it means the link from `src` to `dst`; `microgrids` says in which microgrid an inverter stands."""
+        if src == dst:
+            return False
+        if self.left.holds(src, microgrids) and self.right.holds(dst, microgrids):
+            return True
+        return self.both and self.left.holds(dst, microgrids) and self.right.holds(src, microgrids)
+
+
+@lru_cache(maxsize=1024)
+def parse(text: str) -> Pattern:
+    """Read a pattern.
+
+    Raises
+    ------
+    ValueError
+        If it is none, with what one looks like.
+
+    Examples
+    --------
+    >>> microgrids = {"inv1": "MG1", "inv2": "MG1", "inv4": "MG2"}
+    >>> parse("mg1 -> {inv4, plant}").matches("inv2", "inv4", microgrids)
+    True
+    >>> parse("* <-> *").matches("inv2", "plant", microgrids)
+    False
+    """
+    found = _ARROW.fullmatch(text.strip())
+    if found is None:
+        hint = "; write the sender first" if "<-" in text else ""
+        raise ValueError(f'"{text}" names no links{hint}; write "inv4 <-> inv7", "MG1 -> MG2" or "* -> inv2"')
+    return Pattern(_side(found[1], text), _side(found[3], text), found[2] == "<->")
+
+
+def _side(text: str, whole: str) -> Side:
+    if text.startswith("{") and text.endswith("}"):
+        names = tuple(name.strip() for name in text[1:-1].split(","))
+    else:
+        names = (text,)
+    if not all(re.fullmatch(r"\*|[A-Za-z0-9_.-]+", name) for name in names):
+        rule = "write an inverter, a microgrid, plant, *, or several as {inv1, inv2}"
+        raise ValueError(f'"{text}" in "{whole}" is no name; {rule}')
+    return Side(names)
+
+
+def objections(text: str, names: Iterable[str], microgrids: Mapping[str, str]) -> list[str]:
+    """All that is wrong with a pattern: it is none, it names somebody unknown, or it means no link at all.
+
+    Parameters
+    ----------
+    text : str
+        The pattern.
+    names : Iterable[str]
+        All inverters, spare ones included.
+    microgrids : Mapping[str, str]
+        The microgrid of each.
+
+    Examples
+    --------
+    >>> objections("inv1 -> inv2", ["inv1", "inv2"], {})
+    []
+    >>> objections("a -> inv1", ["inv1"], {})
+    ['"a -> inv1" matches nothing: nobody is called "a"; the names are inv1, plant, *']
+    """
+    try:
+        pattern = parse(text)
+    except ValueError as error:
+        return [str(error)]
+    agents = list(names)
+    groups = list(dict.fromkeys(microgrids[name] for name in agents if name in microgrids))
+    known = [*agents, *groups, PLANT, ANY]
+    lower = {group.lower() for group in groups}
+    unknown = [
+        name
+        for side in (pattern.left, pattern.right)
+        for name in side.names
+        if name not in known and name.lower() not in lower
+    ]
+    if unknown:
+        return [
+            f'"{text}" matches nothing: nobody is called "{name}"; {nearest(name, known, "names")}'
+            for name in dict.fromkeys(unknown)
+        ]
+    if not any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):
+        return [f'"{text}" matches nothing: a link has two different ends, and the plant has links to agents only']
+    return []
+
+
+def links_among(names: Iterable[str]) -> list[Link]:
+    """Every directed link among inverters and between each and the plant."""
+    ends = [*names, PLANT]
+    return [Link(src, dst) for src in ends for dst in ends if src != dst]
