@@ -127,11 +127,11 @@ class Side:
         messages: list[AnyMessage] = []
         if self._links is None:
             return messages
-        for src, payload in self._links.due(now):
+        for arrival in self._links.due(now):
             try:
-                messages.append(decode(payload))
+                messages.append(decode(arrival.payload))
             except RejectedError as rejected:
-                self.rejects.add(rejected.kind, f"the link from {src}", rejected.text)
+                self.rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
         return messages
 
     def _publish(self, key: str, payload: bytes) -> None:

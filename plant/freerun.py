@@ -22,22 +22,19 @@ from typing import Literal
 from plant.config import PlantConfig
 from plant.interface import LivePlant
 from plant.pacing import TOLERATED, Pacer, sentence
-from plant.reporting import Reporter, measurement_of
-from plant.schedule import Schedule
+from plant.reporting import measurement_of
 from plant.service import Service
-from wire.actions import Action, Fetch, Publish, Say
-from wire.clock import ticks_until, time_of
-from wire.codec import RejectedError, Rejects, decode, encode
-from wire.keys import Keys, check_name
-from wire.messages import PLANT, AnyMessage, Command, Leave, Nameplate, PlantEvent, State, Stop
+from plant.side import CLOSING, Side
+from wire.actions import Fetch, Say
+from wire.codec import RejectedError, decode, encode
+from wire.keys import check_name
+from wire.links import Links
+from wire.messages import PLANT, Command, Leave, Nameplate, PlantEvent, State
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""
-
-CLOSING = 2.0
-"""Longest wait for the others to close (s)."""
 
 LEAD = 0.25
 """Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
@@ -49,7 +46,7 @@ WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
 
-class FreePlant:
+class FreePlant(Side):
     """The plant in wall-clock time.
 
     Parameters
@@ -58,35 +55,18 @@ class FreePlant:
         Names the agents to wait for, the control period, the speed and the end.
     plant : LivePlant
         The plant at t = 0.
+    links : Links, optional
+        What the links to the plant do to its messages.
     """
 
-    def __init__(self, config: PlantConfig, plant: LivePlant) -> None:
-        for name in config.agents:
-            check_name("agents", name)
-            if name not in plant.inverters:
-                raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
+    def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
+        super().__init__(config, plant, links)
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(PLANT)
         self.phase: Phase = "gathering"
-        self.outcome = ""
-        """Why the run broke; empty while it goes well."""
-        self.cause: RuntimeError | None = None
-        """What the plant raised, if that broke the run."""
-        self.tick = 0
-        """k: the plant stands at k T_c."""
-        self.instances: dict[str, str] = {}
-        """The one instance of each agent that takes part."""
-        self.plates: dict[str, Nameplate] = {}
-        self.config, self.plant = config, plant
+        self.plant = plant
         self.pacer = Pacer(config.T_c / config.speed, 0.0)
-        self._ticks = None if config.end is None else ticks_until(config.end, config.T_c)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
-        self._actions: list[Action | Say] = []
-        self._recorders: set[str] = set()
-        self._tokens: set[str] = set()
-        """All tokens of agents and recorders that are there now, refused ones too."""
         self._states: dict[str, State] = {}
         self._last: dict[str, int] = {}
         """Number of the last state of each agent."""
@@ -95,18 +75,11 @@ class FreePlant:
         self._step_due = False
         self._deadline = 0.0
         self._complained = False
-        self._reporter = Reporter(config.incarnation, plant)
         self._service = Service(self)
-        self._schedule = Schedule(config, plant.inverters)
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
         self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def token(self) -> str:
-        """Key of the plant's liveliness token."""
-        return self.keys.alive_plant
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
@@ -117,11 +90,6 @@ class FreePlant:
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         return self.keys.control, self.keys.telemetry, *map(self.keys.measurement, self.plant.inverters)
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
 
     @property
     def over(self) -> bool:
@@ -146,11 +114,6 @@ class FreePlant:
         self._say(f"run {self.config.run}: waits up to {self.config.wait_for_agents:g} s for {names}")
         self._gather(now)
 
-    def take_actions(self) -> list[Action | Say]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
     def abort(self, reason: str, now: float) -> None:
         """End the run because something went wrong."""
         if self.phase not in ("closing", "over"):
@@ -173,18 +136,6 @@ class FreePlant:
         self._deadline = now + CLOSING
         if not self._tokens:
             self.phase = "over"
-
-    def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
-        """Tell one agent, or all, to close."""
-        stop = Stop(
-            sender=PLANT,
-            incarnation=self.config.incarnation,
-            seq=self.tick,
-            t=self.t,
-            reason=reason,
-            refused=refused,
-        )
-        self._actions.append(Publish(key, encode(stop)))
 
     # ---------------------------------------------------------------- liveliness
 
@@ -226,7 +177,7 @@ class FreePlant:
 
     def _drop(self, name: str) -> None:
         del self.instances[name]
-        for known in (self.plates, self._states, self._last, self._heard):
+        for known in (self.plates, self._states, self._last, self._heard, self._set_by):
             known.pop(name, None)
 
     # ---------------------------------------------------------------- messages
@@ -241,7 +192,8 @@ class FreePlant:
                 if message.seq <= self._last.get(name, -1):
                     raise RejectedError("stale", f"State({message.seq}) of {name} after {self._last[name]}")
                 self._last[name], self._heard[name] = message.seq, now
-                self._states[name] = message
+                if not self._is_offered(message, payload, now * self.config.speed):
+                    self._states[name] = message
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
                 self._on_leave(name, now)
@@ -253,14 +205,6 @@ class FreePlant:
                 raise RejectedError("foreign", f"a {type(message).__name__} of {name}")
         except RejectedError as rejected:
             self.rejects.add(rejected.kind, key, rejected.text)
-
-    def _check_sender(self, expected: str, message: AnyMessage) -> None:
-        name, life = message.sender, message.incarnation
-        if name != expected:
-            raise RejectedError("foreign", f"sender {name}, {expected} was expected")
-        plate = self.plates.get(name)
-        if plate is None or life != plate.incarnation:
-            raise RejectedError("ghost", f"life {life} of {name} does not take part")
 
     def _on_nameplate(self, plate: Nameplate, now: float) -> None:
         name = plate.sender
@@ -283,7 +227,7 @@ class FreePlant:
         except ValueError as error:
             raise RejectedError("garbled", str(error)) from None
         answer = self._service.serve(command)
-        self._actions.append(Publish(self.keys.answer(command.reply_to), encode(answer)))
+        self._publish(self.keys.answer(command.reply_to), encode(answer))
         if command.verb == "down":
             self.close("the run was ended by command", now)
 
@@ -300,11 +244,6 @@ class FreePlant:
     def events(self) -> tuple[PlantEvent, ...]:
         """The latest events, oldest first."""
         return tuple(self._reporter.latest)
-
-    @property
-    def t(self) -> float:
-        """Run time the plant stands at (s)."""
-        return time_of(self.tick, self.config.T_c)
 
     def _gather(self, now: float) -> None:
         """Begin, if all are there."""
@@ -371,7 +310,7 @@ class FreePlant:
         roster = tuple(name for name in self.plant.inverters if now - self._heard.get(name, -HEARD) < HEARD)
         for name in self.plates:
             message = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
-            self._actions.append(Publish(self.keys.measurement(name), encode(message)))
+            self._publish(self.keys.measurement(name), encode(message))
         self._step_due = True
 
     def work(self, now: float) -> bool:
@@ -379,6 +318,9 @@ class FreePlant:
         if not self._step_due:
             return False
         self._step_due = False
+        for state in self._arrived(now * self.config.speed):
+            if state.sender in self.plates:
+                self._states[state.sender] = state
         for name, state in self._states.items():
             self.plant.hold(name, state.P_set, state.V_set)
         self._states.clear()
@@ -408,13 +350,4 @@ class FreePlant:
 
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
-        messages = self._reporter.report(
-            self.t,
-            final=final,
-            outcome=self.outcome,
-            reproducible=False,
-            pacing=self.pacer.report(),
-            awaited=awaited,
-        )
-        for message in messages:
-            self._actions.append(Publish(self.keys.telemetry, encode(message)))
+        self._telemetry(final=final, reproducible=False, awaited=awaited, pacing=self.pacer.report())

@@ -30,13 +30,12 @@ from typing import Literal
 
 from plant.config import PlantConfig
 from plant.interface import PlantLike
-from plant.reporting import Reporter, measurement_of
-from plant.schedule import Schedule
-from wire.actions import Action, Fetch, Publish
-from wire.clock import ticks_until, time_of
-from wire.codec import RejectedError, Rejects, decode, encode
-from wire.keys import Keys, check_name
-from wire.messages import PLANT, Nameplate, PlantEvent, Prepare, Ready, State, Stop
+from plant.reporting import measurement_of
+from plant.side import CLOSING, Side
+from wire.actions import Fetch
+from wire.codec import RejectedError, decode, encode
+from wire.links import Links
+from wire.messages import PLANT, Nameplate, PlantEvent, Prepare, Ready, State
 from wire.patience import Awaited, Patience
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
@@ -44,11 +43,8 @@ Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over
 TELEMETRY_TICKS = 10
 """Telemetry is sent at tick 0 and then every so many ticks: enough for a progress bar, few enough to be cheap."""
 
-CLOSING = 2.0
-"""Longest wait for the others to close (s)."""
 
-
-class PlantSide:
+class PlantSide(Side):
     """The plant in simulated time.
 
     Parameters
@@ -57,41 +53,23 @@ class PlantSide:
         Names the agents and recorders to wait for, the control period and the end.
     plant : PlantLike
         The plant at t = 0.
+    links : Links, optional
+        What the links to the plant do to its messages.
     """
 
-    def __init__(self, config: PlantConfig, plant: PlantLike) -> None:
-        for name in config.agents:
-            check_name("agents", name)
-            if name not in plant.inverters:
-                raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(PLANT)
-        self.phase: Phase = "gathering"
-        self.outcome = ""
-        """Why the run broke; empty while it goes well."""
-        self.cause: RuntimeError | None = None
-        """What the plant raised, if that broke the run."""
-        self.reproducible = True
-        self.tick = 0
-        """k: the plant stands at k T_c."""
-        self._config, self._plant = config, plant
-        if config.end is None:
+    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
+        super().__init__(config, plant, links)
+        if self._ticks is None:
             raise ValueError("end: a run in simulated time must have one; give a multiple of T_c in s")
-        self._ticks = ticks_until(config.end, config.T_c)
+        self.phase: Phase = "gathering"
+        self.reproducible = True
+        self._plant = plant
         self._patience = Patience(PLANT, config.deadline)
-        self._actions: list[Action] = []
-        self._schedule = Schedule(config, plant.inverters)
         later = self._schedule.joiners.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in later))
         """All who may ever take part, in the order of the inverters."""
         self._joining: tuple[str, ...] = ()
         """Whom the tick is held for."""
-        self._instances: dict[str, str] = {}
-        """The one instance of each agent that takes part."""
-        self._plates: dict[str, Nameplate] = {}
-        self._recorders: set[str] = set()
-        self._tokens: set[str] = set()
-        """All tokens of agents and recorders that are there now, dismissed ones too."""
         self._roster: tuple[str, ...] = ()
         self._roster_number = -1
         self._roster_changed = False
@@ -100,14 +78,8 @@ class PlantSide:
         self._state_keys = {self.keys.state(name): name for name in self._everyone}
         self._ready_keys = {self.keys.ready(name): name for name in self._everyone}
         self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
-        self._reporter = Reporter(config.incarnation, plant)
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def token(self) -> str:
-        """Key of the plant's liveliness token."""
-        return self.keys.alive_plant
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
@@ -118,11 +90,6 @@ class PlantSide:
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
 
     @property
     def over(self) -> bool:
@@ -144,18 +111,13 @@ class PlantSide:
         self._patience.renew(now)
         self._gather(now)
 
-    def take_actions(self) -> list[Action]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
     def missing(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
         agents = self._everyone
         match self.phase:
             case "gathering":
-                recorders = [Awaited("token", name) for name in self._config.recorders if name not in self._recorders]
-                return (*self._absent(self._config.agents), *recorders)
+                recorders = [Awaited("token", name) for name in self.config.recorders if name not in self._recorders]
+                return (*self._absent(self.config.agents), *recorders)
             case "joining":
                 return self._absent(self._joining)
             case "preparing":
@@ -165,8 +127,8 @@ class PlantSide:
         return ()
 
     def _absent(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
-        absent = [Awaited("token", name) for name in names if name not in self._instances]
-        mute = [Awaited("nameplate", name) for name in names if name in self._instances and name not in self._plates]
+        absent = [Awaited("token", name) for name in names if name not in self.instances]
+        mute = [Awaited("nameplate", name) for name in names if name in self.instances and name not in self.plates]
         return (*absent, *mute)
 
     def expire(self, now: float) -> None:
@@ -201,20 +163,20 @@ class PlantSide:
                 self._tokens.add(key)
                 refusal = self._refusal(name, instance)
                 if refusal:
-                    self._stop(self.keys.dismissal(name, instance), refusal, refused=True)
-                elif name not in self._instances:
-                    self._instances[name] = instance
+                    self.stop(self.keys.dismissal(name, instance), refusal, refused=True)
+                elif name not in self.instances:
+                    self.instances[name] = instance
                     self._actions.append(Fetch(self.keys.nameplate(name, instance)))
 
     def _refusal(self, name: str, instance: str) -> str:
         if name not in self._everyone:
             return f"{name}: the plant waits for no agent of this name, only for {', '.join(self._everyone)}"
-        if self._instances.get(name, instance) != instance:
+        if self.instances.get(name, instance) != instance:
             return f"{name}: another agent of this name takes part in the run already; give this one another name"
-        if self.phase == "gathering" and name not in self._config.agents:
+        if self.phase == "gathering" and name not in self.config.agents:
             return f"{name}: the scenario lets it join later; start it when the plant awaits it"
-        if self.phase != "gathering" and name not in self._instances and name not in self._joining:
-            return f"{name}: the run has begun, at t = {self._t:g} s; an agent can join only before its start"
+        if self.phase != "gathering" and name not in self.instances and name not in self._joining:
+            return f"{name}: the run has begun, at t = {self.t:g} s; an agent can join only before its start"
         return ""
 
     def vanished(self, key: str, now: float) -> None:
@@ -223,29 +185,29 @@ class PlantSide:
         match self.keys.parts(key):
             case ("alive", "recorder", name):
                 self._recorders.discard(name)
-            case ("alive", "agent", name, instance) if self._instances.get(name) == instance:
+            case ("alive", "agent", name, instance) if self.instances.get(name) == instance:
                 self._lose(name, now)
         if self.phase == "closing" and not self._tokens:
             self._be_over()
 
     def _lose(self, name: str, now: float) -> None:
-        del self._instances[name]
-        self._plates.pop(name, None)
+        del self.instances[name]
+        self.plates.pop(name, None)
         if self.phase == "gathering" or (self.phase == "preparing" and self._roster_number == 0):
             self.abort(f"{name} died before the run began", now)
         elif name in self._joining:
-            self.abort(f"{name} died at t = {self._t:g} s, before it had joined", now)
+            self.abort(f"{name} died at t = {self.t:g} s, before it had joined", now)
         elif self.phase in ("preparing", "ticking", "joining"):
             self.reproducible = False
             self._roster_changed = True
             self._waiting.discard(name)
-            text = f"{name} died at t = {self._t:g} s; its inverter stays on primary droop at its last set-points"
+            text = f"{name} died at t = {self.t:g} s; its inverter stays on primary droop at its last set-points"
             self._note(name, text)
             if self.phase == "preparing":  # nobody can get ready to hear the dead
                 self._prepare(now)
 
     def _note(self, name: str, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self._t, kind="roster", subject=name, text=text))
+        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=name, text=text))
 
     # ---------------------------------------------------------------- messages
 
@@ -255,13 +217,13 @@ class PlantSide:
             message = decode(payload)
             name = message.sender
             if key in self._state_keys and isinstance(message, State):
-                self._check_sender(self._state_keys[key], message.incarnation, name)
-                self._on_state(message)
+                self._check_sender(self._state_keys[key], message)
+                self._on_state(message, payload)
             elif key in self._ready_keys and isinstance(message, Ready):
-                self._check_sender(self._ready_keys[key], message.incarnation, name)
+                self._check_sender(self._ready_keys[key], message)
                 self._on_ready(message)
-            elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self._instances.get(name, "")):
-                self._plates[name] = message
+            elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self.instances.get(name, "")):
+                self.plates[name] = message
                 self._gather(now)
             else:
                 raise RejectedError("foreign", f"a {type(message).__name__} of {name}")
@@ -269,18 +231,12 @@ class PlantSide:
         except RejectedError as rejected:
             self.rejects.add(rejected.kind, key, rejected.text)
 
-    def _check_sender(self, expected: str, incarnation: int, name: str) -> None:
-        if name != expected:
-            raise RejectedError("foreign", f"sender {name}, {expected} was expected")
-        plate = self._plates.get(name)
-        if plate is None or incarnation != plate.incarnation:
-            raise RejectedError("ghost", f"life {incarnation} of {name} does not take part")
-
-    def _on_state(self, message: State) -> None:
+    def _on_state(self, message: State, payload: bytes) -> None:
         if self.phase != "ticking" or message.seq != self.tick or message.sender not in self._waiting:
             kind = "stale" if message.seq <= self.tick else "unexpected"
             raise RejectedError(kind, f"State({message.seq}) of {message.sender} at tick {self.tick} ({self.phase})")
-        self._states[message.sender] = message
+        if not self._is_offered(message, payload, message.t):
+            self._states[message.sender] = message
         self._waiting.discard(message.sender)
 
     def _on_ready(self, message: Ready) -> None:
@@ -311,7 +267,7 @@ class PlantSide:
         return True
 
     def _gather(self, now: float) -> None:
-        config = self._config
+        config = self.config
         if self.phase == "gathering" and not self.missing():
             self._roster_changed = True
             self._reporter.collect()
@@ -322,16 +278,16 @@ class PlantSide:
     def _move(self, now: float) -> None:
         """Let leave who leaves at this tick, and begin to wait for who joins."""
         leave, join = self._schedule.take(self.tick)
-        when = f"at t = {self._t:g} s, as the scenario says"
+        when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:
             self._note(name, f"{name} leaves {when}")
-            instance = self._instances.pop(name, "")
-            self._plates.pop(name, None)
+            instance = self.instances.pop(name, "")
+            self.plates.pop(name, None)
             if instance:
-                self._stop(self.keys.dismissal(name, instance), f"{name} leaves {when}")
+                self.stop(self.keys.dismissal(name, instance), f"{name} leaves {when}")
             self._connect(name, False, now)
             self._roster_changed = True
-        join = tuple(name for name in join if name not in self._instances)
+        join = tuple(name for name in join if name not in self.instances)
         for name in join:
             self._note(name, f"{name} joins {when}")
         if join and not self.outcome:
@@ -353,12 +309,12 @@ class PlantSide:
             self._plant.connect(name, on)
         except RuntimeError as error:
             self.cause = error
-            self.abort(f"plant at t = {self._t:g} s: {error}", now)
+            self.abort(f"plant at t = {self.t:g} s: {error}", now)
         else:
             self._reporter.collect()
 
     def _prepare(self, now: float) -> None:
-        self._roster = tuple(name for name in self._everyone if name in self._instances)
+        self._roster = tuple(name for name in self._everyone if name in self.instances)
         self._roster_number += 1
         self._roster_changed = False
         self._waiting = set(self._roster)
@@ -366,13 +322,13 @@ class PlantSide:
         self._patience.renew(now)
         prepare = Prepare(
             sender=PLANT,
-            incarnation=self._config.incarnation,
+            incarnation=self.config.incarnation,
             seq=self._roster_number,
-            t=self._t,
+            t=self.t,
             roster=self._roster,
-            instances=tuple(self._instances[name] for name in self._roster),
+            instances=tuple(self.instances[name] for name in self._roster),
         )
-        self._actions.append(Publish(self.keys.control, encode(prepare)))
+        self._publish(self.keys.control, encode(prepare))
 
     def _grant(self, now: float) -> None:
         """Send every agent its measurement, and with it the grant of this tick."""
@@ -380,14 +336,15 @@ class PlantSide:
         self._waiting = set(self._roster)
         self._patience.renew(now)
         readings = self._plant.measure()
-        t, tick, roster, incarnation = self._t, self.tick, self._roster, self._config.incarnation
+        t, tick, roster, incarnation = self.t, self.tick, self._roster, self.config.incarnation
         for name in roster:
             measurement = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
-            self._actions.append(Publish(self._measurement_keys[name], encode(measurement)))
+            self._publish(self._measurement_keys[name], encode(measurement))
         if tick == 0:
             self._report(final=False)
 
     def _finish_tick(self, now: float) -> None:
+        self._states.update((state.sender, state) for state in self._arrived(self.t))
         for name in self._roster:
             state = self._states.get(name)
             if state is not None:
@@ -408,31 +365,17 @@ class PlantSide:
 
     # ---------------------------------------------------------------- telemetry and the end
 
-    @property
-    def _t(self) -> float:
-        return time_of(self.tick, self._config.T_c)
-
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
-        """Send rows and events, and who is to be started."""
-        messages = self._reporter.report(
-            self._t, final=final, outcome=self.outcome, reproducible=self.reproducible, awaited=awaited
-        )
-        for message in messages:
-            self._actions.append(Publish(self.keys.telemetry, encode(message)))
+        self._telemetry(final=final, reproducible=self.reproducible, awaited=awaited)
 
     def _close(self, reason: str, now: float) -> None:
         self._report(final=True)
-        self._stop(self.keys.control, reason)
+        self.stop(self.keys.control, reason)
         self.phase = "closing"
         self._waiting = set()
         self._patience.until = now + CLOSING
         if not self._tokens:
             self._be_over()
-
-    def _stop(self, key: str, reason: str, *, refused: bool = False) -> None:
-        incarnation, t = self._config.incarnation, self._t
-        stop = Stop(sender=PLANT, incarnation=incarnation, seq=self.tick, t=t, reason=reason, refused=refused)
-        self._actions.append(Publish(key, encode(stop)))
 
     def _be_over(self) -> None:
         self.phase = "over"

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Protocol
 
 
-class Arrival(NamedTuple):
+class Arrival(Protocol):
     """A message that a link has let through."""
 
-    src: str
-    """Who sent it."""
-    payload: bytes
-    """Its bytes, as the link left them."""
+    @property
+    def src(self) -> str:
+        """Who sent it."""
+        ...
+
+    @property
+    def payload(self) -> bytes:
+        """Its bytes, as the link left them."""
+        ...
 
 
 class Links(Protocol):
@@ -42,7 +48,7 @@ class Links(Protocol):
         """
         ...
 
-    def due(self, now: float) -> list[Arrival]:
+    def due(self, now: float) -> Sequence[Arrival]:
         """Take out what has arrived by now, in the order of arrival."""
         ...
 
