@@ -17,13 +17,13 @@ def predict(
         str | None, typer.Option(metavar="NAMES", help="Cases to predict, e.g. III,IV; all when left out.")
     ] = None,
     vars_: Annotated[
-        bool, typer.Option("--vars", help="Also the modes of voltage and vars, from the plant's sensitivities.")
-    ] = False,
+        bool, typer.Option("--vars/--no-vars", help="Modes of voltage and vars, which take a second or two.")
+    ] = True,
 ) -> None:
     """Predict modes, settling times, limits of step and delay, and times to restore after each event, from theory.
 
-    Nothing is run but the plant on droop alone, once, to learn the load of each event. docs/theory.md has the
-    equations and how far they met the plant.
+    Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
+    docs/theory.md has the equations, and how far they met the plant.
 
     Exit code: 0 all is well, 2 bad usage or a bad file, 3 the plant has no solution.
 

@@ -127,7 +127,7 @@ class Loop:
         return a, np.where(fleet.leads, 1.0 - np.exp(-fleet.kappa * fleet.T_c), 0.0)
 
     @cached_property
-    def _built(self) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
+    def _built(self) -> tuple[Floats, Floats, Floats]:
         """Map of the state, and the rows that read e and the powers from it.
 
         The state: y(k-1), ..., y(k-H); x(k); e(k-1), ..., e(k-M); held values; the load.
@@ -139,20 +139,21 @@ class Loop:
         x0 = H * n
         e0, held0 = x0 + states, x0 + states + M
         load = held0 + len(delays.lossy)
-        one = sp.eye_array(load + 1, format="csr")
+        one = np.eye(load + 1)
 
-        def y(back: int, i: int) -> sp.csr_array:
+        def y(back: int, i: int) -> Floats:
             """y_i(k - back)."""
-            return one[[(back - 1) * n + i]]
+            row: Floats = one[(back - 1) * n + i]
+            return row
 
-        before = sp.vstack([y(1 + setpoint[i], i) for i in range(n)], format="csr")
+        before = np.array([y(1 + setpoint[i], i) for i in range(n)])
         x = one[x0:e0]
-        e_now = sp.csr_array(plant.C[None] @ x + plant.D[None] @ before) + plant.F * one[[load]]
-        powers = plant.C_p @ x + plant.D_p @ before + plant.F_p[:, None] @ one[[load]]
+        e_now = plant.C @ x + plant.D @ before + plant.F * one[load]
+        powers = plant.C_p @ x + plant.D_p @ before + np.outer(plant.F_p, one[load])
 
         held = {}
         for k, (i, j) in enumerate(delays.lossy):
-            held[i, j] = (1.0 - loss[i][j]) * y(1 + link[i][j], j) + loss[i][j] * one[[held0 + k]]
+            held[i, j] = (1.0 - loss[i][j]) * y(1 + link[i][j], j) + loss[i][j] * one[held0 + k]
 
         (a, b), degree, new = self.gains, fleet.degree, []
         for i in range(n):
@@ -163,17 +164,17 @@ class Loop:
                     heard = held[i, j] if (i, j) in held else y(1 + link[i][j], j)
                     row = row + (a[i] * fleet.heard[i, j] / degree[i]) * heard
             if fleet.leads[i]:
-                row = row - b[i] * (one[[e0 + measurement[i] - 1]] if measurement[i] else e_now)
+                row = row - b[i] * (one[e0 + measurement[i] - 1] if measurement[i] else e_now)
             new.append(row)
-        now = sp.vstack([y(setpoint[i], i) if setpoint[i] else new[i] for i in range(n)], format="csr")
-        moved = sp.csr_array(plant.A @ x + plant.B @ now + plant.E[:, None] @ one[[load]])
-        rows = [*new, one[: (H - 1) * n], moved]
-        rows += [e_now, one[e0 : held0 - 1]] if M else []
-        rows += [*held.values(), one[[load]]]
-        return sp.csr_array(sp.vstack(rows)), e_now, sp.csr_array(powers)
+        now = np.array([y(setpoint[i], i) if setpoint[i] else new[i] for i in range(n)])
+        moved = plant.A @ x + plant.B @ now + np.outer(plant.E, one[load])
+        rows = [*new, *one[: (H - 1) * n], *moved]
+        rows += [e_now, *one[e0 : held0 - 1]] if M else []
+        rows += [*held.values(), one[load]]
+        return np.array(rows), e_now, powers
 
     @property
-    def matrix(self) -> sp.csr_array:
+    def matrix(self) -> Floats:
         """Map of the state of one tick to that of the next, the constant load last in it."""
         return self._built[0]
 
@@ -185,7 +186,7 @@ class Loop:
         frozen[-1] = True
         frozen[: self._delays.depth * self.fleet.n] = np.tile(~self.fleet.acts, self._delays.depth)
         keep = np.flatnonzero(~frozen)
-        return np.asarray(matrix.toarray()[np.ix_(keep, keep)])
+        return np.asarray(matrix[np.ix_(keep, keep)])
 
     @cached_property
     def resting(self) -> int:
@@ -236,9 +237,10 @@ class Loop:
             z[-1 - len(lossy) : -1] = start[[j for _, j in lossy]]
         z[-1] = load
         e, powers, set_points = np.zeros(ticks), np.zeros((ticks, n)), np.zeros((ticks, n))
+        step = sp.csr_array(matrix)
         for k in range(ticks):
-            e[k], powers[k] = (e_row @ z)[0], power_rows @ z
-            z = matrix @ z
+            e[k], powers[k] = e_row @ z, power_rows @ z
+            z = step @ z
             set_points[k] = z[:n]
         t: Floats = np.arange(1.0, ticks + 1.0) * fleet.T_c
         return Path(t, e, powers, set_points)

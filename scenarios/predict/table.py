@@ -20,8 +20,9 @@ from scenarios.predict.fleet import Fleet
 from scenarios.predict.limits import delay_limit
 from scenarios.predict.loads import IslandStep
 from scenarios.predict.model import Loop
-from scenarios.predict.sensitivity import Sensitivity, VarModes, var_modes
+from scenarios.predict.sensitivity import Sensitivity
 from scenarios.predict.times import Times, predicted_times
+from scenarios.predict.vars import var_delay_limit, var_modes
 
 WIDTH = 100
 """Columns."""
@@ -45,10 +46,8 @@ def case_text(title: str, fleet: Fleet, steps: Sequence[tuple[IslandStep, Fleet]
         For voltage and vars.
     """
     if not fleet.acts.any():
-        return (
-            f"{title}\n  No secondary control: no modes, no limits of delay. Droop alone decides, at once; "
-            "`gridpeers run` shows it."
-        )
+        words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
+        return "\n".join([title, *_wrapped(words, "  ")])
     found = modes(fleet)
     lines = [title, *_wrapped(_words(fleet, found), "  ")]
     lines += _aligned([("", "continuous", "our law", ""), *_rows(fleet, found)])
@@ -105,7 +104,7 @@ def _rows(fleet: Fleet, found: Modes) -> list[Row]:
             "delay: plant",
             _s(closed["local loop"], "any"),
             _limit(limits["local loop"]),
-            "measurement or set-point late",
+            "f as measured, or P_set, late",
         ),
         ("loss 50 %", "", _s(equivalent_delay(fleet.T_c, 0.5), ""), "held: as so much more delay on the links"),
         ("loss 90 %", "", _s(equivalent_delay(fleet.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
@@ -136,15 +135,16 @@ def _sentence(times: Times) -> str:
 
 def _vars(fleet: Fleet, plant: Sensitivity | None) -> list[str]:
     if plant is None:
-        return ["  Voltage and vars: not predicted here; --vars adds their modes from the plant's sensitivities."]
-    known = [name in plant.names for name in fleet.names]
-    if not all(known):
+        return ["  Voltage and vars: left out by --no-vars."]
+    if not all(name in plant.names for name in fleet.names):
         return ["  Voltage and vars: not predicted with spare inverters."]
-    found: VarModes = var_modes(fleet, plant)
+    found, limit = var_modes(fleet, plant), var_delay_limit(fleet, plant)
     if found.spectral_radius >= 1.0:
         text = f"unstable on a plant without lags, spectral radius {found.spectral_radius:.4f}"
     else:
-        text = f"slowest mode to 2 % in {found.slowest_s:.2f} s on a plant without lags (an estimate, docs/theory.md)"
+        text = f"slowest mode to 2 % in {found.settling_s:.2f} s; stable up to {_limit(limit)} of delay of measurement "
+        text += "or set-point (on a plant without lags; right to about one control period)"
+        text = text.replace("up to any of delay", "with any delay up to 1 s")
     return _wrapped(f"Voltage and vars: {text}.", "  ")
 
 
