@@ -154,6 +154,7 @@ class FreeAgent(Side):
         due = now >= self._status.due
         if due:
             self._status.take(now)
+            self._ask_again()
         if due or (self.phase, self._in_sums) != before:
             self._publish_status(now)
 
@@ -241,6 +242,12 @@ class FreeAgent(Side):
         key = self.keys.nameplate(name, instance)
         self._routes[key] = (name, lambda message, payload, now: self._on_nameplate(name, message))
         self._actions.append(Fetch(key))
+
+    def _ask_again(self) -> None:
+        """Ask once more for the nameplates that have not come: a question dies with its link."""
+        for name, instances in self._claims.items():
+            if name not in self._met:
+                self._fetch_nameplate(name, instances[0])
 
     def _forget(self, name: str) -> None:
         self._met.discard(name)

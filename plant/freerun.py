@@ -42,6 +42,9 @@ LEAD = 0.25
 HEARD = 1.0
 """Time (s, wall) after its last state for which an agent is told to the others as one that is heard."""
 
+AGAIN = 1.0
+"""Time (s, wall) after which a nameplate that has not come is asked for again: a question dies with its link."""
+
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
@@ -70,6 +73,8 @@ class FreePlant(Side):
         self._states: dict[str, State] = {}
         self._last: dict[str, int] = {}
         """Number of the last state of each agent."""
+        self._asked: dict[str, float] = {}
+        """When each was last asked for its nameplate."""
         self._heard: dict[str, float] = {}
         """When the last state of each agent came."""
         self._step_due = False
@@ -156,7 +161,11 @@ class FreePlant(Side):
                     self._refuse(name, instance, f"{reason} first (gridpeers stop {name}), or give this one another")
                 else:
                     self.instances[name] = instance
-                    self._actions.append(Fetch(self.keys.nameplate(name, instance)))
+                    self._ask(name, now)
+
+    def _ask(self, name: str, now: float) -> None:
+        self._asked[name] = now
+        self._actions.append(Fetch(self.keys.nameplate(name, self.instances[name])))
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
         self._say(f"refused {reason}")
@@ -177,7 +186,7 @@ class FreePlant(Side):
 
     def _drop(self, name: str) -> None:
         del self.instances[name]
-        for known in (self.plates, self._states, self._last, self._heard, self._set_by):
+        for known in (self.plates, self._states, self._last, self._asked, self._heard, self._set_by):
             known.pop(name, None)
 
     # ---------------------------------------------------------------- messages
@@ -275,6 +284,9 @@ class FreePlant(Side):
             if self.phase == "running":
                 self._move()
                 self._measure(now)
+                for name in sorted(self.instances.keys() - self.plates.keys()):
+                    if now - self._asked[name] >= AGAIN:
+                        self._ask(name, now)
 
     def _move(self) -> None:
         """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""

@@ -408,3 +408,16 @@ def test_an_agent_without_a_plant_keeps_its_session() -> None:
 
     assert lab.side.phase == "seeking"
     assert not lab.side.over
+
+
+def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
+    """A question can die with the link it went over, though the other's token stays; the answer ends the asking."""
+    lab = running()
+    lab.token("inv2")
+    lab.go(0.5)
+    lab.go(0.5)
+    lab.plate("inv2")
+    lab.go(0.5)
+
+    assert lab.fetched.count(KEYS.nameplate("inv2", "a")) == 3
+    assert lab.listened == [KEYS.state("inv2")]

@@ -357,3 +357,18 @@ def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> No
     assert off == 0.0
     assert awaited == [(0.2, ("inv2",))]
     assert lab.toy.measure()["inv2"].P != 0.0
+
+
+def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
+    """A question can die with the link it went over, though the agent's token stays; the answer ends the asking."""
+    lab = running(2)
+    lab.token("inv2", gone=True)
+    lab.token("inv2", "b")
+    lab.step(60)
+    asked = lab.fetched.count(KEYS.nameplate("inv2", "b"))
+    lab.hear(KEYS.nameplate("inv2", "b"), replace(Agent(agent_config("inv2")).nameplate, incarnation=2))
+    lab.step(60)
+
+    assert asked == 2
+    assert lab.fetched.count(KEYS.nameplate("inv2", "b")) == 2
+    assert [m.to for m in lab.take(Measurement)][-1] == "inv2"
