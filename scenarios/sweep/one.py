@@ -29,6 +29,7 @@ from scenarios.results.record import Tape
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
+from scenarios.sweep.blas import one_thread
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
@@ -56,7 +57,8 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
 def run_one(number: int, scenario: Scenario, case: str) -> Done:
     """Run one case in this thread and measure it."""
     try:
-        return _run(number, scenario, case)
+        with one_thread():
+            return _run(number, scenario, case)
     except Exception as error:
         text = str(error)
         known = type(error).__name__ in ("PlantError", "RecordError")

@@ -33,7 +33,7 @@ MOST_TICKS = 12
 """Most values of a parameter that are written at an axis."""
 
 _NEVER = "#b0b0b0"
-"""Colour of a cell of a heat map whose median never came to be."""
+"""Colour of the hatching of a heat map where the median never came to be."""
 
 
 def draw_all(table: pa.Table, folder: Path) -> tuple[Path, ...]:
@@ -110,8 +110,8 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
             here = np.array([(p, q) == (a, b) for p, q in zip(rows[x], rows[y], strict=True)], dtype=bool)
             medians[i, j] = spread_of([0] * int(here.sum()), z[here], BINS).median[0] if here.any() else np.nan
         masked = np.ma.masked_invalid(medians)
-        colours = mpl.colormaps["cividis"].with_extremes(bad=_NEVER)
-        mesh = panel.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap=colours)
+        mesh = panel.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap="cividis")
+        panel.patch.set(hatch="////", edgecolor=_NEVER)
         figure.colorbar(mesh, ax=panel, label=label_of(index))
         for axis, positions, label in ((panel.xaxis, xs, x), (panel.yaxis, ys, y)):
             every = -(-len(positions) // MOST_TICKS)
@@ -120,8 +120,8 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
             axis.set_label_text(label_of(label))
         panel.tick_params(axis="x", rotation=45)
         panel.grid(visible=False)
-    grey = "; grey: never, or broke, in half of the runs or more"
-    figure.suptitle(f"{window}, case {case}: medians over all other parameters{grey}", fontsize=10)
+    hatched = "; hatched: never, or broke, in half of the runs or more"
+    figure.suptitle(f"{window}, case {case}: medians over all other parameters{hatched}", fontsize=10)
     return figure
 
 

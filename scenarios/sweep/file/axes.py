@@ -90,8 +90,8 @@ def values_of(table: Mapping[str, Any], where: str, mistakes: Mistakes) -> dict[
             values = value
             if not value:
                 mistakes.add(at, "has no value; list at least one")
-            elif any(repr(item) in map(repr, value[:i]) for i, item in enumerate(value)):
-                mistakes.add(at, "lists a value twice, which would be run twice; for more seeds write seeds = n")
+            elif where == "grid" and (twice := _twice(value)) is not None:
+                mistakes.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
         else:
             mistakes.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
             values = []
@@ -105,6 +105,8 @@ def check_zip(values: Mapping[str, Sequence[Any]], mistakes: Mistakes) -> None:
     if len(set(counts.values())) > 1 and all(counts.values()):
         listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
         mistakes.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
+    elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
+        mistakes.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
 
 
 def check_graph(axis: GraphAxis, inverters: Sequence[str], mistakes: Mistakes) -> None:
@@ -121,13 +123,23 @@ def check_graph(axis: GraphAxis, inverters: Sequence[str], mistakes: Mistakes) -
         mistakes.add("graph.per_count", f"must be from 1 to 10000 graphs, got {axis.per_count}")
 
 
+def _twice(items: Sequence[Any]) -> Any:
+    """First item that comes again, or None. They are compared as written: lists and tables are among them."""
+    seen = set()
+    for item in items:
+        if repr(item) in seen:
+            return item
+        seen.add(repr(item))
+    return None
+
+
 def is_number(value: Any) -> TypeGuard[float]:
     """Whether a value of the file is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _is_range(value: Any) -> bool:
-    return isinstance(value, Mapping) and "from" in value
+    return isinstance(value, Mapping) and any(key in value for key in _RANGE)
 
 
 def _spread(value: Mapping[str, Any], at: str, mistakes: Mistakes) -> list[float]:

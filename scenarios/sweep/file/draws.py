@@ -47,7 +47,9 @@ class Law:
 def laws_of(axis: RandomAxis, mistakes: Mistakes) -> dict[str, Law]:
     """Law of each key of `[random.keys]`, mistakes noted."""
     found = {}
-    for path, value in flatten(axis.keys, lambda value: any(name in value for name in LAWS)):
+    for path, value in flatten(
+        axis.keys, lambda value: not any(isinstance(below, Mapping) for below in value.values())
+    ):
         at = f"random.keys.{path}"
         if not isinstance(value, Mapping) or len(value) != 1 or next(iter(value)) not in LAWS:
             wrong = next((key for key in value if key not in LAWS), "") if isinstance(value, Mapping) else ""

@@ -73,11 +73,12 @@ def read_sweep(name: str | Path) -> Plan:
     origin = _origins(sweep, laws, cases, mistakes)
     axes = [] if mistakes.any else _axes(sweep, laws, scenario, names, cases)
     count = of.size(axes)
-    sane = _check_size(sweep, count * len(cases), scenario, mistakes)
-    checked = count if sane else 1
+    size = count * len(cases)
+    checked = count if size <= sweep.max_runs else 1
     samples = Samples(read_toml(base)[1], base, dict(flatten(sweep.set, lambda value: False)), cases)
     runs = samples.runs(islice(of.samples(axes), checked))
     samples.tell(origin, mistakes, checked)
+    _check_size(sweep, size, runs[0].scenario if runs else scenario, mistakes)
     mistakes.raise_if_any()
     return Plan(
         name=sweep.name or path.stem,
@@ -171,13 +172,11 @@ def _axes(
     return axes
 
 
-def _check_size(sweep: Sweep, runs: int, scenario: Scenario, mistakes: Mistakes) -> bool:
-    if runs <= sweep.max_runs or sweep.max_runs < 1:
-        return True
-    time = duration(runs * SECONDS_PER_SECOND * scenario.time.end_s)
-    mistakes.add(
-        "max_runs",
-        f"this is {runs:,} runs, about {time} on one core, and more than max_runs = {sweep.max_runs:,}; thin out the "
-        "axes, or raise max_runs if it is meant",
-    )
-    return False
+def _check_size(sweep: Sweep, runs: int, scenario: Scenario, mistakes: Mistakes) -> None:
+    if runs > sweep.max_runs > 0:
+        time = duration(runs * SECONDS_PER_SECOND * scenario.time.end_s)
+        mistakes.add(
+            "max_runs",
+            f"this is {runs:,} runs, about {time} on one core, and more than max_runs = {sweep.max_runs:,}; thin out "
+            "the axes, or raise max_runs if it is meant",
+        )
