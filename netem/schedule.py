@@ -10,7 +10,10 @@ from typing import NamedTuple
 from netem.models.instant import INSTANT
 from netem.spec.fault import Span
 
-GATES = ("cut", "partition", "flap")
+CUTS = ("cut", "partition")
+"""Kinds that let nothing pass as long as they hold."""
+
+GATES = (*CUTS, "flap")
 """Kinds that let nothing pass: all of them count at once, where of another kind only one entry can hold."""
 
 
@@ -52,7 +55,7 @@ class Schedule:
         """When a message of time t (s) gets past cuts, and "", or why it does not.
 
         The time is infinite for a message kept by a cut without an end. A kept message is let go when nothing keeps
-        it any more, and meets whatever holds then.
+        it any more, and meets whatever holds then; it is lost when a cut that loses begins meanwhile.
         """
         while True:
             down = [
@@ -66,9 +69,15 @@ class Schedule:
             for _, span in closed:
                 if not span.model.hold:
                     return t, span.kind
-            t = min(until for until, _ in closed)
-            if math.isinf(t):
-                return t, ""
+            until = min(until for until, _ in closed)
+            for begins in sorted(span.from_s for span in self.spans if span.kind in CUTS and t < span.from_s < until):
+                active = self.at(begins).active
+                losing = [kind for kind in CUTS if kind in active and not active[kind].model.hold]
+                if losing:
+                    return begins, losing[0]
+            if math.isinf(until):
+                return until, ""
+            t = until
 
     def with_spans(self, spans: Iterable[Span]) -> Schedule:
         """The schedule with more entries, which take precedence."""
