@@ -116,7 +116,7 @@ def test_dask_gives_the_table_of_this_machine(sweep_file: Write, tmp_path: Path)
 
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0007, 0.001]\n"case.IV.graph" = ["full", "ring"]\n')
     with LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=1, threads_per_worker=2, processes=False, host="127.0.0.1", protocol="tcp", dashboard_address=None
+        n_workers=1, threads_per_worker=2, processes=False, host="127.0.0.1", protocol="tcp", dashboard_address=":0"
     ) as cluster:
         there = done(path, tmp_path / "there", dask=cluster.scheduler_address)
 

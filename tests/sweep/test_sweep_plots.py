@@ -1,0 +1,94 @@
+"""Which plots a sweep gets, and what their numbers are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.sweep.choice import choose, values
+from scenarios.sweep.plots import draw_all
+from scenarios.sweep.statistics import spread_of
+
+
+def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:
+    """A table as a sweep writes it, case IV only."""
+    n = len(next(iter(parameters.values())))
+    head = {"sample": list(range(n)), "case": ["IV"] * n, "seed": [1] * n}
+    fate = {"status": ["ran"] * n, "why": [None] * n, "history_sha256": [""] * n}
+    named = {f"event1.{name}": column for name, column in indexes.items()}
+    return pa.table(head | parameters | fate | (named or {"event1.MPSI": [0.1] * n}) | {"event1.p.inv1": [0.5] * n})
+
+
+CHOICES: list[tuple[dict[str, list[Any]], list[str], tuple[str, str] | None]] = [
+    (
+        {"graph.links": [8, 8, 9, 9], "graph.number": [0, 1, 0, 1], "graph.lambda_2": [0.1, 0.2, 0.3, 0.4]},
+        ["graph.links"],
+        None,
+    ),
+    ({"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}, [], ("a", "b")),
+    ({"a": [1, 1, 2, 2], "b": ["ring", "full", "ring", "full"]}, ["a", "b"], None),
+    ({"a": list(range(90)), "b": list(range(90))}, ["a", "b"], None),
+    ({"a": [1, 1], "b": [2, 2]}, [], None),
+]
+
+
+@pytest.mark.parametrize(("parameters", "alone", "map_of"), CHOICES)
+def test_plots_are_chosen_by_what_is_varied(
+    tmp_path: Path, parameters: dict[str, list[Any]], alone: list[str], map_of: tuple[str, str] | None
+) -> None:
+    """One parameter, or a text, or random draws: curves; two numbers on a grid: a map; repeats are no axes."""
+    drawn = table(parameters)
+    choice = choose(drawn)
+
+    assert (choice.alone, choice.map_of) == (alone, map_of)
+    assert choice.indexes == {"event1": ["MPSI"]}
+    files = draw_all(drawn, tmp_path)
+    assert len(files) == len(alone) + (map_of is not None)
+    assert all(file.stat().st_size > 5000 for file in files)
+
+
+def test_a_sweep_of_which_nothing_ran_is_drawn_too(tmp_path: Path) -> None:
+    """No index at all, or none but missing ones: no figure or an empty one, and no error."""
+    column: list[float | None] = [None] * 4
+    grid: dict[str, list[Any]] = {"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}
+    bare = table(grid).drop_columns(["event1.MPSI", "event1.p.inv1"])
+
+    assert draw_all(bare, tmp_path) == ()
+    assert len(draw_all(table(grid, MPSI=column, t_restore_s=column), tmp_path)) == 1
+    assert len(draw_all(table({"a": [1, 2, 3, 4]}, MPSI=column, t_restore_s=column), tmp_path)) == 1
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.none() | st.floats(0.0, 9.0)), min_size=1, max_size=30))
+def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple[int, float | None]]) -> None:
+    """Median and range by sorting, None last: no run is left out because it was bad."""
+    rows = {"event1.t_restore_s": [t for _, t in runs], "event1.MPSI": [t for _, t in runs]}
+
+    spread = spread_of([a for a, _ in runs], values(rows, "event1.t_restore_s"), 12)
+
+    for i, a in enumerate(spread.x):
+        mine = sorted(np.inf if t is None else t for b, t in runs if b == a)
+        middle = [mine[(len(mine) - 1) // 2], mine[len(mine) // 2]]
+        assert spread.median[i] == (np.inf if np.inf in middle else sum(middle) / 2)
+        assert spread.never[i] == mine.count(np.inf)
+        came = [t for t in mine if t < np.inf]
+        assert [spread.low[i], spread.high[i]] == (
+            [came[0], came[-1]] if came else pytest.approx([np.nan] * 2, nan_ok=True)
+        )
+    assert np.isnan(values(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
+
+
+def test_what_was_drawn_at_random_is_grouped_into_equal_parts() -> None:
+    """More values than an axis can have: their medians over groups of as many runs each."""
+    at = np.random.default_rng(3).permutation(np.arange(120.0))
+
+    spread = spread_of(at.tolist(), 2.0 * at, 12)
+
+    assert spread.binned
+    assert spread.x == [4.5 + 10 * i for i in range(12)]
+    assert spread.median.tolist() == [9.0 + 20 * i for i in range(12)]
