@@ -164,14 +164,14 @@ class FreeAgent(Side):
         if not lost:
             return
         what = {
-            PLANT: "the plant is there, but nothing comes from it",
+            PLANT: "nothing comes from the plant" + (", though it is there" if self._plant_there else ""),
             self._name: "the plant is heard, but does not hear this agent",
         }
         self._go_astray(what.get(lost, f"the plant hears {lost}, but nothing comes from it here"))
 
     def _unheard(self, now: float) -> tuple[str, ...]:
         """Who should be heard and is not: the plant, a neighbour that the plant hears, or oneself, by the plant."""
-        if self._ran and self._plant_there and (PLANT not in self._came or now - self._came[PLANT][1] > SILENT):
+        if self._ran and (PLANT not in self._came or now - self._came[PLANT][1] > SILENT):
             return (PLANT,)
         if self.phase != "running" or self._measurement is None:
             return ()

@@ -396,17 +396,32 @@ def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_
     assert not lab.side.over
 
 
-def test_an_agent_without_a_plant_keeps_its_session() -> None:
-    """What is not there cannot be found by another session either."""
+def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_then() -> None:
+    """A half renewed link can hide a plant that is there; each new session is given twice the time, up to a minute."""
     lab = Lab()
     lab.token("plant")
     lab.measure(1)
     lab.go(T_C)
     lab.token("plant", gone=True)
+    lasted = []
+    for _ in range(6):
+        began = lab.now
+        while not lab.side.over:
+            lab.go(0.5)
+        lasted.append(lab.now - began)
+        lab.side.start(lab.now)
+
+    assert lab.side.phase == "seeking"
+    assert lasted == pytest.approx([4.5, 7.0, 14.0, 28.0, 56.0, 60.0], abs=1.1)
+    assert lab.said[-1] == "inv1: nothing comes from the plant; opens a new session"
+
+
+def test_an_agent_that_has_never_had_a_plant_keeps_its_session() -> None:
+    """Nothing says that one is there."""
+    lab = Lab()
     for _ in range(20):
         lab.go(0.5)
 
-    assert lab.side.phase == "seeking"
     assert not lab.side.over
 
 
