@@ -422,7 +422,7 @@ def test_an_agent_that_has_never_had_a_plant_keeps_its_session() -> None:
     for _ in range(20):
         lab.go(0.5)
 
-    assert not lab.side.over
+    assert not lab.side.astray
 
 
 def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
