@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from hypothesis import settings
+
 from netem.channel import Channel, Fate
 from netem.receiver import Receiver
 from netem.spec.fault import Fault
@@ -13,6 +15,9 @@ from netem.spec.pattern import Link
 
 MICROGRIDS = {f"inv{i}": f"MG{(i + 2) // 3}" for i in range(1, 10)}
 """The nine inverters of the paper, three to a microgrid."""
+
+steady = settings(derandomize=True, deadline=None, max_examples=50)
+"""The same examples every time, and no limit on an example's time, which a busy machine would break."""
 
 T_C = 0.02
 """Distance of the messages (s)."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
-from tests.netem.links import T_C, channel, delays, fates
+from tests.netem.links import T_C, channel, delays, fates, steady
 
 N = 4000
 
@@ -44,6 +44,7 @@ def test_quantile_and_distribution_function_are_those_of_the_law(name: str) -> N
         assert model.cdf(law.ppf(u)) == pytest.approx(u, abs=1e-9)
 
 
+@steady
 @given(st.sampled_from(list(LAWS)), st.floats(2.0**-53, 1.0 - 2.0**-53))
 def test_no_delay_is_negative_or_endless(name: str, u: float) -> None:
     """Whatever number is drawn, the delay is finite and not below zero."""
@@ -69,6 +70,7 @@ def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(mode
     assert abs(stats.pearsonr(innovations[1:], innovations[:-1]).statistic) < 3 / math.sqrt(N)
 
 
+@steady
 @given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20), st.booleans())
 def test_a_trace_is_played_in_order_and_again(recorded: list[float], spread: bool) -> None:
     """Message n has the delay n places after the link's start, which without spread is the first of the trace."""
@@ -80,6 +82,7 @@ def test_a_trace_is_played_in_order_and_again(recorded: list[float], spread: boo
     assert drawn[: len(recorded)] == drawn[len(recorded) :]
 
 
+@steady
 @given(st.integers(0, 50), st.floats(0.05, 0.5))
 def test_fifo_delays_never_let_a_message_overtake(seed: int, sigma: float) -> None:
     """With fifo arrivals are in the order of sending, and no delay is shortened; without it, some are not."""

@@ -10,6 +10,7 @@ from scipy import stats
 
 from netem.draws import Stream
 from netem.models.chain import RESTART, Chain
+from tests.netem.links import steady
 
 N = 20_000
 
@@ -34,6 +35,7 @@ def test_numbers_are_uniform_normal_and_independent_from_one_to_the_next() -> No
     assert abs(stats.pearsonr(uniform, normal).statistic) < 3 / math.sqrt(N)
 
 
+@steady
 @given(st.lists(st.tuples(*[st.text(max_size=4)] * 3, st.integers(0, 3)), min_size=2, max_size=6, unique=True))
 def test_every_seed_link_and_purpose_has_numbers_of_its_own(keys: list[tuple[str, str, str, int]]) -> None:
     """No two streams share a number, whatever the names, even where their letters run together."""
@@ -42,6 +44,7 @@ def test_every_seed_link_and_purpose_has_numbers_of_its_own(keys: list[tuple[str
     assert len(set(numbers)) == len(keys)
 
 
+@steady
 @given(st.lists(st.integers(0, 3 * RESTART), min_size=1, max_size=5))
 def test_a_chains_state_depends_on_the_number_and_not_on_what_was_asked_before(numbers: list[int]) -> None:
     """A receiver that missed messages, or joined late, is in the state of one that saw them all."""

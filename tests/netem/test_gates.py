@@ -19,7 +19,7 @@ from netem.models.slots import Slots
 from netem.schedule import Schedule
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
-from tests.netem.links import T_C, channel, fates
+from tests.netem.links import T_C, channel, fates, steady
 
 time = st.integers(0, 200).map(lambda k: k / 10)
 
@@ -29,6 +29,7 @@ def spans(*entries: tuple[str, float, float, object]) -> Channel:
     return Channel(Link("inv1", "inv2"), [Span(*entry) for entry in entries], seed=1)
 
 
+@steady
 @given(st.integers(0, 500), st.integers(0, 500))
 def test_a_cut_drops_what_is_sent_from_its_beginning_up_to_its_end(start: int, end: int) -> None:
     """Of messages at ticks k T_c, those of start <= k < end are dropped, whatever binary makes of k T_c."""
@@ -67,6 +68,7 @@ def test_what_a_cut_lets_go_into_another_cut_meets_that_one() -> None:
     assert kept.judge(0, 0.2, 10).deliveries == ((pytest.approx(1.3), None),)
 
 
+@steady
 @given(st.integers(1, 20), st.integers(1, 20), st.integers(0, 300))
 def test_a_flap_is_up_and_down_in_turn(up: int, down: int, start: int) -> None:
     """From its beginning on, a flapping link is up for up_s and down for down_s, tick by tick."""
@@ -77,6 +79,7 @@ def test_a_flap_is_up_and_down_in_turn(up: int, down: int, start: int) -> None:
         assert (fate.reason == "flap") == (seq >= start and (seq - start) % (up + down) >= up)
 
 
+@steady
 @given(st.integers(1, 40), st.integers(0, 40), st.integers(1, 40), st.integers(0, 2000))
 def test_a_message_goes_in_the_first_slot_that_is_open(period: int, offset: int, length: int, tick: int) -> None:
     """It goes at once if a slot is open, else at the beginning of the next, as counted in whole milliseconds."""
@@ -88,6 +91,7 @@ def test_a_message_goes_in_the_first_slot_that_is_open(period: int, offset: int,
     assert slots.opens(tick / 1000) == pytest.approx(goes / 1000, abs=1e-9)
 
 
+@steady
 @given(
     st.lists(st.tuples(st.integers(0, 300), st.integers(1, 400)), max_size=40), st.integers(1, 20), st.integers(1, 900)
 )
@@ -136,6 +140,7 @@ def test_everything_at_once_adds_up_in_the_order_told() -> None:
     assert judge.judge(0, 0.5, 100).deliveries == ((1.25, None), (1.375, None))
 
 
+@steady
 @given(st.lists(st.tuples(st.sampled_from(["cut", "loss", "delay"]), time, time, st.integers(0, 3)), max_size=6), time)
 def test_a_flat_schedule_says_at_every_time_what_the_layered_one_says(
     layers: list[tuple[str, float, float, int]], t: float

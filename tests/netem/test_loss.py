@@ -13,7 +13,7 @@ from scipy import stats
 from netem.models.corrupt import Corrupt, flip
 from netem.models.duplicate import Duplicate
 from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
-from tests.netem.links import channel, fates
+from tests.netem.links import channel, fates, steady
 
 N = 20_000
 
@@ -71,6 +71,7 @@ def test_gilberts_bursts_are_geometric() -> None:
     assert stats.chisquare(observed, expected).pvalue > 0.01
 
 
+@steady
 @given(probability, st.floats(0.01, 1.0), probability, probability)
 def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
     p: float, r: float, good: float, bad: float
@@ -79,6 +80,7 @@ def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
     _assert_stationary(GilbertElliott(p=p, r=r, loss_good=good, loss_bad=bad))
 
 
+@steady
 @given(st.floats(0.0, 0.5), st.floats(0.01, 0.5), st.floats(0.0, 0.5), st.floats(0.01, 1.0), st.floats(0.0, 0.5))
 def test_the_four_states_stationary_law_is_left_by_one_step_as_it_was(
     p13: float, p31: float, p32: float, p23: float, p14: float
@@ -100,6 +102,7 @@ def test_markov_with_a_single_way_is_gilberts_model() -> None:
     assert lost(Markov(p13=0.05, p31=0.25), 4000) == lost(GilbertElliott(p=0.05, r=0.25), 4000)
 
 
+@steady
 @given(st.integers(0, 20), st.floats(0.0, 0.9), st.floats(0.0, 0.1))
 def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float, more: float) -> None:
     """A message's number is the same whatever the probability: sweeps over loss compare like with like."""
@@ -126,6 +129,7 @@ def test_corrupted_messages_have_any_bit_flipped_alike() -> None:
     assert stats.chisquare([flipped[bit] for bit in range(32)]).pvalue > 0.01
 
 
+@steady
 @given(st.binary(min_size=1, max_size=40), st.data())
 def test_a_flip_changes_one_bit_and_undoes_itself(payload: bytes, data: st.DataObject) -> None:
     """A flipped payload differs in exactly one bit."""

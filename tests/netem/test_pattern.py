@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netem.spec.pattern import Link, links_among, objections, parse
-from tests.netem.links import MICROGRIDS
+from tests.netem.links import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)
 ENDS = [*NAMES, "plant"]
@@ -52,6 +52,7 @@ side = st.one_of(
 )
 
 
+@steady
 @given(side, side)
 def test_both_ways_is_one_way_and_the_other(left: str, right: str) -> None:
     """`<->` means what the two arrows mean together."""

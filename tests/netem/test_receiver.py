@@ -22,7 +22,7 @@ from netem.receiver import Arrival, Receiver
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.partition import Partition
-from tests.netem.links import MICROGRIDS, T_C, receiver
+from tests.netem.links import MICROGRIDS, T_C, receiver, steady
 
 PAYLOAD = bytes(range(120))
 
@@ -64,6 +64,7 @@ def outcomes(traces: tuple[LinkTrace, ...]) -> dict[str, Any]:
     return {trace.src: dict(zip(trace.seq, trace.outcome, strict=True)) for trace in traces}
 
 
+@steady
 @given(
     st.lists(faults("* -> inv2"), max_size=4), st.lists(st.tuples(st.integers(1, 99), faults("* -> inv2")), max_size=3)
 )
@@ -85,6 +86,7 @@ def test_accounting_closes_whatever_happens(entries: list[Fault], live: list[tup
     assert all(count.closes and not count.in_flight for count in to.counts().values())
 
 
+@steady
 @given(faults("inv1 -> inv2"), faults("* -> inv3"), faults("inv4 -> inv2"), st.integers(1, 5))
 def test_nothing_elsewhere_changes_a_links_fates(own: Fault, other: Fault, third: Fault, extra: int) -> None:
     """Faults and agents on other links leave every verdict of a link as it was."""
@@ -95,6 +97,7 @@ def test_nothing_elsewhere_changes_a_links_fates(own: Fault, other: Fault, third
     assert alone.take_trace() == tuple(trace for trace in among.take_trace() if trace.src == "inv1")
 
 
+@steady
 @given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt", "slots"]), min_size=1), st.integers(0, 90))
 def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int) -> None:
     """Before and after a cut each message fares as if there had been none."""
@@ -116,6 +119,7 @@ def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int)
     assert {k: v for k, v in after.items() if v != "cut"} == {k: before[k] for k, v in after.items() if v != "cut"}
 
 
+@steady
 @given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt"]), min_size=1), st.sets(st.integers(0, 99)))
 def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str], missed: set[int]) -> None:
     """Times that wander, a way that takes time and messages never seen change no fate, nor does another process."""
@@ -129,6 +133,7 @@ def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str],
     assert seen.get("inv1", {}) == {k: v for k, v in fates["inv1"].items() if k not in missed}
 
 
+@steady
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 8)), max_size=30))
 def test_messages_are_handed_out_in_the_order_of_arrival_number_and_sender(offers: list[tuple[int, int]]) -> None:
     """What arrives at one time is sorted by number, then by sender, whoever was offered first."""
@@ -149,6 +154,7 @@ def test_a_delay_of_whole_ticks_ends_at_that_tick() -> None:
         assert len(to.due(k * T_C)) == (k >= 5)
 
 
+@steady
 @given(st.lists(st.floats(0.0, 0.015), min_size=20, max_size=20))
 def test_the_way_to_the_receiver_reorders_nothing_that_netem_leaves_in_order(jitter: list[float]) -> None:
     """In wall-clock time the real way's jitter adds to netem's delays, and no message overtakes another by it."""

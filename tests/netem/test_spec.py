@@ -22,7 +22,7 @@ from netem.spec.pattern import Link, links_among
 from netem.spec.profiles import PROFILES
 from netem.spec.reading import read_netem
 from netem.spec.trace_file import with_traces
-from tests.netem.links import MICROGRIDS
+from tests.netem.links import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)
 
@@ -219,6 +219,7 @@ changes = st.lists(
 )
 
 
+@steady
 @given(changes, st.integers(0, 19))
 def test_a_run_with_live_changes_can_be_replayed_from_a_schedule(done: list[Change], tick: int) -> None:
     """The schedule without changes has on every link, at every time, what the changed one had, and is consistent."""
@@ -291,6 +292,7 @@ def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: 
     assert all(word in mistake.text for word, mistake in zip(words, wrong, strict=True))
 
 
+@steady
 @given(
     st.builds(
         Fault,

@@ -1,0 +1,147 @@
+"""All links of a run, all that can be tested, and a warning for what chance does not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from netem.check.delay import check_delay
+from netem.check.loss import FEWEST, Finding, check_loss
+from netem.check.rows import Messages, Row, messages
+from netem.draws import Stream
+from netem.ledger import LinkCounts, LinkTrace
+from netem.schedule import GATES
+from netem.spec.fault import Span
+from netem.spec.pattern import Link
+
+LEVEL = 0.001
+"""Probability that a run without any fault of ours has a warning, over all its tests together (Holm)."""
+
+MASKS = {
+    "rate": "a rate",
+    "slots": "slots",
+    "cut": "a cut that holds",
+    "partition": "a partition that holds",
+    "flap": "a flap that holds",
+}
+"""What adds to a delay, so that its law cannot be seen alone."""
+
+
+class Report(NamedTuple):
+    """What was found."""
+
+    rows: tuple[Row, ...]
+    """Every test, by link."""
+    warnings: tuple[str, ...]
+    """One sentence for each that failed, and for each link whose accounts do not close."""
+
+
+def verify(
+    traces: Iterable[LinkTrace],
+    spans: Mapping[Link, Sequence[Span]],
+    seed: int,
+    counts: Mapping[Link, LinkCounts] | None = None,
+) -> Report:
+    """Hold what links did against what they were told.
+
+    Parameters
+    ----------
+    traces : Iterable[LinkTrace]
+        Verdicts of all receivers, as they were taken.
+    spans : Mapping[Link, Sequence[Span]]
+        What each link was told, without overlaps: `Netem.spans`, or after live changes `Schedule.flat`.
+    seed : int
+        Seed of the run.
+    counts : Mapping[Link, LinkCounts], optional
+        Accounts of the links.
+
+    References
+    ----------
+    Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Statist. 6 (1979) 65-70.
+    """
+    by_link: dict[Link, list[LinkTrace]] = {}
+    for trace in traces:
+        by_link.setdefault(Link(trace.src, trace.dst), []).append(trace)
+    rows = [
+        Row(link.src, link.dst, *finding)
+        for link in sorted(spans)
+        for span in spans[link]
+        for finding in _findings(tuple(by_link.get(link, ())), span, spans[link], link, seed)
+    ]
+    judged = _holm(rows)
+    warnings = [
+        f"{row.src} -> {row.dst}: {row.what} is {row.realised}, configured {row.configured} "
+        f"(n = {row.n}, p = {row.p:.2g}); this is not chance, so netem or this check is wrong: please report it"
+        for row in judged
+        if row.ok is False
+    ]
+    for link, count in (counts or {}).items():
+        if not count.closes:
+            warnings.append(f"{link}: the account does not close: {count}")
+    return Report(tuple(judged), tuple(warnings))
+
+
+def _findings(
+    traces: tuple[LinkTrace, ...], span: Span, others: Sequence[Span], link: Link, seed: int
+) -> list[Finding]:
+    """Tests of one entry of one link."""
+    if span.kind in ("rate", "slots"):
+        return []
+    sent = messages(traces, span)
+    if span.kind == "loss":
+        return check_loss(sent, span.model)
+    if span.kind in GATES:
+        return [_gate(sent, span)]
+    arrived = sent.those(np.isfinite(sent.delay))
+    if span.kind == "duplicate":
+        return [_share("duplicate", int((arrived.copies - 1).sum()), len(arrived.seq), span.model.p)]
+    if span.kind == "corrupt":
+        return [_share("corrupt", int(arrived.flipped.sum()), int(arrived.copies.sum()), span.model.p)]
+    masks = [MASKS[other.kind] for other in others if _masks(other, span)] + (["fifo"] if span.model.fifo else [])
+    if masks:
+        return [("delay", str(span.model.__struct_config__.tag), f"not tested: {' and '.join(masks)} on it", 0, None)]
+    return check_delay(sent, span.model, Stream(seed, *link, "delay"))
+
+
+def _masks(other: Span, span: Span) -> bool:
+    """Whether another entry adds to the delays of this one."""
+    if other.kind not in MASKS or other.from_s >= span.to_s or span.from_s >= other.to_s:
+        return False
+    return other.kind not in GATES or other.model.hold
+
+
+def _share(what: str, found: int, n: int, p: float) -> Finding:
+    if n < FEWEST:
+        return (what, f"{p:.4g}", f"too few messages to tell: {n}", n, None)
+    return (what, f"{p:.4g}", f"{found / n:.4g}", n, float(stats.binomtest(found, n, p).pvalue))
+
+
+def _gate(sent: Messages, span: Span) -> Finding:
+    """A cut lets nothing through; of one that holds, or of a flap, only what is dropped without need is wrong."""
+    n = len(sent.seq)
+    if span.kind == "flap" or span.model.hold:
+        return (
+            span.kind,
+            "held" if span.model.hold else "up and down",
+            "not tested: it depends on the time alone",
+            n,
+            None,
+        )
+    through = int((sent.reason == "").sum())
+    return (span.kind, "nothing passes", f"{through} passed", n, float(through == 0) if n else None)
+
+
+def _holm(rows: Sequence[Row]) -> list[Row]:
+    """Which tests fail when all together may fail by chance with probability `LEVEL`."""
+    tested = sorted((i for i, row in enumerate(rows) if row.p is not None), key=lambda i: rows[i].p or 0.0)
+    judged = list(rows)
+    failing = True
+    for rank, i in enumerate(tested):
+        p = rows[i].p
+        assert p is not None
+        failing = failing and p <= LEVEL / (len(tested) - rank)
+        judged[i] = rows[i]._replace(ok=not failing)
+    return judged
