@@ -80,9 +80,12 @@ def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) 
         for members, (load, connected) in after.items():
             if connected:
                 continue
-            former = [p for names, (p, _) in before.items() if set(members) & set(names)]
-            one = len(former) == 1
-            step = LoadStep(start_pu=former[0], load_pu=load, joining=event.join) if one else None
+            former = [names for names in before if set(members) & set(names)]
+            step = None
+            if len(former) == 1:
+                start, fed = before[former[0]]
+                new = fed or former[0][0] != members[0]  # an island is known by its first inverter
+                step = LoadStep(start_pu=start, load_pu=load, islanding=new, joining=event.join)
             found.append(IslandStep(label=event.label, t_s=event.t_s, roster=roster, members=members, load=step))
         before = after
     return tuple(found)

@@ -16,7 +16,7 @@ of a delay of p/(1-p) ticks. The model follows the means; how far one run strays
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -95,6 +95,8 @@ class Loop:
     fleet: Fleet
     ticks: Ticks = field(default_factory=Ticks)
     plant: PlantModel = "lagged"
+    muted: int = 0
+    """Links with at least so many ticks of delay carry nothing yet; 0: all do. For the ticks after an islanding."""
 
     @cached_property
     def _delays(self) -> _Delays:
@@ -119,10 +121,17 @@ class Loop:
         return found
 
     @property
+    def _heard(self) -> Floats:
+        """Links that carry something, without those that are muted."""
+        if not self.muted:
+            return self.fleet.heard
+        return np.where(np.array(self._delays.link) < self.muted, self.fleet.heard, 0.0)
+
+    @property
     def gains(self) -> tuple[Floats, Floats]:
         """Law's factors a_i (part of the way to the neighbours' mean) and g_i b_i (of the frequency error)."""
         fleet = self.fleet
-        pairs = zip(fleet.kappa.tolist(), fleet.degree.tolist(), strict=True)
+        pairs = zip(fleet.kappa.tolist(), self._heard.sum(axis=1).tolist(), strict=True)
         a = np.array([towards(kappa, d, fleet.T_c) for kappa, d in pairs])
         return a, np.where(fleet.leads, 1.0 - np.exp(-fleet.kappa * fleet.T_c), 0.0)
 
@@ -155,14 +164,15 @@ class Loop:
         for k, (i, j) in enumerate(delays.lossy):
             held[i, j] = (1.0 - loss[i][j]) * y(1 + link[i][j], j) + loss[i][j] * one[held0 + k]
 
-        (a, b), degree, new = self.gains, fleet.degree, []
+        (a, b), audible, new = self.gains, self._heard, []
+        degree = audible.sum(axis=1)
         for i in range(n):
             row = y(1, i)
             if degree[i]:
                 row = row - a[i] * y(1 + self.ticks.own, i)
-                for j in np.flatnonzero(fleet.heard[i]).tolist():
+                for j in np.flatnonzero(audible[i]).tolist():
                     heard = held[i, j] if (i, j) in held else y(1 + link[i][j], j)
-                    row = row + (a[i] * fleet.heard[i, j] / degree[i]) * heard
+                    row = row + (a[i] * audible[i, j] / degree[i]) * heard
             if fleet.leads[i]:
                 row = row - b[i] * (one[e0 + measurement[i] - 1] if measurement[i] else e_now)
             new.append(row)
@@ -210,7 +220,7 @@ class Loop:
         """Whether every mode that moves decays."""
         return self.spectral_radius < 1.0 - 1e-12
 
-    def run(self, ticks: int, start: Floats, load: float) -> Path:
+    def run(self, ticks: int, start: Floats, load: float, *, islanding: bool = False) -> Path:
         """Step of the load: until t = 0 all stand still at nominal frequency, from then on the load is another.
 
         Parameters
@@ -221,6 +231,9 @@ class Loop:
             m_p P_set of each at the start (pu frequency).
         load : float
             From t = 0 on, in pu frequency: the mean m_p p that carries it.
+        islanding : bool, optional
+            Whether the island is new. Agents leave out states that were sent in another island than theirs (but at the
+            very tick of the change), so a link with n ticks of delay carries nothing at the ticks 2 to n + 1.
 
         Notes
         -----
@@ -238,9 +251,11 @@ class Loop:
         z[-1] = load
         e, powers, set_points = np.zeros(ticks), np.zeros((ticks, n)), np.zeros((ticks, n))
         step = sp.csr_array(matrix)
+        longest = max(n for row in self._delays.link for n in row) if islanding else 0
+        steps = {n: sp.csr_array(replace(self, muted=n).matrix) for n in range(1, longest + 1)}
         for k in range(ticks):
             e[k], powers[k] = e_row @ z, power_rows @ z
-            z = step @ z
+            z = steps.get(k, step) @ z  # this is tick k + 1, and mute are links with n >= k
             set_points[k] = z[:n]
         t: Floats = np.arange(1.0, ticks + 1.0) * fleet.T_c
         return Path(t, e, powers, set_points)

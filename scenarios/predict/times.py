@@ -36,6 +36,8 @@ class LoadStep:
     """At the start all stand at it, at nominal frequency. The paper's start."""
     load_pu: float = 0.880
     """From the event on. The paper's event 1."""
+    islanding: bool = True
+    """Whether the event makes the island, as islanding does; then late states of before are left out at first."""
     joining: tuple[str, ...] = ()
     """Who comes with the event, at no load."""
 
@@ -152,7 +154,7 @@ def predicted_times(
     weight = case.weight
     nominal = step.load_pu * float(weight @ case.m_p)
     start = np.where([name in step.joining for name in case.names], 0.0, step.start_pu * case.m_p)
-    path = loop.run(count, start, nominal)
+    path = loop.run(count, start, nominal, islanding=step.islanding)
     restore = _for_good(path.t, np.abs(path.e) * F_NOM < F_BAND)
     share = _for_good(path.t, sharing_index(path, weight) < MPSI_BAND)
     short = _beyond_limits(case, path)
