@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from scenarios.results.history import Floats
-from scenarios.sweep.statistics import MOST_VALUES
+from scenarios.sweep.statistics import MOST_VALUES, is_number
 from scenarios.sweep.table import FATE
 
 REPEATS = ("sample", "case", "seed", "graph.number", "graph.lambda_2", "graph.edges")
@@ -36,6 +36,10 @@ class Choice:
     def runs(self) -> int:
         """Rows of the table."""
         return len(self.columns["case"])
+
+    def is_number(self, name: str) -> bool:
+        """Whether a parameter is a number in every row."""
+        return is_number(self.columns[name])
 
     def rows(self, case: str) -> dict[str, list[Any]]:
         """Columns of the rows of a case."""
@@ -74,4 +78,4 @@ def values(rows: Mapping[str, Sequence[Any]], column: str) -> Floats:
 
 
 def _is_axis(column: Sequence[Any]) -> bool:
-    return all(isinstance(value, int | float) for value in column) and len(set(column)) <= MOST_VALUES
+    return is_number(column) and len(set(column)) <= MOST_VALUES

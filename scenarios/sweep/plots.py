@@ -67,10 +67,13 @@ def _curves(choice: Choice, window: str, x: str) -> Figure:
             rows = choice.rows(case)
             at, y = rows[x], values(rows, f"{window}.{index}")
             spread = spread_of(at, y, BINS)
-            _curve(panel, spread, case, number, at, y)
+            if choice.is_number(x):
+                _curve(panel, spread, case, number, at, y)
+            else:
+                _bars(panel, spread, case, number, list(dict.fromkeys(choice.columns[x])))
             never += [count for count in spread.never if count]
         if never:
-            panel.set_title(f"never in {sum(never)} of {choice.runs} runs", loc="right", fontsize=7)
+            panel.set_title(f"never in {sum(never)} of {choice.runs} runs", loc="right", fontsize=7, pad=3)
         _name_axis(panel, choice, x)
         panel.set_ylabel(label_of(index))
         _frame(panel)
@@ -80,22 +83,24 @@ def _curves(choice: Choice, window: str, x: str) -> Figure:
 
 
 def _curve(panel: Axes, spread: Spread, case: str, number: int, at: Sequence[Any], y: Floats) -> None:
+    """Median and range of one case over a number, with a point per run where the number was drawn."""
     colour, dashes, width = case_style(case, number)
-    x = spread.x if spread.numeric else list(range(len(spread.x)))
-    finite = np.isfinite(spread.median)
-    median = np.where(finite, spread.median, np.nan)
-    top = np.where(np.isfinite(spread.high), spread.high, np.nan)
-    if spread.numeric:
-        panel.fill_between(x, spread.low, top, color=colour, alpha=0.18, linewidth=0)
-        panel.plot(x, median, linestyle=dashes, color=colour, lw=width, marker="o", ms=3.5, label=f"case {case}")
-        if spread.binned:
-            shown = np.isfinite(y)
-            panel.plot(np.asarray(at, float)[shown], y[shown], ".", color=colour, ms=2.5, alpha=0.5)
-        return
-    shift = 0.12 * number
-    panel.vlines([i + shift for i in x], spread.low, top, color=colour, alpha=0.5, lw=3)
-    panel.plot([i + shift for i in x], median, "o", color=colour, label=f"case {case}")
-    panel.set_xticks(x, [str(value) for value in spread.x], rotation=30, ha="right")
+    median = np.where(np.isfinite(spread.median), spread.median, np.nan)
+    panel.fill_between(spread.x, spread.low, spread.high, color=colour, alpha=0.18, linewidth=0)
+    panel.plot(spread.x, median, linestyle=dashes, color=colour, lw=width, marker="o", ms=3.5, label=f"case {case}")
+    if spread.binned:
+        shown = np.isfinite(y)
+        panel.plot(np.asarray(at, float)[shown], y[shown], ".", color=colour, ms=2.5, alpha=0.5)
+
+
+def _bars(panel: Axes, spread: Spread, case: str, number: int, order: Sequence[Any]) -> None:
+    """Median and range of one case, for each text side by side."""
+    colour = case_style(case, number)[0]
+    x = [order.index(value) + 0.12 * number for value in spread.x]
+    median = np.where(np.isfinite(spread.median), spread.median, np.nan)
+    panel.vlines(x, spread.low, spread.high, color=colour, alpha=0.5, lw=3)
+    panel.plot(x, median, "o", color=colour, label=f"case {case}")
+    panel.set_xticks(range(len(order)), [str(value) for value in order], rotation=30, ha="right")
 
 
 def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure:
@@ -103,12 +108,15 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
     figure, panels = _page(choice.indexes[window])
     rows = choice.rows(case)
     xs, ys = (sorted(set(rows[name])) for name in (x, y))
+    cells: dict[tuple[Any, Any], list[int]] = {}
+    for number, at in enumerate(zip(rows[x], rows[y], strict=True)):
+        cells.setdefault(at, []).append(number)
     for panel, index in zip(panels, choice.indexes[window], strict=True):
         z = values(rows, f"{window}.{index}")
         medians = np.full((len(ys), len(xs)), np.nan)
         for (i, b), (j, a) in product(enumerate(ys), enumerate(xs)):
-            here = np.array([(p, q) == (a, b) for p, q in zip(rows[x], rows[y], strict=True)], dtype=bool)
-            medians[i, j] = spread_of([0] * int(here.sum()), z[here], BINS).median[0] if here.any() else np.nan
+            if here := cells.get((a, b)):
+                medians[i, j] = spread_of([0] * len(here), z[here], BINS).median[0]
         masked = np.ma.masked_invalid(medians)
         mesh = panel.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap="cividis")
         panel.patch.set(hatch="////", edgecolor=_NEVER)
@@ -138,7 +146,7 @@ def _page(indexes: Sequence[str]) -> tuple[Figure, list[Axes]]:
 def _name_axis(panel: Axes, choice: Choice, x: str) -> None:
     panel.set_xlabel(label_of(x))
     numbers = choice.columns[x]
-    if all(isinstance(number, int | float) for number in numbers):
+    if choice.is_number(x):
         if min(numbers) > 0 and max(numbers) / min(numbers) > 30:
             panel.set_xscale("log")
         elif len(set(numbers)) <= MOST_TICKS and all(isinstance(number, int) for number in numbers):

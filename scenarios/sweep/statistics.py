@@ -28,8 +28,6 @@ class Spread:
     """Greatest value that came to be."""
     never: Sequence[int]
     """In how many runs it never came to be."""
-    numeric: bool
-    """Whether the parameter is a number."""
     binned: bool
     """Whether its values were grouped."""
 
@@ -52,7 +50,7 @@ def spread_of(at: Sequence[Any], values: Floats, bins: int) -> Spread:
     >>> spread.x, spread.median.tolist(), spread.high.tolist(), spread.never
     ([8, 12], [3.0, 0.5], [3.0, 0.5], [1, 0])
     """
-    numeric = all(isinstance(value, int | float) for value in at)
+    numeric = is_number(at)
     distinct = sorted(set(at)) if numeric else list(dict.fromkeys(at))
     binned = numeric and len(distinct) > MOST_VALUES
     if binned:
@@ -70,7 +68,12 @@ def spread_of(at: Sequence[Any], values: Floats, bins: int) -> Spread:
         highs.append(came[-1] if came.size else np.nan)
         medians.append(_median(told))
         never.append(int(told.size - came.size))
-    return Spread(x, np.array(lows), np.array(medians), np.array(highs), never, numeric, binned)
+    return Spread(x, np.array(lows), np.array(medians), np.array(highs), never, binned)
+
+
+def is_number(column: Sequence[Any]) -> bool:
+    """Whether a column holds numbers alone; what is true or false is none."""
+    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in column)
 
 
 def _median(ordered: Floats) -> float:
