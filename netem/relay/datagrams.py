@@ -7,11 +7,12 @@ import heapq
 import socket
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from netem.draws import Stream
 from netem.relay.bottleneck import NEVER, Bottleneck
 from netem.relay.direction import Direction, Road
-from netem.relay.draws import Draws
 
 LARGEST = 65536
 """No datagram is longer (bytes)."""
@@ -30,12 +31,13 @@ class Datagrams:
     ----------
     direction : Direction
         What is set for it.
-    draws : Draws
-        Of this conversation and direction: the fate of datagram n depends on n alone.
+    stream : Callable[[str], Stream]
+        The random numbers of this conversation and direction, for a purpose: the fate of datagram n depends on n alone.
     """
 
-    def __init__(self, direction: Direction, draws: Draws) -> None:
-        self._direction, self._draws = direction, draws
+    def __init__(self, direction: Direction, stream: Callable[[str], Stream]) -> None:
+        self._direction = direction
+        self._loss, self._delay, self._reorder = stream("loss"), stream("delay"), stream("reorder")
         self._queue = Bottleneck(direction.faults.rate)
         self._flight: list[tuple[float, int, bytes]] = []
         self._numbers: deque[int] = deque()
@@ -57,15 +59,15 @@ class Datagrams:
 
     def take(self, now: float) -> list[bytes]:
         """What arrives by now."""
-        faults, draws = self._direction.faults, self._draws
+        faults = self._direction.faults
         self._queue.set_rate(faults.rate, now)
         for data, left in self._queue.take(now):
             number = self._numbers.popleft()
-            if draws.uniform("loss", number) < faults.loss:
+            if self._loss.uniform(number) < faults.loss:
                 self._direction.counts.lost += 1
                 continue
-            delay = faults.delayed(draws.uniform("delay", number))
-            if draws.uniform("reorder", number) < faults.reorder:
+            delay = faults.delayed(self._delay.uniform(number))
+            if self._reorder.uniform(number) < faults.reorder:
                 delay = 0.0
             heapq.heappush(self._flight, (left + delay, number, data))
         ready = []
@@ -84,7 +86,7 @@ class _Carrier:
 
     def __init__(self, road: Road, direction: Direction, name: str, forward: Callable[[bytes], bool]) -> None:
         self._road, self._direction, self._forward = road, direction, forward
-        self._line = Datagrams(direction, Draws(road.seed, f"{name}/{direction.name}"))
+        self._line = Datagrams(direction, partial(Stream, road.seed, name, direction.name))
         self._timer: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
         self.last = self._loop.time()

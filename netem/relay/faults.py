@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-LONGEST = 60.0
-"""Longest delay or jitter (s) taken for meant: one to a geostationary satellite and back is half a second."""
+from netem.mistakes import probability, seconds
 
 
 class FaultsError(ValueError):
@@ -31,8 +30,8 @@ class Faults:
     >>> Faults(delay=200, loss=2)
     Traceback (most recent call last):
         ...
-    netem.relay.faults.FaultsError: delay: 200 s is not plausible (0 to 60 s); did you mean 0.2 (200 ms)?
-    loss: a probability is from 0 to 1, got 2; did you mean 0.02 (2 %)?
+    netem.relay.faults.FaultsError: delay: 200 s is not plausible for a delay (0 to 10 s); did you mean 0.2 (200 ms)?
+    loss: a loss is a probability from 0 to 1, got 2; did you mean 0.02 (2 %)?
     """
 
     delay: float = 0.0
@@ -55,16 +54,11 @@ class Faults:
             raise FaultsError("\n".join(mistakes))
 
     def _mistakes(self) -> Iterator[str]:
-        for name in ("delay", "jitter"):
-            time = getattr(self, name)
-            if not 0.0 <= time <= LONGEST:
-                hint = f"; did you mean {time / 1e3:g} ({time:g} ms)?" if time > LONGEST else ""
-                yield f"{name}: {time:g} s is not plausible (0 to {LONGEST:g} s){hint}"
-        for name in ("loss", "reorder"):
-            p = getattr(self, name)
-            if not 0.0 <= p <= 1.0:
-                hint = f"; did you mean {p / 100:g} ({p:g} %)?" if 1.0 < p <= 100.0 else ""
-                yield f"{name}: a probability is from 0 to 1, got {p:g}{hint}"
+        times = [mistake for name in ("delay", "jitter") for mistake in seconds(name, getattr(self, name), f"a {name}")]
+        for path, text in times + probability("loss", self.loss, "a loss"):
+            yield f"{path}: {text}"
+        for path, text in probability("reorder", self.reorder, "reordering"):
+            yield f"{path}: {text}"
         if not (self.rate == 0.0 or 1.0 <= self.rate < float("inf")):
             yield f"rate: {self.rate:g} bytes/s; write at least 1, or 0 for no limit"
         if not self.queue >= 1500.0:

@@ -78,6 +78,7 @@ class Relay:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._wait(self._relay.close())
+        self._wait(_settle())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(PATIENCE)
         self._loop.close()
@@ -162,6 +163,16 @@ class Relay:
 
     def _wait(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(PATIENCE)
+
+
+async def _settle() -> None:
+    """Let asyncio finish what it has begun, e.g. with a connection that came in the very last moment."""
+    while others := asyncio.all_tasks() - {asyncio.current_task()}:
+        for other in others:
+            other.cancel()
+        await asyncio.gather(*others, return_exceptions=True)
+    for _ in range(3):  # turns of the loop: a task's last callback, the end of its transport, the end of its socket
+        await asyncio.sleep(0)
 
 
 def _resolve(endpoint: Endpoint) -> tuple[int, tuple[Any, ...]]:

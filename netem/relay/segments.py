@@ -21,8 +21,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
+from netem.draws import Stream
 from netem.relay.bottleneck import NEVER
-from netem.relay.draws import Draws
 from netem.relay.faults import Faults
 
 SIZE = 1448
@@ -54,8 +54,8 @@ class Segments:
 
     Parameters
     ----------
-    draws : Draws
-        Of this connection and direction.
+    stream : Callable[[str], Stream]
+        The random numbers of this connection and direction, for a purpose.
     ways : Callable[[], tuple[Faults, Faults]]
         What is set now: for this direction, and for the one in which acknowledgements go.
     on_loss : Callable[[], None], optional
@@ -63,9 +63,13 @@ class Segments:
     """
 
     def __init__(
-        self, draws: Draws, ways: Callable[[], tuple[Faults, Faults]], on_loss: Callable[[], None] = lambda: None
+        self,
+        stream: Callable[[str], Stream],
+        ways: Callable[[], tuple[Faults, Faults]],
+        on_loss: Callable[[], None] = lambda: None,
     ) -> None:
-        self._draws, self._ways, self._on_loss = draws, ways, on_loss
+        self._loss, self._delay = stream("loss"), stream("delay")
+        self._ways, self._on_loss = ways, on_loss
         self._flight: deque[_Segment] = deque()
         self._lost: list[_Segment] = []
         self._sent = 0
@@ -113,14 +117,14 @@ class Segments:
         segment.sent = at
         segment.turn += 1
         R = faults.delay + back.delay
-        if self._draws.uniform("loss", segment.number, segment.turn) < faults.loss:
+        if self._loss.uniform(segment.number, segment.turn) < faults.loss:
             rto = R + max(RTO_MIN, 4.0 * (faults.jitter + back.jitter) / 2.0)
             segment.arrives = NEVER
             segment.resend = at + min(rto * 2.0 ** (segment.turn - 1), RTO_MAX)
             self._lost.append(segment)
             self._on_loss()
             return
-        segment.arrives = at + faults.delayed(self._draws.uniform("delay", segment.number, segment.turn))
+        segment.arrives = at + faults.delayed(self._delay.uniform(segment.number, segment.turn))
         known = segment.arrives + back.delay + R / 4.0
         for lost in self._lost:
             if lost.sent < at:

@@ -6,11 +6,12 @@ import asyncio
 import contextlib
 import socket
 import struct
+from functools import partial
 from typing import Any
 
+from netem.draws import Stream
 from netem.relay.bottleneck import NEVER, Bottleneck
 from netem.relay.direction import Direction, Road
-from netem.relay.draws import Draws
 from netem.relay.segments import SIZE, Segments
 
 WINDOW = 4 << 20
@@ -38,9 +39,9 @@ class _Way:
         def on_loss() -> None:
             counts.lost += 1
 
-        draws = Draws(road.seed, f"{name}/{self._direction.name}")
+        stream = partial(Stream, road.seed, name, self._direction.name)
         self._queue = Bottleneck(self._direction.faults.rate)
-        self._segments = Segments(draws, lambda: (self._direction.faults, back.faults), on_loss)
+        self._segments = Segments(stream, lambda: (self._direction.faults, back.faults), on_loss)
         self._ended = False
         self._work, self._room = asyncio.Event(), asyncio.Event()
 
@@ -149,6 +150,8 @@ class TcpRelay:
         task = asyncio.get_running_loop().create_task(self._relay(reader, writer))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        # a task that is cancelled before its first step never comes to its own `finally`
+        task.add_done_callback(lambda _: _abort([writer]))
 
     async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         name, road = str(self._road.new_connection()), self._road

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from scipy.stats import binom, kstest
 
+from netem.draws import Stream
 from netem.relay.bottleneck import NEVER
 from netem.relay.datagrams import Datagrams
 from netem.relay.direction import Direction
-from netem.relay.draws import Draws
 from netem.relay.faults import Faults, FaultsError
 from netem.relay.words import WordError, read
 
@@ -17,7 +19,7 @@ SURE = 1e-4
 
 def carried(faults: Faults, count: int = N, gap: float = 1.0, *, size: int = 4, seed: int = 1) -> dict[int, float]:
     """Delay of each datagram that arrived, in the order of arrival."""
-    line, delays = Datagrams(Direction("there", faults), Draws(seed, "1/there")), {}
+    line, delays = Datagrams(Direction("there", faults), partial(Stream, seed, "1", "there")), {}
 
     def take(now: float) -> None:
         for data in line.take(now):
@@ -95,10 +97,10 @@ def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -
 @pytest.mark.parametrize(
     ("values", "complaint"),
     [
-        ({"delay": -0.1}, r"delay: -0.1 s is not plausible"),
+        ({"delay": -0.1}, r"delay: a delay must not be negative, got -0.1 s"),
         ({"delay": 100.0}, r"did you mean 0.1 \(100 ms\)\?"),
         ({"loss": 2.0}, r"did you mean 0.02 \(2 %\)\?"),
-        ({"delay": float("nan")}, "delay: nan s"),
+        ({"delay": float("nan")}, "delay: a delay must be a finite number"),
         ({"queue": float("nan")}, "queue: nan bytes"),
         ({"jitter": 0.1}, "nothing arrives early"),
         ({"reorder": 0.1}, "needs a delay"),

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from netem.draws import Stream
 from netem.relay.bottleneck import NEVER, Bottleneck
-from netem.relay.draws import Draws
 from netem.relay.faults import Faults
 from netem.relay.segments import RTO_MIN, Segments
 
@@ -15,16 +17,25 @@ DELAYS = st.floats(0.0, 1.0)
 GAPS = st.lists(st.floats(0.0, 0.5), min_size=1, max_size=40)
 
 
-class Chosen(Draws):
-    """Draws that lose the transmissions named, and no other; every delay is the mean."""
+class Chosen(Stream):
+    """Numbers that lose the transmissions named (segment, turn), and no other; every delay is the mean."""
 
     def __init__(self, *lost: tuple[int, int]) -> None:
-        super().__init__(0, "")
-        self._chosen = lost
+        super().__init__(0, "", "", "")
+        self._lost = lost
 
-    def uniform(self, what: str, number: int, turn: int = 1) -> float:
-        """Number for one packet."""
-        return 0.0 if what == "loss" and (number, turn) in self._chosen else 0.5
+    def __call__(self, purpose: str) -> Stream:
+        """The numbers of a purpose."""
+        return self if purpose == "loss" else Chosen()
+
+    def uniform(self, seq: int, index: int = 0) -> float:
+        """Number for one transmission."""
+        return 0.0 if (seq, index) in self._lost else 0.5
+
+
+def streams(seed: int) -> Callable[[str], Stream]:
+    """The random numbers of a direction."""
+    return partial(Stream, seed, "1", "there")
 
 
 def carried(line: Segments, sent: list[float]) -> list[float]:
@@ -52,8 +63,8 @@ def test_tcp_loses_nothing_and_keeps_the_order(
     faults = Faults(delay=delay, jitter=jitter * delay, loss=loss)
     sent = [sum(gaps[: n + 1]) for n in range(len(gaps))]
 
-    lossy = carried(Segments(Draws(seed, ""), lambda: (faults, Faults(delay=back))), sent)
-    sound = carried(Segments(Draws(seed, ""), lambda: (Faults(delay=delay), Faults(delay=back))), sent)
+    lossy = carried(Segments(streams(seed), lambda: (faults, Faults(delay=back))), sent)
+    sound = carried(Segments(streams(seed), lambda: (Faults(delay=delay), Faults(delay=back))), sent)
 
     assert all(a <= b for a, b in pairwise(lossy))
     shortest = delay - jitter * delay
