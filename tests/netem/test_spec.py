@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -12,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netem.models.cut import Cut
-from netem.models.delay import Constant, Lognormal, Normal, Trace
+from netem.models.delay import Constant, Lognormal, Normal
 from netem.models.loss import Bernoulli, GilbertElliott
 from netem.spec.change import Change, Heal, replayed, schedule_of
 from netem.spec.fault import Fault
@@ -21,7 +20,6 @@ from netem.spec.partition import Partition
 from netem.spec.pattern import Link, links_among
 from netem.spec.profiles import PROFILES
 from netem.spec.reading import read_netem
-from netem.spec.trace_file import with_traces
 from tests.netem.links import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)
@@ -255,41 +253,6 @@ def test_the_der_requirement_is_what_was_published() -> None:
     models = Fault(on="* <-> *", profile="der-requirement").models()
 
     assert models == {"delay": Constant(delay_s=0.3), "loss": Bernoulli(p=0.01)}
-
-
-def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None:
-    """The column delay_s becomes the trace, other columns and empty lines are free."""
-    (tmp_path / "delays.csv").write_text("t_s, delay_s\n0,0.01\n\n1,0.02\n")
-    netem, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="delays.csv")),)), tmp_path)
-
-    assert not wrong
-    assert netem.links[0].models()["delay"].delays_s == (0.01, 0.02)
-    assert not netem.mistakes(NAMES, MICROGRIDS, 10.0)
-
-
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        (
-            "delay_s\n0.01\nabc\n-0.1\n20\n",
-            ['row 3: delay_s must be a number of seconds, got "abc"', "row 4:", "row 5: 20 s"],
-        ),
-        ("delay\n0.01\n", ['no column "delay_s"']),
-        ("delay_s\n12\n13\n", ["are they in milliseconds?"]),
-        ("delay_s\n", ["no row"]),
-        ("delay_s\n" + "x\n" * 30, [*[f"row {i}:" for i in range(2, 22)], "10 more rows"]),
-        (None, ["there is no file"]),
-    ],
-)
-def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: list[str]) -> None:
-    """Each mistake has its row; a whole file in milliseconds is one mistake."""
-    if rows is not None:
-        (tmp_path / "d.csv").write_text(rows)
-    _, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
-
-    assert {mistake.path for mistake in wrong} == {"link[0].delay.file"}
-    assert len(wrong) == len(words)
-    assert all(word in mistake.text for word, mistake in zip(words, wrong, strict=True))
 
 
 @steady
