@@ -76,10 +76,10 @@ def test_the_model_is_the_law(seed: int) -> None:
 
 
 def test_lossy_links_follow_the_mean() -> None:
-    """The mean of 400 runs with a third of all messages lost is the model's at every tick, to 5 standard errors."""
+    """The mean of 200 runs with a third of all messages lost is the model's at every tick, to 5 standard errors."""
     case = dataclasses.replace(fleet("reduced"), gains=Gains(P_set_min=-1e9, P_set_max=1e9))
     ticks, rng = Ticks(loss=1.0 / 3.0, link=1), np.random.default_rng(1)
-    runs = np.array([plainly(case, ticks, 25, rng)[1] for _ in range(400)])
+    runs = np.array([plainly(case, ticks, 25, rng)[1] for _ in range(200)])
 
     mean = Loop(fleet=case, ticks=ticks, plant="quasi-steady").run(25, np.full(9, START), LOAD).set_point
 
@@ -95,7 +95,7 @@ def _swing(case: Fleet, ticks: Ticks, plant: str) -> float:
 
 
 @pytest.mark.parametrize("plant", ["lagged", "quasi-steady"])
-@pytest.mark.parametrize("graph", ["full", "star", "path"])
+@pytest.mark.parametrize("graph", ["star", "path"])
 @pytest.mark.parametrize("kind", ["disagreement", "local loop"])
 def test_just_below_the_limit_a_swing_decays_and_just_above_it_grows(graph: str, kind: str, plant: str) -> None:
     """The limits by eigenvalues are those of a simulation in time, to the control period."""
@@ -124,7 +124,7 @@ def test_a_late_set_point_is_as_bad_as_a_late_measurement() -> None:
 def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) -> None:
     """With own values fresh all graphs but one are stable at any delay, and so say the eigenvalues at some of them."""
     case = fleet(graph)
-    radii = [Loop(fleet=case, ticks=Ticks(link=n)).spectral_radius for n in (0, 3, 10, 30)]
+    radii = [Loop(fleet=case, ticks=Ticks(link=n)).spectral_radius for n in (0, 8, 26)]
 
     assert math.isinf(first_crossing(case)) == (graph != "star")
     assert (max(radii) < 1.0) == (graph != "star")
