@@ -6,9 +6,10 @@ neighbour. SI on the wire, per unit inside: the neighbours' ratings come from th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from agents.config import AgentConfig
+from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
 from agents.topology import in_neighbours
 from wire.messages import Measurement, Nameplate, State
@@ -54,6 +55,12 @@ class Agent:
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.secondary == "all" or (config.control.secondary == "GFM" and self._leader)
+        handling = config.control.handling
+        self._worth = Worth(handling)
+        self._gains = gains_in_force(config.control.gains, handling)
+        self._kappa_c = handling.kappa_c if handling.weights == "degree-normalised" else None
+        self._stops = handling.anti_windup == "conditional"
+        self._follows_P, self._follows_V = Follows(handling.T_sat), Follows(handling.T_sat)
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
@@ -72,14 +79,18 @@ class Agent:
         if known is not None and known.incarnation > nameplate.incarnation:
             return False
         if known is not None and known.incarnation < nameplate.incarnation:
-            self._heard.pop(nameplate.sender, None)
+            self._drop(nameplate.sender)
         self._known[nameplate.sender] = nameplate
         return True
 
     def forget(self, name: str) -> None:
         """Forget who somebody is and what it said, as its process is gone."""
         self._known.pop(name, None)
+        self._drop(name)
+
+    def _drop(self, name: str) -> None:
         self._heard.pop(name, None)
+        self._worth.forget(name)
 
     def let_go(self) -> None:
         """Have the next tick start from the set-points that its measurement shows, as the first one does."""
@@ -116,9 +127,12 @@ class Agent:
         reason = self.judge(state)
         if not reason:
             self._heard[state.sender] = state
+            self._worth.arrived(state.sender)
         return reason
 
-    def tick(self, measurement: Measurement, neighbours: Sequence[str] = ()) -> State:
+    def tick(
+        self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
+    ) -> State:
         """Decide the set-points of this tick, (12)-(15).
 
         Parameters
@@ -126,8 +140,11 @@ class Agent:
         measurement : Measurement
             What the own sensors read now; the own values are always fresh.
         neighbours : Sequence[str], optional
-            Whom to listen to. Of each the last state heard counts; one that was never heard, or stands in another
-            island, is left out of the sums.
+            Whom to listen to. Of each the last state heard counts, for what `agents.handling` says it is worth; one
+            that was never heard, or stands in another island, is left out of the sums.
+        ages : Mapping[str, float], optional
+            Age of these states (s of run time), where the own clock knows more than the times written in them. Without
+            it, from there to the own measurement.
 
         Returns
         -------
@@ -139,16 +156,25 @@ class Agent:
         if not self._takes_part or measurement.grid_connected or self._P_set is None or self._V_set is None:
             # On hold the set-points follow the plant's, so that the law starts without a bump when the island forms.
             self._P_set, self._V_set = measurement.P_set, measurement.V_set
+            self._follows_P.begin()
+            self._follows_V.begin()
+        y_bar, z_bar, d = self._means(measurement.t, neighbours, ages)
         if self._takes_part and not measurement.grid_connected:
-            y_bar, z_bar, d = self._means(neighbours)
-            gains, T = config.control.gains, config.T_c
+            gains, T = self._gains, config.T_c
             P_set = self._P_set / config.P_rated
             V_set = self._V_set / config.V_nom
             e = (measurement.f - config.f_nom) / config.f_nom
             z = config.m_q * measurement.Q / config.P_rated
             v = measurement.V / config.V_nom
-            P_set = P_set_step(P_set, y_bar, d, e, leader=self._leader, m_p=config.m_p, gains=gains, T=T)
-            V_set = V_set_step(V_set, z, z_bar, d, v, leader=self._leader, gains=gains, T=T)
+            P_side, V_side = self._in_vain(measurement, e) if self._stops else (0, 0)
+            # A saturated leader that cannot lessen the frequency error is a follower: it does not integrate it.
+            leader = self._leader and -e * P_side <= 0.0
+            P_set = P_set_step(
+                P_set, y_bar, d, e, leader=leader, m_p=config.m_p, gains=gains, T=T, kappa_c=self._kappa_c
+            )
+            V_next = V_set_step(V_set, z, z_bar, d, v, leader=self._leader, gains=gains, T=T)
+            if (V_next - V_set) * V_side <= 0.0:
+                V_set = V_next
             self._P_set = P_set * config.P_rated
             self._V_set = V_set * config.V_nom
         return State(
@@ -162,16 +188,30 @@ class Agent:
             island=measurement.island,
         )
 
-    def _means(self, neighbours: Sequence[str]) -> tuple[float, float, float]:
-        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of the weights, which all are 1."""
-        y = z = 0.0
-        d = 0
-        for name in neighbours:
-            state = self._heard.get(name)
-            if state is None or not self.shares_island(name):
-                continue
-            plate = self._known[name]
-            y += plate.m_p * (state.P_set / plate.P_rated)
-            z += plate.m_q * (state.Q / plate.P_rated)
-            d += 1
-        return (y / d, z / d, float(d)) if d else (0.0, 0.0, 0.0)
+    def _means(
+        self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None
+    ) -> tuple[float, float, float]:
+        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
+        heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
+        worth = self._worth.at_tick(
+            {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
+        )
+        y = z = d = 0.0
+        for name, r in worth.items():
+            plate, state = self._known[name], heard[name]
+            y += r * plate.m_p * (state.P_set / plate.P_rated)
+            z += r * plate.m_q * (state.Q / plate.P_rated)
+            d += r
+        if d == 0.0:
+            return 0.0, 0.0, 0.0
+        return y / d, z / d, d if self._kappa_c is None else d / len(worth)
+
+    def _in_vain(self, measurement: Measurement, e: float) -> tuple[int, int]:
+        """Sides on which P and V have long been off (3), (7) and (4), (8) with the set-points that the plant holds."""
+        config, m = self.config, measurement
+        P = m.P / config.P_rated + e / config.m_p
+        V = m.V / config.V_nom / config.m_q + m.Q / config.P_rated
+        return (
+            self._follows_P.short_side(m.P_set / config.P_rated, P, m.t),
+            self._follows_V.short_side(m.V_set / config.V_nom / config.m_q, V, m.t),
+        )

@@ -30,6 +30,33 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Upper limit of V_set (pu), anti-windup."""
 
 
+class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What an agent makes of late, lost and missing states, and of its own saturation. The default is the paper's way.
+
+    Equations, sources and costs are in docs/handling.md.
+    """
+
+    stale: Literal["hold", "skip", "age-weighted"] = "hold"
+    """Neighbours' states that are not new: the last one counts in full ("hold"), not at all ("skip"), or ever less the
+    older it is beside what is usual of its link ("age-weighted")."""
+    T_age: float = 0.2
+    """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted". > 0."""
+    max_age: float = 0.0
+    """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in wall-clock time."""
+    weights: Literal["paper", "degree-normalised"] = "paper"
+    """Weights c_ij of the neighbours: 1, or 1 over their number."""
+    kappa_c: float = 12.0
+    """Gain (1/s) of the consensus on m_p P_set, for "degree-normalised"; the leaders' gain stays m_p / k_p. > 0."""
+    beta_c: float = 8.0
+    """Factor on beta_GFM and beta_GFL, for "degree-normalised"; the paper's is the number of neighbours. >= 0."""
+    anti_windup: Literal["clamp", "none", "conditional"] = "clamp"
+    """Set-points of a saturated inverter: limited ("clamp"), free ("none", the paper's Remark 2), or limited and also
+    not integrated further ("conditional")."""
+    T_sat: float = 0.5
+    """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
+    "conditional". > 0."""
+
+
 GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
 """How nameplates become neighbours; "links" takes the listed pairs."""
 
@@ -49,6 +76,8 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Undirected links for the rule "links"."""
     gains: Gains = Gains()
     """Gains of the law."""
+    handling: Handling = Handling()
+    """What becomes of bad links and of saturation."""
 
 
 class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

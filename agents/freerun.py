@@ -361,7 +361,7 @@ class FreeAgent(Side):
         return max((now - at) * self._config.speed, self._t - state.t)
 
     def _young(self, now: float) -> tuple[str, ...]:
-        limit = self._config.max_age
+        limit = self._config.control.handling.max_age or self._config.max_age
         return tuple(name for name in self._neighbours if self._age(name, now) <= limit)
 
     def _tick(self, now: float) -> None:
@@ -375,7 +375,8 @@ class FreeAgent(Side):
             self.phase = "running"
             self._say(f"joins at t = {measurement.t:g} s, from {measurement.P_set:.0f} W and {measurement.V_set:.1f} V")
         young = self._young(now)
-        state = replace(self._agent.tick(measurement, young), seq=self.sent)
+        ages = {name: self._age(name, now) for name in young}
+        state = replace(self._agent.tick(measurement, young, ages), seq=self.sent)
         self._in_sums = tuple(name for name in young if self._agent.shares_island(name))
         self.ticks += 1
         self.sent += 1

@@ -43,6 +43,7 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   periods: none unstable with ratings up to threefold apart. `tests/unit/test_law.py` repeats both searches.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
+`agents.handling` has these and other ways, and other weights c_ij than 1; with any of them the law stays this.
 """
 
 from __future__ import annotations
@@ -73,7 +74,16 @@ def towards(rate: float, d: float, T: float) -> float:
 
 
 def P_set_step(
-    P_set: float, y_bar: float, d: float, e: float, *, leader: bool, m_p: float, gains: Gains, T: float
+    P_set: float,
+    y_bar: float,
+    d: float,
+    e: float,
+    *,
+    leader: bool,
+    m_p: float,
+    gains: Gains,
+    T: float,
+    kappa_c: float | None = None,
 ) -> float:
     """P_set (pu of own rating) after one control period, (12) for a follower, (13) for a leader.
 
@@ -95,6 +105,8 @@ def P_set_step(
         k_p and the limits.
     T : float
         Control period (s).
+    kappa_c : float, optional
+        Gain of each unit of c_ij (1/s), where it is not the leader's kappa = m_p/k_p.
 
     Examples
     --------
@@ -105,7 +117,7 @@ def P_set_step(
     """
     kappa = m_p / gains.k_p
     y = m_p * P_set
-    change = towards(kappa, d, T) * (y_bar - y)
+    change = towards(kappa if kappa_c is None else kappa_c, d, T) * (y_bar - y)
     if leader:
         change -= (1.0 - exp(-kappa * T)) * e
     return min(max(P_set + change / m_p, gains.P_set_min), gains.P_set_max)
