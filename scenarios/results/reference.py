@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from agents.config import Gains
+from agents.config import Gains, Handling
 from plant.config import GflParameters, GfmParameters
 from scenarios.field_docs import FieldDoc, class_doc, field_docs
 from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
@@ -24,6 +24,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[plant.gfm]", GfmParameters),
     ("[plant.gfl]", GflParameters),
     ("[gains]", Gains),
+    ("[handling]", Handling),
     ("[processes]", Processes),
     ("[[event]]", Event),
     ("[case.NAME]", Case),
@@ -109,8 +110,8 @@ def _is_table(cls: type, key: str) -> bool:
 def _default(doc: FieldDoc) -> str:
     if not doc.default:
         return "required"
-    if doc.default.startswith("Gains("):
-        return "`[gains]`"
+    if doc.default.startswith(("Gains(", "Handling(")):
+        return f"`[{doc.name}]`"
     shown = doc.default.replace("'", '"').replace("()", "[]")
     return f"`{ {'True': 'true', 'False': 'false'}.get(shown, shown) }`"
 

@@ -41,7 +41,9 @@ def configs(
     endpoints = (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
     inverters = inverters_of(scenario, feeder)
-    control = Control(secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains)
+    control = Control(
+        secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains, handling=rule.handling
+    )
     plant = PlantConfig(
         run=run,
         settings=PlantSettings(

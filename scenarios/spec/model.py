@@ -10,7 +10,7 @@ from typing import Literal
 
 import msgspec
 
-from agents.config import Gains, GraphRule
+from agents.config import Gains, GraphRule, Handling
 from plant.config import GflParameters, GfmParameters
 
 
@@ -74,6 +74,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
     gains: Gains = Gains()
     """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
+    handling: Handling = Handling()
+    """Table `[case.NAME.handling]`: of this case only; what it leaves out comes from `[handling]`."""
 
 
 class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -102,6 +104,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Table `[plant]`."""
     gains: Gains = Gains()
     """Table `[gains]`: of the secondary law, for every case."""
+    handling: Handling = Handling()
+    """Table `[handling]`: what agents make of bad links and of saturation, for every case."""
     processes: Processes = Processes()
     """Table `[processes]`."""
     events: tuple[Event, ...] = msgspec.field(default=(), name="event")
@@ -112,6 +116,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 UNIT_OF_KEY: dict[type, dict[str, str]] = {
     Gains: dict.fromkeys(("P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
+    Handling: dict.fromkeys(("T_age", "max_age", "T_sat"), "s"),
     GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
     | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu"),
     GflParameters: dict.fromkeys(("T_if", "T_ff", "T_pf", "T_vf", "T_qf"), "s")

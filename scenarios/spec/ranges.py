@@ -9,7 +9,7 @@ import math
 import re
 from typing import NamedTuple
 
-from agents.config import Gains
+from agents.config import Gains, Handling
 from plant.config import GflParameters, GfmParameters
 from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Time
 
@@ -20,7 +20,7 @@ class Range(NamedTuple):
     what: str
     """What the number is, for the sentence."""
     unit: str
-    """"s", "pu", "Hz" or ""."""
+    """"s", "pu", "Hz", "1/s" or ""."""
     low: float
     """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
     high: float
@@ -48,6 +48,11 @@ RANGES: dict[tuple[type, str], Range] = {
     (Gains, "P_set_max"): Range("a limit of P_set", "pu", -1.2, 2.0),
     (Gains, "V_set_min"): Range("a limit of V_set", "pu", 0.5, 1.5, above_zero=True),
     (Gains, "V_set_max"): Range("a limit of V_set", "pu", 0.5, 1.5, above_zero=True),
+    (Handling, "T_age"): Range("a time in which a state ages", "s", 1e-3, 60.0, above_zero=True),
+    (Handling, "max_age"): Range("the greatest age of a state", "s", 0.0, 60.0),
+    (Handling, "kappa_c"): Range("gain kappa_c", "1/s", 1e-3, 1e4, above_zero=True),
+    (Handling, "beta_c"): Range("factor beta_c", "", 0.0, 1e4),
+    (Handling, "T_sat"): Range("a time until an inverter counts as saturated", "s", 1e-3, 60.0, above_zero=True),
     (GfmParameters, "w_lim"): Range("the limiters' bound w_lim", "", 0.1, 1e4, above_zero=True),
     (GflParameters, "F_current"): Range("the cross-coupling gain F_current", "", 0.0, 1.0),
 }

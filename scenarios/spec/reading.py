@@ -18,6 +18,9 @@ from scenarios.spec.ranges import number_in, objection, range_of
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is read over, so that the copy can be run again."""
 
+FOR_EVERY_CASE = ("gains", "handling")
+"""Tables that hold for every case, and that a case may have as its own, starting from the common one."""
+
 T = TypeVar("T", bound=msgspec.Struct)
 
 _UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
@@ -47,6 +50,7 @@ def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[
         mistakes.add(path, f"must be a table with the keys {', '.join(fields)}, got {_shown(data)}")
         data = {}
     base = bases.get(path.rpartition(".")[2])
+    base = base if isinstance(base, cls) else None  # not for a case that is named like the table
     values: dict[str, Any] = {}
     for key in data:
         if key not in fields:
@@ -54,7 +58,7 @@ def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[
     for key, field in fields.items():
         below = _join(path, key)
         if cls is Scenario and field.name == "cases":
-            bases = {"gains": values["gains"]}
+            bases = {name: values[name] for name in FOR_EVERY_CASE}
         if key in data:
             values[field.name] = _value(field, data[key], below, cls, mistakes, bases)
         elif base is not None:

@@ -8,9 +8,8 @@ from typing import Any
 
 import msgspec
 
-from agents.config import Gains
 from scenarios.spec.model import Case, Scenario, key_of
-from scenarios.spec.reading import AS_RUN
+from scenarios.spec.reading import AS_RUN, FOR_EVERY_CASE
 
 
 def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
@@ -28,7 +27,7 @@ def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
     """
     lines = [
         "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
-        *_table(scenario, "", scenario.gains),
+        *_table(scenario, "", scenario),
         "",
         f"[{AS_RUN}]",
         *(f"{key} = {_value(value)}" for key, value in as_run.items()),
@@ -36,22 +35,22 @@ def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(struct: msgspec.Struct, path: str, gains: Gains) -> Iterator[str]:
-    """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats the common gains."""
+def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]:
+    """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats a common table."""
     below: list[str] = []
     for field in msgspec.structs.fields(struct):
         value, key = getattr(struct, field.name), key_of(type(struct), field)
         where = f"{path}.{_key(key)}" if path else _key(key)
-        if isinstance(struct, Case) and value == gains:
+        if isinstance(struct, Case) and field.name in FOR_EVERY_CASE and value == getattr(common, field.name):
             continue
         if isinstance(value, msgspec.Struct):
-            below += ["", f"[{where}]", *_table(value, where, gains)]
+            below += ["", f"[{where}]", *_table(value, where, common)]
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
             for item in value:
-                below += ["", f"[[{where}]]", *_table(item, where, gains)]
+                below += ["", f"[[{where}]]", *_table(item, where, common)]
         elif isinstance(value, dict):
             for name, item in value.items():
-                below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", gains)]
+                below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", common)]
         elif value or not isinstance(value, tuple | dict):
             yield f"{key} = {_value(value)}"
     yield from below

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from agents.config import Gains
+from agents.config import Gains, Handling
 from plant.config import GfmParameters, SwitchEvent
 from plant.tables.read import DATA
 from scenarios.spec import catalogue, load_scenario
@@ -89,6 +89,20 @@ def test_a_case_changes_only_the_gains_it_names(tmp_path: Path) -> None:
     scenario, _ = load_scenario(written(tmp_path, text))
 
     assert scenario.cases["only"].gains == Gains(alpha=3.0, k_q=0.5)
+
+
+def test_a_case_changes_only_the_handling_it_names_and_agents_are_told(tmp_path: Path) -> None:
+    """[case.NAME.handling] starts from [handling], also in a case of that name, and agents get the result."""
+    text = SHORT.replace("case.only", "case.handling")
+    text += '[case.handling.handling]\nstale = "skip"\n\n[handling]\nT_age_s = 0.1\nweights = "degree-normalised"\n'
+
+    scenario, feeder = load_scenario(written(tmp_path, text))
+    agents = configs(scenario, feeder, "handling")[1]
+
+    asked = Handling(stale="skip", T_age=0.1, weights="degree-normalised")
+    assert {agent.control.handling for agent in agents} == {asked}
+    again, _ = load_scenario(written(tmp_path, to_toml(scenario, {})))
+    assert again == scenario
 
 
 def test_keys_with_units_reach_the_plants_parameters(tmp_path: Path) -> None:
