@@ -114,5 +114,10 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Lock-step with the plant, or real time."""
     speed: float = 1.0
     """Wall-clock: run time per wall time (s/s), > 0."""
+    clock_rate: float = 1.0
+    """How fast the agent's own clock goes: 1.0001 gains 100 ppm. Wall-clock: it ticks so much more often; simulated: it
+    takes a period for so much longer."""
+    links: str = ""
+    """What the links to this agent do to its messages, as text for whoever puts them before it; empty: nothing."""
     max_age: float = 0.25
     """Wall-clock: a neighbour's state, or a measurement, older than this (s of run time) is not used."""

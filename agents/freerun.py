@@ -25,7 +25,7 @@ from msgspec.structs import replace
 
 from agents.config import AgentConfig
 from agents.hearing import PATIENCE, Hearing, patience_after
-from agents.side import Side
+from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
 from wire.links import Links
@@ -68,7 +68,7 @@ class FreeAgent(Side):
         """Ticks skipped, as their time was over."""
         self.ticks = self.sent = self.used = self.lost = 0
         self._first_routes = dict(self._routes)
-        self._timer = Timer(config.T_c / config.speed, 0.0)
+        self._timer = Timer(config.T_c / config.speed / config.clock_rate, 0.0)
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
         self._lateness = 0.0
@@ -101,7 +101,8 @@ class FreeAgent(Side):
     @property
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
-        return self.keys.state(self._name), self.keys.leave(self._name), self.keys.status(self._name)
+        keys, name = self.keys, self._name
+        return keys.state(name), keys.leave(name), keys.status(name), keys.report(name)
 
     @property
     def over(self) -> bool:
@@ -192,6 +193,7 @@ class FreeAgent(Side):
     def leave(self, reason: str) -> None:
         """Leave properly: have the own inverter taken off the network, then close."""
         if not self.over:
+            self._report_links(final=True)
             self._leave()
             self.stopped = reason
 
@@ -380,6 +382,8 @@ class FreeAgent(Side):
         self._in_sums = tuple(name for name in young if self._agent.shares_island(name))
         self.ticks += 1
         self.sent += 1
+        if self.ticks % REPORT_TICKS == 0:
+            self._report_links()
         self._publish(self.keys.state(self._name), encode(state))
 
     def _publish_status(self, now: float) -> None:

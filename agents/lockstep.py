@@ -33,8 +33,9 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from agents.agent import Agent
 from agents.config import AgentConfig
-from agents.side import Side
+from agents.side import REPORT_TICKS, Side
 from agents.topology import is_pairwise
 from wire.actions import Fetch, Listen
 from wire.clock import time_of
@@ -45,6 +46,9 @@ from wire.patience import Awaited, Patience
 
 Peer = tuple[str, str]
 """Name and instance of an agent."""
+
+CLOSING = 2.0
+"""Longest wait (s) for the neighbours' last states, and for word that the report on emulated links has come."""
 
 PATIENCE = 2.0
 """An agent waits this many deadlines, so that the plant complains first."""
@@ -65,6 +69,8 @@ class AgentSide(Side):
 
     def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
         super().__init__(config, instance, links)
+        if config.clock_rate != 1.0:  # its periods seem longer to it than they are
+            self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate))
         self._T_c, self._incarnation = config.T_c, config.incarnation
         self._pairwise = is_pairwise(config.control)
         self._patience = Patience(config.name, PATIENCE * config.deadline)
@@ -83,6 +89,10 @@ class AgentSide(Side):
         self._waiting: dict[str, str] = {}
         """In-neighbours, and their instances, whose state of the tick before has not come yet."""
         self._ahead: dict[str, tuple[State, bytes]] = {}
+        self._ending = ""
+        """Why it is about to close."""
+        self._reported = False
+        """Whether the last report on emulated links is out."""
         self._sensed: Measurement | None = None
         """The last measurement that the link from the plant let through."""
 
@@ -91,7 +101,7 @@ class AgentSide(Side):
     @property
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
-        return self.keys.ready(self._name), self.keys.state(self._name)
+        return self.keys.ready(self._name), self.keys.state(self._name), self.keys.report(self._name)
 
     @property
     def wanted(self) -> int:
@@ -124,7 +134,12 @@ class AgentSide(Side):
 
     def expire(self, now: float) -> None:
         """Give up if the deadline has passed."""
-        if not self.over and self.until is not None and now >= self.until:
+        if self.over or self.until is None or now < self.until:
+            return
+        if self._ending:
+            self._report_the_last()
+            self.stopped = self._ending
+        else:
             self.failed = self._patience.complaint(self.missing(), now)
 
     # ---------------------------------------------------------------- liveliness
@@ -143,6 +158,8 @@ class AgentSide(Side):
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
         match self.keys.parts(key):
+            case ("alive", "plant") if self._ending:
+                self.stopped = self._ending
             case ("alive", "plant") if not self.over:
                 tick = "" if self._tick is None else f" at tick {self._tick}"
                 self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
@@ -171,7 +188,7 @@ class AgentSide(Side):
     def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
         self._check_plant(message)
         if isinstance(message, Stop):
-            self.stopped = message.reason
+            self._end(message.reason, now)
         elif isinstance(message, Prepare):
             self._on_prepare(message, now)
         else:
@@ -184,7 +201,22 @@ class AgentSide(Side):
         if message.refused:
             self.failed = message.reason
         else:
-            self.stopped = message.reason
+            self._end(message.reason, now)
+
+    def _end(self, reason: str, now: float) -> None:
+        """Close; with emulated links only once the neighbours' last states are booked and the plant has the book."""
+        if self._links is None or self._ending:
+            self.stopped = self._ending or reason
+            return
+        self._ending = reason
+        self._patience.until = now + CLOSING
+        if not self._waiting:
+            self._report_the_last()
+
+    def _report_the_last(self) -> None:
+        if not self._reported:
+            self._reported = True
+            self._report_links(final=True)
 
     def _on_prepare(self, message: Prepare, now: float) -> None:
         if len(message.instances) != len(message.roster):
@@ -291,6 +323,20 @@ class AgentSide(Side):
             kind = "stale" if seq < self._tick else "unexpected"
             raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
 
+    def _stand_still(self, measurement: Measurement) -> State:
+        """What the lock-step needs of a paused agent; no link lets it through. Awake, it starts from what is held."""
+        self._agent.let_go()
+        return State(
+            sender=self._name,
+            incarnation=self._incarnation,
+            seq=measurement.seq,
+            t=measurement.t,
+            P_set=measurement.P_set,
+            V_set=measurement.V_set,
+            Q=measurement.Q,
+            island=measurement.island,
+        )
+
     def _hear(self, state: State, payload: bytes) -> None:
         if not self._is_offered(state, payload, state.t):
             self._agent.hear(state)
@@ -306,7 +352,9 @@ class AgentSide(Side):
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if all that it needs is here."""
         measurement, tick = self._measurement, self._tick
-        if measurement is None or tick is None:
+        if self._ending and not self._waiting:
+            self._report_the_last()
+        if measurement is None or tick is None or self._ending:
             return
         for name in self._waiting.keys() - set(measurement.roster):
             del self._waiting[name]
@@ -317,10 +365,13 @@ class AgentSide(Side):
         sensed = self._sensed or measurement  # the first one is how the agent is set up, and always there
         if sensed is not measurement:
             sensed = replace(sensed, seq=tick, t=measurement.t)
-        state = self._agent.tick(sensed, neighbours)
+        stalled = self._links is not None and self._links.stalled(measurement.t)
+        state = self._stand_still(measurement) if stalled else self._agent.tick(sensed, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)
         self._tick, self._measurement = tick + 1, None
+        if self._tick % REPORT_TICKS == 0:
+            self._report_links()
         if measurement.roster != self._roster:
             self._roster = measurement.roster
             self._neighbours = self._agent.in_neighbours(self._roster)

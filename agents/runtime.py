@@ -12,17 +12,19 @@ from agents.freerun import FreeAgent
 from agents.lockstep import AgentSide
 from wire.drive import StoppedError, drive, perform
 from wire.keys import check_name
-from wire.process import ConfigurationError
+from wire.process import ConfigurationError, MakeLinks, no_links
 from wire.session import Session
 
 
-def run_agent(config: AgentConfig) -> str:
+def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     """Take part in a run until it ends.
 
     Parameters
     ----------
     config : AgentConfig
         Who the agent is, the run's rule, and where the rendezvous is.
+    make_links : MakeLinks, optional
+        Makes the emulated links, if there are any.
 
     Returns
     -------
@@ -50,7 +52,8 @@ def run_agent(config: AgentConfig) -> str:
         try:
             if side is None:
                 try:
-                    side = (FreeAgent if wall else AgentSide)(config, session.id)
+                    links = make_links(config.name, config.links)
+                    side = (FreeAgent if wall else AgentSide)(config, session.id, links)
                 except ValueError as error:
                     raise ConfigurationError(str(error)) from None
             _take_part(side, session, log)

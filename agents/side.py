@@ -10,7 +10,10 @@ from wire.actions import Action, Publish, Say
 from wire.codec import RejectedError, Rejects, decode, encode
 from wire.keys import Keys
 from wire.links import Links
-from wire.messages import PLANT, AnyMessage
+from wire.messages import PLANT, AnyMessage, LinkReport
+
+REPORT_TICKS = 100
+"""What emulated links did is sent every so many ticks."""
 
 Handler = Callable[[AnyMessage, bytes, float], None]
 """Takes a message, its bytes, and the time."""
@@ -133,6 +136,23 @@ class Side:
             except RejectedError as rejected:
                 self.rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
         return messages
+
+    def _report_links(self, *, final: bool = False) -> None:
+        """Send what the emulated links did of late."""
+        if self._links is None:
+            return
+        *first, last = self._links.report()
+        for data in (*first, last):
+            report = LinkReport(
+                sender=self._name,
+                incarnation=self._config.incarnation,
+                seq=0,
+                t=0.0,
+                data=data,
+                instance=self._instance,
+                final=final and data is last,
+            )
+            self._publish(self.keys.report(self._name), encode(report))
 
     def _publish(self, key: str, payload: bytes) -> None:
         self._actions.append(Publish(key, payload))

@@ -113,13 +113,13 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Move(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An agent that the scenario lets leave, its inverter with it, or join."""
+    """An agent that the scenario lets leave, its inverter with it, die, without its inverter, or join."""
 
     t: float
     """Time (s), a multiple of T_c."""
     inverter: str
     """Name, e.g. "inv2"."""
-    action: Literal["leave", "join"]
+    action: Literal["leave", "die", "join"]
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -163,6 +163,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Longest wait for any agent (s)."""
     listen: tuple[str, ...]
     """Endpoints the plant listens on; the rendezvous of the run."""
+    links: str = ""
+    """What the links to the plant do to its messages, as text for whoever puts them before it; empty: nothing."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
     recorders: tuple[str, ...] = ()

@@ -24,12 +24,12 @@ from plant.interface import LivePlant
 from plant.pacing import TOLERATED, Pacer, sentence
 from plant.reporting import measurement_of
 from plant.service import Service
-from plant.side import CLOSING, Side
+from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Fetch, Say
 from wire.codec import RejectedError, decode, encode
 from wire.keys import check_name
 from wire.links import Links
-from wire.messages import PLANT, Command, Leave, Nameplate, PlantEvent, State
+from wire.messages import PLANT, Command, Leave, LinkReport, Nameplate, PlantEvent, State
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
@@ -82,6 +82,7 @@ class FreePlant(Side):
         self._complained = False
         self._service = Service(self)
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
+        self._report_keys = {self.keys.report(name) for name in plant.inverters}
         self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
 
     # ---------------------------------------------------------------- what the driver needs
@@ -89,7 +90,7 @@ class FreePlant(Side):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return *self._state_keys, *self._leave_keys, self.keys.command
+        return *self._state_keys, *self._leave_keys, *self._report_keys, self.keys.command
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -135,11 +136,10 @@ class FreePlant(Side):
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
         self._say(f"ends: {reason}. {self._pace()}")
-        self._report(final=True)
-        self.stop(self.keys.control, reason)
+        self._tell_the_end(reason)
         self.phase = "closing"
         self._deadline = now + CLOSING
-        if not self._tokens:
+        if self._all_have_gone():
             self.phase = "over"
 
     # ---------------------------------------------------------------- liveliness
@@ -181,7 +181,7 @@ class FreePlant(Side):
                 self._drop(name)
                 if self.phase in ("gathering", "running"):
                     self._note(name, f"{name} died; its inverter stays on primary droop at its last set-points")
-        if self.phase == "closing" and not self._tokens:
+        if self.phase == "closing" and self._all_have_gone():
             self.phase = "over"
 
     def _drop(self, name: str) -> None:
@@ -203,6 +203,8 @@ class FreePlant(Side):
                 self._last[name], self._heard[name] = message.seq, now
                 if not self._is_offered(message, payload, now * self.config.speed):
                     self._states[name] = message
+            elif key in self._report_keys and isinstance(message, LinkReport):
+                self._forward(message, payload)
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
                 self._on_leave(name, now)
@@ -276,6 +278,7 @@ class FreePlant(Side):
         if self.phase == "gathering":
             self._begin(now)
         elif self.phase == "closing":
+            self._send_the_last()
             self.phase = "over"
         elif self.phase == "running" and self.tick == self._ticks:
             self.close("end of the scenario", now)
@@ -290,7 +293,7 @@ class FreePlant(Side):
 
     def _move(self) -> None:
         """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""
-        leave, join = self._schedule.take(self.tick)
+        leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
         for name in leave:
             if name in self.instances:
                 reason = f"{name} leaves at t = {self.t:g} s, as the scenario says"
@@ -346,6 +349,8 @@ class FreePlant(Side):
         self._reporter.collect()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
             self._report(final=False)
+        if self.tick % LINK_TICKS == 0:
+            self._report_links()
         return True
 
     # ---------------------------------------------------------------- what is told

@@ -31,11 +31,11 @@ from typing import Literal
 from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.reporting import measurement_of
-from plant.side import CLOSING, Side
+from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Fetch
 from wire.codec import RejectedError, decode, encode
 from wire.links import Links
-from wire.messages import PLANT, Nameplate, PlantEvent, Prepare, Ready, State
+from wire.messages import PLANT, LinkReport, Nameplate, PlantEvent, Prepare, Ready, State
 from wire.patience import Awaited, Patience
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
@@ -77,6 +77,7 @@ class PlantSide(Side):
         self._states: dict[str, State] = {}
         self._state_keys = {self.keys.state(name): name for name in self._everyone}
         self._ready_keys = {self.keys.ready(name): name for name in self._everyone}
+        self._report_keys = {self.keys.report(name) for name in self._everyone}
         self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
 
     # ---------------------------------------------------------------- what the driver needs
@@ -84,7 +85,7 @@ class PlantSide(Side):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return *self._state_keys, *self._ready_keys
+        return *self._state_keys, *self._ready_keys, *self._report_keys
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -187,7 +188,7 @@ class PlantSide(Side):
                 self._recorders.discard(name)
             case ("alive", "agent", name, instance) if self.instances.get(name) == instance:
                 self._lose(name, now)
-        if self.phase == "closing" and not self._tokens:
+        if self.phase == "closing" and self._all_have_gone():
             self._be_over()
 
     def _lose(self, name: str, now: float) -> None:
@@ -222,6 +223,8 @@ class PlantSide(Side):
             elif key in self._ready_keys and isinstance(message, Ready):
                 self._check_sender(self._ready_keys[key], message)
                 self._on_ready(message)
+            elif key in self._report_keys and isinstance(message, LinkReport):
+                self._forward(message, payload)
             elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self.instances.get(name, "")):
                 self.plates[name] = message
                 self._gather(now)
@@ -277,16 +280,14 @@ class PlantSide(Side):
 
     def _move(self, now: float) -> None:
         """Let leave who leaves at this tick, and begin to wait for who joins."""
-        leave, join = self._schedule.take(self.tick)
+        leave, join, die = self._schedule.take(self.tick)
         when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:
-            self._note(name, f"{name} leaves {when}")
-            instance = self.instances.pop(name, "")
-            self.plates.pop(name, None)
-            if instance:
-                self.stop(self.keys.dismissal(name, instance), f"{name} leaves {when}")
+            self._dismiss(name, f"{name} leaves {when}")
             self._connect(name, False, now)
-            self._roster_changed = True
+        for name in die:
+            text = f"{name} dies {when}; its inverter stays on primary droop at its last set-points"
+            self._dismiss(name, text)
         join = tuple(name for name in join if name not in self.instances)
         for name in join:
             self._note(name, f"{name} joins {when}")
@@ -294,6 +295,16 @@ class PlantSide(Side):
             self.phase, self._joining = "joining", join
             self._patience.renew(now)
             self._report(final=False, awaited=join)
+
+    def _dismiss(self, name: str, text: str) -> None:
+        """Have an agent end, as the scenario says."""
+        self._note(name, text)
+        instance = self.instances.pop(name, "")
+        self.plates.pop(name, None)
+        self._set_by.pop(name, None)
+        if instance:
+            self.stop(self.keys.dismissal(name, instance), text)
+        self._roster_changed = True
 
     def _admit(self, now: float) -> None:
         """Go on with those who have joined: their inverters are on the network, at no load."""
@@ -362,6 +373,8 @@ class PlantSide(Side):
             self._close("end of the scenario", now)
         elif self.tick % TELEMETRY_TICKS == 0:
             self._report(final=False)
+            if self.tick % LINK_TICKS == 0:
+                self._report_links()
 
     # ---------------------------------------------------------------- telemetry and the end
 
@@ -369,14 +382,14 @@ class PlantSide(Side):
         self._telemetry(final=final, reproducible=self.reproducible, awaited=awaited)
 
     def _close(self, reason: str, now: float) -> None:
-        self._report(final=True)
-        self.stop(self.keys.control, reason)
+        self._tell_the_end(reason)
         self.phase = "closing"
         self._waiting = set()
         self._patience.until = now + CLOSING
-        if not self._tokens:
+        if self._all_have_gone():
             self._be_over()
 
     def _be_over(self) -> None:
+        self._send_the_last()
         self.phase = "over"
         self._patience.rest()

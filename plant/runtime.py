@@ -15,7 +15,8 @@ from plant.freerun import FreePlant
 from plant.interface import LivePlant
 from plant.lockstep import PlantSide
 from wire.drive import StoppedError, drive, perform
-from wire.process import ConfigurationError
+from wire.messages import PLANT
+from wire.process import ConfigurationError, MakeLinks, no_links
 from wire.session import Session
 
 LISTENING, COMPILING, READY = "listening", "compiling", "ready"
@@ -30,7 +31,9 @@ def build(config: PlantConfig) -> LivePlant:
     return build_plant(config)
 
 
-def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] = build) -> str:
+def run_plant(
+    config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] = build, make_links: MakeLinks = no_links
+) -> str:
     """Run the plant until the end of the scenario.
 
     The session is opened first, as it is the rendezvous: the agents find each other while the plant is built.
@@ -41,6 +44,8 @@ def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] =
         The plant, its agents and its times.
     builder : Callable[[PlantConfig], LivePlant], optional
         Makes the plant; tests have smaller ones.
+    make_links : MakeLinks, optional
+        Makes the emulated links to it, if there are any.
 
     Returns
     -------
@@ -62,7 +67,8 @@ def run_plant(config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] =
         try:
             tell(COMPILING)
             plant = builder(config)
-            side = FreePlant(config, plant) if wall else PlantSide(config, plant)
+            links = make_links(PLANT, config.links)
+            side = FreePlant(config, plant, links) if wall else PlantSide(config, plant, links)
         except ValueError as error:
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:

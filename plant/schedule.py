@@ -1,4 +1,4 @@
-"""Who leaves and who joins at which tick, as the scenario says. The same in both kinds of time."""
+"""Who leaves, dies and joins at which tick, as the scenario says. The same in both kinds of time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ class Moves(NamedTuple):
     """Inverters whose agents leave."""
     join: tuple[str, ...] = ()
     """Inverters whose agents join."""
+    die: tuple[str, ...] = ()
+    """Inverters whose agents die."""
 
 
 class Schedule:
@@ -37,7 +39,7 @@ class Schedule:
     >>> config = PlantConfig(run="demo", settings=PlantSettings(), agents=("inv1", "inv2"), T_c=0.02, end=5.0,
     ...     record_step=0.01, deadline=10.0, listen=(), moves=(Move(t=2.0, inverter="inv2", action="leave"),))
     >>> Schedule(config, ("inv1", "inv2")).take(100)
-    Moves(leave=('inv2',), join=())
+    Moves(leave=('inv2',), join=(), die=())
     """
 
     def __init__(self, config: PlantConfig, inverters: tuple[str, ...]) -> None:
@@ -51,9 +53,9 @@ class Schedule:
                     f"moves: {move.inverter} must {move.action} at a positive multiple of the control period "
                     f"{config.T_c:g} s, got {move.t:g} s"
                 )
-            leave, join = self._at.get(tick, Moves())
-            leaves = move.action == "leave"
-            self._at[tick] = Moves((*leave, move.inverter), join) if leaves else Moves(leave, (*join, move.inverter))
+            moves = self._at.get(tick, Moves())
+            names = (*getattr(moves, move.action), move.inverter)
+            self._at[tick] = moves._replace(**{move.action: names})
 
     @property
     def joiners(self) -> frozenset[str]:

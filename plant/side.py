@@ -13,10 +13,14 @@ from wire.clock import ticks_until, time_of
 from wire.codec import RejectedError, Rejects, decode, encode
 from wire.keys import Keys, check_name
 from wire.links import Links
-from wire.messages import PLANT, AnyMessage, Nameplate, Pacing, State, Stop
+from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Pacing, State, Stop
 
 CLOSING = 2.0
 """Longest wait for the others to close (s)."""
+
+
+LINK_TICKS = 100
+"""What emulated links to the plant did is sent every so many ticks."""
 
 
 class Side:
@@ -57,6 +61,8 @@ class Side:
         """All tokens of agents and recorders that are there now, refused ones too."""
         self._schedule = Schedule(config, plant.inverters)
         self._reporter = Reporter(config.incarnation, plant)
+        self._last_due = False
+        """Whether the last telemetry is yet to be sent, though the run has ended."""
         self._set_by: dict[str, int] = {}
         """Number of the last state of each agent that a link let through."""
 
@@ -118,6 +124,45 @@ class Side:
             if isinstance(state, State) and state.seq > self._set_by.get(src, -1):
                 self._set_by[src] = state.seq
                 yield state
+
+    def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
+        raise NotImplementedError
+
+    def _tell_the_end(self, reason: str) -> None:
+        """Have everybody close. The last telemetry waits for what the agents have to say of emulated links."""
+        self._last_due = True
+        if self._links is None:
+            self._send_the_last()
+        self.stop(self.keys.control, reason)
+
+    def _all_have_gone(self) -> bool:
+        """Whether all tokens have; once those of the agents have, the last telemetry is sent."""
+        if not any(self.keys.parts(token)[1] == "agent" for token in self._tokens):
+            self._send_the_last()
+        return not self._tokens
+
+    def _send_the_last(self) -> None:
+        """Send the last telemetry, if it has not been sent."""
+        if self._last_due:
+            self._last_due = False
+            self._report_links()
+            self._report(final=True)
+
+    def _forward(self, report: LinkReport, payload: bytes) -> None:
+        """Pass on what an agent's links did; it closes once it knows that its last report is here."""
+        self._publish(self.keys.telemetry, payload)
+        if report.final:
+            try:
+                check_name("instance", report.instance)
+            except ValueError as error:
+                raise RejectedError("garbled", str(error)) from None
+            self.stop(self.keys.dismissal(report.sender, report.instance), "its report is here")
+
+    def _report_links(self) -> None:
+        """Send what the emulated links to the plant did of late."""
+        for data in self._links.report() if self._links is not None else ():
+            report = LinkReport(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, data=data)
+            self._publish(self.keys.telemetry, encode(report))
 
     def _telemetry(
         self,

@@ -94,6 +94,10 @@ class Keys:
         """The agent of an inverter leaves properly."""
         return f"{self._root}/leave/{inverter}"
 
+    def report(self, inverter: str) -> str:
+        """What the emulated links into an agent did."""
+        return f"{self._root}/report/{inverter}"
+
     def status(self, inverter: str) -> str:
         """How the agent of an inverter fares."""
         return f"{self._root}/status/{inverter}"
@@ -190,8 +194,12 @@ def describe() -> tuple[KeySpec, ...]:
             "at every tick, once its measurement and the neighbours' states of the tick before are in",
         ),
         row(
-            keys.telemetry, "publication", "Telemetry", "plant", "recorders",
+            keys.telemetry, "publication", "Telemetry, LinkReport", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
+        ),
+        row(
+            keys.report(agent), "publication", "LinkReport", "agent", "plant, who publishes it on telemetry",
+            "in a run with emulated links: every 100 ticks, and when it ends",
         ),
         row(
             keys.leave(agent), "publication", "Leave", "agent", "plant",

@@ -52,8 +52,18 @@ class Links(Protocol):
         """Take out what has arrived by now, in the order of arrival."""
         ...
 
+    def stalled(self, t: float) -> bool:
+        """Whether the receiver itself is to stand still at t (s of run time)."""
+        ...
+
     def order(self, text: str, t: float) -> str:
-        """Change what the links do from t on, as a person said; what was changed, or nothing if it is not for here."""
+        """Change what the links do from t on, as a person said; what was changed, or nothing if it is not for here.
+
+        Raises
+        ------
+        ValueError
+            If it is no order to links.
+        """
         ...
 
     def report(self) -> tuple[bytes, ...]:

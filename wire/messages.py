@@ -124,6 +124,17 @@ class Leave(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     """An agent leaves properly: the plant takes its inverter off the network (agent -> plant, wall-clock time)."""
 
 
+class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """What the emulated links into one receiver did of late (agent -> plant -> recorders)."""
+
+    data: bytes
+    """A part of the receiver's book, for the record; no core looks into it."""
+    instance: Name = ""
+    """Which process of the sender's: it is told that its last part has come."""
+    final: bool = False
+    """Whether this is the last part: the sender closes once it is told."""
+
+
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A person wants something of the plant (command line -> plant, wall-clock time)."""
 
@@ -232,9 +243,22 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
 
 AnyMessage = (
-    Nameplate | Measurement | State | Prepare | Ready | Stop | Leave | Command | Answer | AgentStatus | Telemetry
+    Nameplate
+    | Measurement
+    | State
+    | Prepare
+    | Ready
+    | Stop
+    | Leave
+    | LinkReport
+    | Command
+    | Answer
+    | AgentStatus
+    | Telemetry
 )
 """Everything that can arrive."""
 
-MESSAGES = (Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, Command, Answer, AgentStatus, Telemetry)
+MESSAGES = (
+    Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, LinkReport, Command, Answer, AgentStatus, Telemetry,
+)  # fmt: skip
 """The types of `AnyMessage`, for documentation that is made from the code."""

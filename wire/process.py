@@ -18,6 +18,7 @@ from typing import TypeVar
 import msgspec
 
 from wire.drive import StoppedError
+from wire.links import Links
 from wire.session import SessionError
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
@@ -39,6 +40,22 @@ C = TypeVar("C")
 
 class ConfigurationError(ValueError):
     """A configuration that cannot work; the message says what would be right."""
+
+
+MakeLinks = Callable[[str, str], Links | None]
+"""Makes the emulated links to somebody, from a name and what the configuration says of links."""
+
+
+def no_links(name: str, text: str) -> None:
+    """Links that do nothing.
+
+    Raises
+    ------
+    ConfigurationError
+        If the configuration asks for more.
+    """
+    if text:
+        raise ConfigurationError(f"{name}: links are to be emulated; start it by scenarios.emulation instead")
 
 
 def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:

@@ -19,7 +19,7 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.outcome import Outcome
 from wire.codec import RejectedError, Rejects, decode
 from wire.keys import Keys
-from wire.messages import PLANT, PlantEvent, Telemetry
+from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 from wire.session import Session, SessionError
 
 RECORDER = "fleet"
@@ -46,7 +46,8 @@ def run_processes(
     start_order: Sequence[str] | None = None,
     on_status: Callable[[str], None] | None = None,
     on_start: Callable[[Children], None] | None = None,
-    plant_command: Sequence[str] = ("-m", "plant"),
+    on_links: Callable[[LinkReport], None] = lambda report: None,
+    plant_command: Sequence[str] = (),
 ) -> Outcome:
     """Run a scenario with a plant process and one process per agent, in simulated or in wall-clock time.
 
@@ -69,8 +70,10 @@ def run_processes(
         Called with "listening", "compiling", "ready" as the plant comes up.
     on_start : Callable[[Children], None], optional
         Called once all processes are started; the tests' way to hurt them.
+    on_links : Callable[[LinkReport], None], optional
+        Called with every part of what the emulated links did.
     plant_command : Sequence[str], optional
-        How the interpreter is told to run the plant; tests have smaller ones.
+        How the interpreter is told to run the plant, if not as usual; tests have smaller ones.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def run_processes(
         def start(name: str, life: int) -> Child:
             return _start(name, life, plant_config, agents, endpoint, log_dir, plant_command, session)
 
-        watch = _Watch(session, plant_config, on_telemetry, on_status or (lambda word: None), start)
+        watch = _Watch(session, plant_config, on_telemetry, on_links, on_status or (lambda word: None), start)
         session.subscribe(keys.telemetry)
         session.hold_token(keys.alive_recorder(RECORDER))
         with Children() as children:
@@ -135,9 +138,10 @@ def _start(
 
     log = log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
     if name == PLANT:
-        return Child(name, list(plant_command), plant_config, log, on_exit, on_word)
+        usual = ("-m", "scenarios.emulation.plant" if plant_config.links else "plant")
+        return Child(name, list(plant_command or usual), plant_config, log, on_exit, on_word)
     config = msgspec.structs.replace(agents[name], connect=(endpoint,), incarnation=life)
-    return Child(name, ["-m", "agents"], config, log, on_exit)
+    return Child(name, ["-m", "scenarios.emulation.agent" if config.links else "agents"], config, log, on_exit)
 
 
 def _endpoint(listen: tuple[str, ...]) -> str:
@@ -170,6 +174,7 @@ class _Watch:
         session: Session,
         config: PlantConfig,
         on_telemetry: Callable[[Telemetry], None],
+        on_links: Callable[[LinkReport], None],
         on_status: Callable[[str], None],
         start: Callable[[str, int], Child],
     ) -> None:
@@ -183,7 +188,7 @@ class _Watch:
         """Longer than the plant's: it knows better what is wrong, unless it is what is wrong."""
         if self._wall:
             self._patience += config.wait_for_agents + 2.0 * config.T_c / config.speed
-        self._on_telemetry, self._on_status = on_telemetry, on_status
+        self._on_telemetry, self._on_links, self._on_status = on_telemetry, on_links, on_status
         self._rejects = Rejects(RECORDER)
         self._began = self._started = self._ended_at = monotonic()
         self._standing = False
@@ -226,6 +231,9 @@ class _Watch:
     def _take(self, key: str, payload: bytes) -> None:
         try:
             telemetry = decode(payload)
+            if isinstance(telemetry, LinkReport):
+                self._on_links(telemetry)
+                return
             if not isinstance(telemetry, Telemetry):
                 raise RejectedError("unexpected", f"a {type(telemetry).__name__} instead of Telemetry")
         except RejectedError as rejected:

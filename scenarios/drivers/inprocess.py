@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
 from time import perf_counter
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import msgspec
 
@@ -19,9 +19,10 @@ from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.lockstep import PlantSide
 from scenarios.drivers.outcome import Outcome
+from scenarios.emulation.links import links_of
 from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import decode
-from wire.messages import PlantEvent, Telemetry
+from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 
 
 class _Delivery(NamedTuple):
@@ -43,6 +44,8 @@ class Bus:
         The agents' cores, in the order in which they start.
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
+    on_links : Callable[[LinkReport], None]
+        Takes what emulated links did.
     newcomer : Callable[[str], AgentSide]
         Makes the core of an agent that the plant awaits while the run goes on.
     """
@@ -52,12 +55,13 @@ class Bus:
         plant: PlantSide,
         agents: Iterable[AgentSide],
         on_telemetry: Callable[[Telemetry], None],
+        on_links: Callable[[LinkReport], None],
         newcomer: Callable[[str], AgentSide],
     ) -> None:
         self._plant, self._agents = plant, list(agents)
         self._newcomer = newcomer
         self._awaited: list[str] = []
-        self._on_telemetry = on_telemetry
+        self._on_telemetry, self._on_links = on_telemetry, on_links
         self._subscribers: defaultdict[str, list[PlantSide | AgentSide]] = defaultdict(list)
         self._nameplates: dict[str, bytes] = {}
         self._queue: deque[_Delivery] = deque()
@@ -98,7 +102,8 @@ class Bus:
         nameplate, answer = agent.nameplate
         self._nameplates[nameplate] = answer
         inverter = self._plant.keys.parts(name)[2]
-        for key in (self._plant.keys.state(inverter), self._plant.keys.ready(inverter)):
+        keys = self._plant.keys
+        for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter)):
             if self._plant not in self._subscribers[key]:
                 self._subscribers[key].append(self._plant)
         self._plant.appeared(name, 0.0)
@@ -117,9 +122,12 @@ class Bus:
                 for to in self._subscribers.get(key, ()):
                     self._queue.append(_Delivery(to, key, payload))
                 if key == self._plant.keys.telemetry:
-                    telemetry = cast("Telemetry", decode(payload))
-                    self._awaited += telemetry.awaited
-                    self._on_telemetry(telemetry)
+                    told = decode(payload)
+                    if isinstance(told, Telemetry):
+                        self._awaited += told.awaited
+                        self._on_telemetry(told)
+                    elif isinstance(told, LinkReport):
+                        self._on_links(told)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
@@ -143,6 +151,7 @@ def run_inprocess(
     agent_configs: Iterable[AgentConfig],
     on_telemetry: Callable[[Telemetry], None],
     *,
+    on_links: Callable[[LinkReport], None] = lambda report: None,
     plant: PlantLike | None = None,
 ) -> Outcome:
     """Run a scenario in this process and this thread.
@@ -155,6 +164,8 @@ def run_inprocess(
         The agents, in the order in which they start; also those that join later.
     on_telemetry : Callable[[Telemetry], None]
         Called with every telemetry message as it comes; the first at t = 0.
+    on_links : Callable[[LinkReport], None], optional
+        Called with every part of what the emulated links did.
     plant : PlantLike, optional
         A plant at t = 0 to use instead of building the configuration's.
 
@@ -178,18 +189,21 @@ def run_inprocess(
         from plant.build import build_plant  # numba and scipy: only for who runs a plant
 
         plant = build_plant(plant_config)
-    side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant)
+    side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links))
     known = {config.name: config for config in agent_configs}
     agents = [
-        AgentSide(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
+        AgentSide(config, f"p{i}", links_of(config.name, config.links))
+        for i, config in enumerate(known.values())
+        if config.name in plant_config.agents
     ]
 
     def newcomer(name: str) -> AgentSide:
         known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
-        agents.append(AgentSide(known[name], f"p{len(known) + len(agents)}"))
+        links = links_of(name, known[name].links)
+        agents.append(AgentSide(known[name], f"p{len(known) + len(agents)}", links))
         return agents[-1]
 
-    Bus(side, agents, note, newcomer).run()
+    Bus(side, agents, note, on_links, newcomer).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

@@ -9,13 +9,14 @@ from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
 from scenarios.spec.model import Event, Scenario
 from scenarios.spec.moves import inverters_of, moves_of
+from scenarios.spec.netem import deaths_of, is_calm, netem_of, setup_of
 
 F_NOM = 60.0
 """Nominal frequency (Hz) of every feeder that gridpeers knows."""
 
 
 def configs(
-    scenario: Scenario, feeder: Feeder, case: str, endpoint: str = ""
+    scenario: Scenario, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Configurations of the plant and of every inverter's agent for one case, those that join later last.
 
@@ -29,6 +30,8 @@ def configs(
         Name of the case.
     endpoint : str, optional
         Where the plant listens and agents connect, e.g. "tcp/127.0.0.1:7447"; the in-process driver needs none.
+    real_nodes : bool, optional
+        Whether processes really are killed and paused, as the driver of wall-clock time does; else it is emulated.
 
     Examples
     --------
@@ -41,6 +44,9 @@ def configs(
     endpoints = (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
     inverters = inverters_of(scenario, feeder)
+    netem = netem_of(scenario, case)
+    links = "" if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_text()
+    rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
     control = Control(
         secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains, handling=rule.handling
     )
@@ -58,12 +64,13 @@ def configs(
             spares=tuple(row.name for row in inverters if row.spare),
         ),
         agents=tuple(row.name for row in feeder.inverters),
-        moves=moves_of(scenario),
+        moves=(*moves_of(scenario), *(() if real_nodes else deaths_of(netem))),
         T_c=time.T_c_s,
         end=time.end_s,
         record_step=time.record_s,
         deadline=scenario.processes.deadline_s,
         listen=endpoints,
+        links=links,
     )
     agents = tuple(
         AgentConfig(
@@ -80,6 +87,8 @@ def configs(
             control=control,
             deadline=scenario.processes.deadline_s,
             connect=endpoints,
+            links=links,
+            clock_rate=rates.get(row.name, 1.0),
         )
         for row in inverters
     )

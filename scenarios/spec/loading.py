@@ -16,6 +16,7 @@ from scenarios.spec.checks import check_cases, check_names, check_switches, chec
 from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
+from scenarios.spec.netem import check_netem, with_delays
 from scenarios.spec.reading import read_tables
 
 ReadFeeder = Callable[[str, str], Feeder]
@@ -114,12 +115,13 @@ def check_tables(
         scenario = msgspec.structs.replace(scenario, name=path.stem)
     check_times(scenario, mistakes)
     check_names(scenario, mistakes)
-    scenario = _with_feeder_path(scenario, path.parent)
+    scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
     if feeder:
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
+        check_netem(scenario, feeder, mistakes)
     return scenario, feeder
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import msgspec
 
 from agents.config import Gains, GraphRule, Handling
+from netem.spec.netem import Netem
 from plant.config import GflParameters, GfmParameters
 
 
@@ -76,6 +77,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
     handling: Handling = Handling()
     """Table `[case.NAME.handling]`: of this case only; what it leaves out comes from `[handling]`."""
+    netem: Netem = Netem()
+    """Entries `[[case.NAME.link]]`, `[[case.NAME.partition]]`, `[[case.NAME.node]]`: of this case only."""
 
 
 class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -97,7 +100,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     paper: Literal["", "islanding", "plug-n-play"] = ""
     """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
     seed: int = 1
-    """Seed of everything drawn at random. Links without faults draw nothing, so here it is only recorded."""
+    """Seed of everything drawn at random: the fates of messages on links with faults."""
     time: Time
     """Table `[time]`."""
     plant: PlantTable = PlantTable()
@@ -110,6 +113,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Table `[processes]`."""
     events: tuple[Event, ...] = msgspec.field(default=(), name="event")
     """Entries `[[event]]`, in the order of time."""
+    netem: Netem = Netem()
+    """Entries `[[link]]`, `[[partition]]`, `[[node]]`: what links and agents suffer, in every case."""
     cases: dict[str, Case] = msgspec.field(name="case")
     """Tables `[case.NAME]`, at least one."""
 

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from netem.spec.netem import Netem
+from netem.spec.reading import ENTRIES, read_netem
 from scenarios.spec.mistakes import Mistakes, suggestion
 from scenarios.spec.model import Case, Scenario, key_of
 from scenarios.spec.ranges import number_in, objection, range_of
@@ -45,16 +47,21 @@ def read_struct(cls: type[T], data: Mapping[str, Any], mistakes: Mistakes) -> T:
 
 def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[str, Any]) -> Any:
     """One table; `bases` holds, by key, what a table below starts from instead of the defaults of its type."""
-    fields = {key_of(cls, field): field for field in msgspec.structs.fields(cls)}
+    fields = {key_of(cls, field): field for field in msgspec.structs.fields(cls) if field.type is not Netem}
     if not isinstance(data, Mapping):
         mistakes.add(path, f"must be a table with the keys {', '.join(fields)}, got {_shown(data)}")
         data = {}
     base = bases.get(path.rpartition(".")[2])
     base = base if isinstance(base, cls) else None  # not for a case that is named like the table
     values: dict[str, Any] = {}
+    entries = ENTRIES if cls in (Scenario, Case) else {}
+    if entries:
+        values["netem"], wrong = read_netem({key: data[key] for key in entries if key in data}, seed=0)
+        for mistake in wrong:
+            mistakes.add(_join(path, mistake.path), mistake.text)
     for key in data:
-        if key not in fields:
-            mistakes.add(_join(path, key), _unknown_key(key, cls, list(fields)))
+        if key not in fields and key not in entries:
+            mistakes.add(_join(path, key), _unknown_key(key, cls, [*fields, *entries]))
     for key, field in fields.items():
         below = _join(path, key)
         if cls is Scenario and field.name == "cases":

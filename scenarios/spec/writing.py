@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from netem.spec.netem import Netem
 from scenarios.spec.model import Case, Scenario, key_of
 from scenarios.spec.reading import AS_RUN, FOR_EVERY_CASE
 
@@ -43,6 +44,12 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
         where = f"{path}.{_key(key)}" if path else _key(key)
         if isinstance(struct, Case) and field.name in FOR_EVERY_CASE and value == getattr(common, field.name):
             continue
+        if isinstance(value, Netem):
+            for entries, items in msgspec.to_builtins(value).items():
+                for item in items if isinstance(items, tuple | list) else ():
+                    below += ["", f"[[{path}.{entries}]]" if path else f"[[{entries}]]"]
+                    below += [f"{_key(name)} = {_inline(given)}" for name, given in item.items()]
+            continue
         if isinstance(value, msgspec.Struct):
             below += ["", f"[{where}]", *_table(value, where, common)]
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
@@ -59,6 +66,15 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
 def _key(name: str) -> str:
     bare = name.replace("_", "").replace("-", "")
     return name if bare.isascii() and bare.isalnum() else _value(name)
+
+
+def _inline(value: Any) -> str:
+    """Write a value that may be a table or a list of them on one line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(below)}" for key, below in value.items()) + " }"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return _value(value)
 
 
 def _value(value: Any) -> str:

@@ -1,0 +1,109 @@
+"""The emulated links in front of one core: netem's receiver, and what befalls the processes at both ends."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from netem.receiver import Arrival, Receiver
+from netem.spec.change import Heal
+from netem.spec.fault import Fault
+from netem.spec.node import NodeFault
+from netem.spec.pattern import parse
+from scenarios.emulation.orders import Order
+from scenarios.emulation.report import parts
+from scenarios.emulation.setup import Setup
+
+
+class _Spell(NamedTuple):
+    """A time in which an agent does not work, or works slowly (s of run time)."""
+
+    since: float
+    until: float
+    slow: float
+    """By how much longer it computes (s); infinite while it is paused."""
+
+
+class EmulatedLinks:
+    """All links into one receiver; `wire.links.Links` says what the core wants of it.
+
+    Parameters
+    ----------
+    name : str
+        The receiver: an inverter, or the plant.
+    setup : Setup
+        The run's faults.
+    """
+
+    def __init__(self, name: str, setup: Setup) -> None:
+        self._name, self._microgrids = name, setup.microgrids
+        self._receiver = Receiver(name, setup.netem, setup.microgrids, keep_trace=setup.keep_trace)
+        self._spells: dict[str, list[_Spell]] = {}
+        self._paused: Counter[str] = Counter()
+        """Messages of each sender that it never sent, as it was paused: only the lock-step needed them."""
+        for node in setup.netem.nodes:
+            if node.slow_s or (node.pause and not setup.real_nodes):
+                self._spells.setdefault(node.name, []).append(_spell(node))
+
+    def touched(self, src: str) -> bool:
+        """Whether anything might ever happen to messages from there."""
+        return bool(self._spells and (src in self._spells or self._name in self._spells)) or self._receiver.touched(src)
+
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+        """Take a message off the wire; see `netem.receiver.Receiver.offer`."""
+        for spell in self._spells.get(src, ()):
+            if spell.since <= t < spell.until:
+                if math.isinf(spell.slow):
+                    self._paused[src] += 1
+                    return
+                at += spell.slow
+        for spell in self._spells.get(self._name, ()):
+            if spell.since <= t < spell.until and math.isinf(spell.slow):
+                at += spell.until - t
+        self._receiver.offer(src, seq, t, at, payload)
+
+    def due(self, now: float) -> Sequence[Arrival]:
+        """Take out what has arrived by now (s of run time)."""
+        return self._receiver.due(now)
+
+    def stalled(self, t: float) -> bool:
+        """Whether the receiver itself is paused at t (s of run time)."""
+        spells = self._spells.get(self._name, ())
+        return any(spell.since <= t < spell.until and math.isinf(spell.slow) for spell in spells)
+
+    def order(self, text: str, t: float) -> str:
+        """Do what a person ordered, from t on (s of run time); who is concerned, or nothing.
+
+        Raises
+        ------
+        ValueError
+            If it is no order.
+        """
+        change = Order.of_text(text).change
+        links = [src for src in (*self._microgrids, "plant") if src != self._name and self._concerns(change, src)]
+        if not links:
+            return ""
+        if isinstance(change, Fault):
+            self._receiver.change(change, t)
+        else:
+            self._receiver.heal(change.on, t, change.kinds)
+        return f"{', '.join(links)} -> {self._name}"
+
+    def _concerns(self, change: Fault | Heal, src: str) -> bool:
+        return parse(change.on).matches(src, self._name, self._microgrids)
+
+    def report(self) -> tuple[bytes, ...]:
+        """Take out what the links did since last asked, as parts of a `LinkBook`."""
+        receiver = self._receiver
+        return parts(receiver.take_trace(), receiver.counts(), receiver.trace_sha256)
+
+
+def _spell(node: NodeFault) -> _Spell:
+    return _Spell(node.from_s, math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s)
+
+
+def links_of(name: str, text: str) -> EmulatedLinks | None:
+    """The links of a process, as its configuration says; None if it says nothing of any."""
+    return EmulatedLinks(name, Setup.of_text(text)) if text else None

@@ -1,0 +1,47 @@
+"""What the links into one receiver did, as it travels to the record."""
+
+from __future__ import annotations
+
+import msgspec
+
+from netem.ledger import LinkCounts, LinkTrace
+
+
+class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A part of a receiver's book."""
+
+    traces: tuple[LinkTrace, ...] = ()
+    """Verdicts since the last part."""
+    counts: dict[str, LinkCounts] = {}
+    """Of each sender how its messages have fared so far."""
+    sha256: str = ""
+    """Hash (hex) of all verdicts so far."""
+
+
+encode_book = msgspec.msgpack.Encoder().encode
+"""Bytes of a book."""
+
+decode_book = msgspec.msgpack.Decoder(LinkBook).decode
+"""Book of the bytes; msgspec.DecodeError if it is none."""
+
+AT_ONCE = 1000
+"""Verdicts in one part: some 25 bytes each, so that a part is far below what a message may have."""
+
+
+def parts(traces: tuple[LinkTrace, ...], counts: dict[str, LinkCounts], sha256: str) -> tuple[bytes, ...]:
+    """Cut a book into parts, none of them too long; the counts and the hash stand in the last one."""
+    pieces = [
+        LinkTrace(
+            trace.src, trace.dst, trace.seq[i : i + AT_ONCE], trace.t[i : i + AT_ONCE], trace.outcome[i : i + AT_ONCE]
+        )
+        for trace in traces
+        for i in range(0, len(trace.seq), AT_ONCE)
+    ]
+    batches: list[list[LinkTrace]] = [[]]
+    for piece in pieces:
+        if sum(len(other.seq) for other in batches[-1]) + len(piece.seq) > AT_ONCE:
+            batches.append([])
+        batches[-1].append(piece)
+    *first, last = (tuple(batch) for batch in batches)
+    books = [LinkBook(traces=batch) for batch in first]
+    return tuple(map(encode_book, [*books, LinkBook(traces=last, counts=counts, sha256=sha256)]))
