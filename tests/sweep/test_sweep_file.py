@@ -30,6 +30,15 @@ def test_every_sweep_of_the_catalogue_can_be_run(name: str) -> None:
     assert plan.name == name
 
 
+def test_the_example_of_the_manual_is_a_sweep(sweep_file: Write) -> None:
+    """docs/sweeps.md shows every table in one file: 2 x 2 x 2 x 4 samples on 3 graphs with 2 seeds."""
+    manual = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+
+    plan = read_sweep(sweep_file(manual.partition("## The file\n```\n")[2].partition("```")[0]))
+
+    assert len(plan.runs) == 2 * 2 * 2 * 4 * 3 * 2
+
+
 def test_the_topology_sweep_has_ten_graphs_for_each_number_of_links() -> None:
     """The paper's figure, from 8 links to 36; with 36 there is but one graph."""
     plan = read_sweep("topology")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -96,6 +97,8 @@ def _numbered(step: str | int | None) -> bool:
     return isinstance(step, int)
 
 
-def _named_tables() -> set[str]:
+@cache
+def _named_tables() -> frozenset[str]:
     """Keys of the scenario below which the user names the tables himself; a new name there is a slip."""
-    return {field.encode_name for field in msgspec.structs.fields(Scenario) if typing.get_origin(field.type) is dict}
+    fields = msgspec.structs.fields(Scenario)
+    return frozenset(field.encode_name for field in fields if typing.get_origin(field.type) is dict)
