@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal, TextIO
 
 import msgspec
@@ -26,6 +27,7 @@ from scenarios.drivers.ports import endpoint
 from scenarios.results import claims, metrics
 from scenarios.results.folder import set_status, shown, write_whole
 from scenarios.results.history import History, Plates
+from scenarios.results.links import LinkRecord
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.plug_claims import PLUG_CLAIMS
 from scenarios.results.record import Recorded, Recorder, RecordError
@@ -33,6 +35,7 @@ from scenarios.results.report import Report, plain
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
+from scenarios.spec.netem import netem_of, setup_of
 from scenarios.spec.writing import to_toml
 from wire.messages import Pacing, Telemetry
 
@@ -106,10 +109,13 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     scenario, folder = request.scenario, request.folder
     write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
     recorded, notes = {}, []
+    links_sha256: dict[str, str] = {}
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
-        recorded[case], outcome = _run_case(request, case, progress)
-        notes += [f"case {case}: {note}" for note in outcome.notes]
+        links = LinkRecord()
+        recorded[case], outcome = _run_case(request, case, progress, links)
+        notes += [f"case {case}: {note}" for note in (*outcome.notes, *_checked_links(request, case, links))]
+        links_sha256 |= {case: links.sha256} if links.counts else {}
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
@@ -133,7 +139,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         for case, history in histories.items()
     }
     sha256 = {case: record.sha256 for case, record in recorded.items()}
-    write_whole(folder / "metrics.json", metrics_json(request, results, sha256, pacing))
+    write_whole(folder / "metrics.json", metrics_json(request, results, sha256, pacing, links_sha256))
     titles = {case: rule.title for case, rule in scenario.cases.items()}
     _draw(histories, titles, plates, events, folder / "plots", moves=any(e.leave or e.join for e in scenario.events))
     report = Report(
@@ -150,13 +156,19 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
 
 
 def metrics_json(
-    request: Request, results: claims.Results, sha256: Mapping[str, str], pacing: Mapping[str, Pacing]
+    request: Request,
+    results: claims.Results,
+    sha256: Mapping[str, str],
+    pacing: Mapping[str, Pacing],
+    links_sha256: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time."""
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
         cases[case]["history_sha256"] = sha256[case]
+        if case in links_sha256:
+            cases[case]["links_sha256"] = links_sha256[case]
         if case in pacing:
             cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
     scenario = request.scenario
@@ -170,11 +182,27 @@ def _numbers(steady: dict[str, Any]) -> dict[str, float | None]:
     return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
 
 
-def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded, Outcome]:
+def _checked_links(request: Request, case: str, record: LinkRecord) -> list[str]:
+    """Write what emulated links did beside the history; what a reader must know of it."""
+    if not record.counts:
+        return []
+    from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
+
+    netem = netem_of(request.scenario, case)
+    setup = setup_of(netem, request.scenario, request.feeder, real_nodes=request.clock == "wall")
+    check = LinkCheck(record, setup.netem, setup.microgrids)
+    record.write(request.folder / case / "links.csv")
+    write_whole(request.folder / case / "links.json", check.to_json())
+    return list(check.lines())
+
+
+def _run_case(request: Request, case: str, progress: Progress, links: LinkRecord) -> tuple[Recorded, Outcome]:
     """Run one case by the driver asked for, and record it."""
     time = request.scenario.time
     listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
-    plant, agents = _timed(request, *configs(request.scenario, request.feeder, case, listen))
+    plant, agents = _timed(
+        request, *configs(request.scenario, request.feeder, case, listen, real_nodes=request.clock == "wall")
+    )
     with Recorder(request.folder / case) as recorder:
 
         def note(telemetry: Telemetry) -> None:
@@ -186,11 +214,11 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             if request.driver == "inprocess":
                 from scenarios.drivers.inprocess import run_inprocess
 
-                outcome = run_inprocess(plant, agents, note)
+                outcome = run_inprocess(plant, agents, note, on_links=links)
             else:
                 from scenarios.drivers.fleet import run_processes
 
-                outcome = run_processes(plant, agents, request.folder / "log" / case, note)
+                outcome = run_processes(plant, agents, request.folder / "log" / case, note, on_links=links)
             if outcome.broke:
                 raise BrokenRunError(f"case {case}: {outcome.broke}")
             return recorder.finish(time.end_s, time.record_s), outcome

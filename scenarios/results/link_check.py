@@ -1,0 +1,83 @@
+"""Whether emulated links did what they were told: configured beside realised, in links.json and in the report."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from netem.check.rows import Row
+from netem.check.verify import verify
+from netem.spec.fault import Span
+from netem.spec.netem import Netem
+from netem.spec.pattern import Link
+from scenarios.results.links import LinkRecord
+from wire.messages import PLANT
+
+
+class LinkCheck:
+    """The self-check of one case.
+
+    Parameters
+    ----------
+    record : LinkRecord
+        What the links did.
+    netem : Netem
+        What they were told; partitions by island resolved.
+    microgrids : Mapping[str, str]
+        Microgrid of every inverter that may take part.
+    """
+
+    def __init__(self, record: LinkRecord, netem: Netem, microgrids: Mapping[str, str]) -> None:
+        self._record = record
+        spans = _spans(record, netem, microgrids)
+        counts = {Link(*link): counts for link, counts in record.counts.items()}
+        found = verify(record.traces, spans, netem.seed, counts)
+        self.rows: tuple[Row, ...] = found.rows
+        self.warnings: tuple[str, ...] = found.warnings
+        """What chance does not explain, and accounts that do not close."""
+
+    def to_json(self) -> str:
+        """Text of links.json: the hash of all verdicts, the accounts of every link, every test."""
+        counts = [
+            {
+                "src": src,
+                "dst": dst,
+                "sent": book.sent,
+                "duplicated": book.duplicated,
+                "delivered": book.delivered,
+                "dropped": book.dropped,
+                "corrupted": book.corrupted,
+                "in_flight": book.in_flight,
+            }
+            for (src, dst), book in sorted(self._record.counts.items())
+        ]
+        tests = [row._asdict() for row in self.rows]
+        whole = {"trace_sha256": self._record.sha256, "accounts": counts, "tests": tests}
+        return json.dumps(whole, indent=1, default=str) + "\n"
+
+    def lines(self) -> Iterable[str]:
+        """Sentences for the report."""
+        books = self._record.counts.values()
+        sent = sum(book.sent for book in books)
+        dropped: Counter[str] = Counter()
+        for book in books:
+            dropped.update(book.dropped)
+        of = ", ".join(f"{reason} {_share(count, sent)}" for reason, count in dropped.most_common()) or "none"
+        tested = [row for row in self.rows if row.ok is not None]
+        yield (
+            f"emulated links: {sent} messages over {len(books)} links, dropped: {of}; self-check: {len(tested)} tests, "
+            f"{'none' if not self.warnings else len(self.warnings)} failed (links.json, links.csv)"
+        )
+        yield from (f"WARNING: {warning}" for warning in self.warnings)
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{100.0 * part / whole:.2f} %" if whole else "0 %"
+
+
+def _spans(record: LinkRecord, netem: Netem, microgrids: Mapping[str, str]) -> dict[Link, tuple[Span, ...]]:
+    """What each link was told over which anything was sent."""
+    names = (*microgrids, PLANT)
+    links = [Link(src, dst) for src in names for dst in names if (src, dst) in record.counts]
+    return {link: spans for link in links if (spans := netem.spans(link, microgrids))}
