@@ -210,7 +210,7 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
     """The reason stands on the screen and in the folder; no history bears its name."""
     import scenarios.drivers.inprocess
 
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no such luck")
 
     monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", broken)
@@ -231,7 +231,7 @@ def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytes
     """Ctrl-C ends with one line, and the folder tells it."""
     import scenarios.drivers.inprocess
 
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", interrupted)
