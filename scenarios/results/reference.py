@@ -8,6 +8,10 @@ from collections.abc import Iterable, Iterator
 import msgspec
 
 from agents.config import Gains, Handling
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from netem.spec.node import NodeFault
+from netem.spec.partition import Partition
 from plant.config import GflParameters, GfmParameters
 from scenarios.field_docs import FieldDoc, class_doc, field_docs
 from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
@@ -28,6 +32,9 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[processes]", Processes),
     ("[[event]]", Event),
     ("[case.NAME]", Case),
+    ("[[link]], [[case.NAME.link]]", Fault),
+    ("[[partition]], [[case.NAME.partition]]", Partition),
+    ("[[node]], [[case.NAME.node]]", NodeFault),
 )
 
 
@@ -102,7 +109,11 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
 
 def _is_table(cls: type, key: str) -> bool:
     """Whether a field is a table of its own, which has a section of its own."""
+    if cls in (Fault, NodeFault):  # their models are written on one line; docs/netem.md has them
+        return False
     kind = next(field.type for field in msgspec.structs.fields(cls) if field.encode_name == key)
+    if kind is Netem:
+        return True
     inner = [kind, *typing.get_args(kind)]
     return cls is not Case and any(isinstance(part, type) and issubclass(part, msgspec.Struct) for part in inner)
 
@@ -112,6 +123,8 @@ def _default(doc: FieldDoc) -> str:
         return "required"
     if doc.default.startswith(("Gains(", "Handling(")):
         return f"`[{doc.name}]`"
+    if doc.default == "None":
+        return "none"
     shown = doc.default.replace("'", '"').replace("()", "[]")
     return f"`{ {'True': 'true', 'False': 'false'}.get(shown, shown) }`"
 
