@@ -40,6 +40,10 @@ STATUS_PERIOD = 0.5
 SILENT = 1.0
 """Time (s, wall) without a message of the plant, or of a neighbour whom it hears, after which that one is silent."""
 
+LEAVING = 1.0
+"""Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
+take what was sent last with it."""
+
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
 
@@ -74,6 +78,10 @@ class FreeAgent(Side):
         self._lateness = 0.0
         self._ran = False
         self._patience, self._began = PATIENCE / 2.0, 0.0
+        self._leaving = ""
+        """Why it leaves, once the plant has been told."""
+        self._left = 0
+        """Periods since then."""
         self._forget_everybody()
 
     def _forget_everybody(self) -> None:
@@ -140,6 +148,11 @@ class FreeAgent(Side):
         if late < 0.0 or self.over:
             return
         skipped = self._timer.take(now)
+        if self._leaving:
+            self._left += 1
+            if self._left * self._timer.period >= LEAVING or not self._plant_there:
+                self.stopped = self._leaving
+            return
         if self._give_up is not None and not self.plant_seen and now >= self._give_up:
             self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
             return
@@ -191,10 +204,14 @@ class FreeAgent(Side):
         self._say(f"{why}; opens a new session")
 
     def leave(self, reason: str) -> None:
-        """Leave properly: have the own inverter taken off the network, then close."""
-        if not self.over:
-            self._report_links(final=True)
-            self._leave()
+        """Leave properly: have the own inverter taken off the network, and close once the plant says that it is."""
+        if self.over or self._leaving:
+            return
+        self._report_links(final=True)
+        self._leave()
+        if self._plant_there:
+            self._leaving = reason
+        else:
             self.stopped = reason
 
     def _leave(self) -> None:
@@ -282,6 +299,8 @@ class FreeAgent(Side):
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
         if message.refused:
             self.failed = message.reason
+        elif self._leaving:
+            self.stopped = self._leaving
         else:
             self.leave(message.reason)
 

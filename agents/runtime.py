@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from agents.config import AgentConfig
 from agents.freerun import FreeAgent
 from agents.lockstep import AgentSide
-from wire.drive import StoppedError, drive, perform
+from wire.drive import StoppedError, drive, serve
 from wire.keys import check_name
 from wire.process import ConfigurationError, MakeLinks, no_links
 from wire.session import Session
@@ -82,5 +82,5 @@ def _take_part(side: FreeAgent | AgentSide, session: Session, log: logging.Logge
     except (StoppedError, KeyboardInterrupt) as stop:
         if isinstance(side, FreeAgent):
             side.leave(f"asked to leave: {stop}")
-            perform(side.take_actions(), session, log)
+            serve(side, session, log)  # until the plant knows
         raise

@@ -204,7 +204,7 @@ class FreePlant(Side):
                 if not self._is_offered(message, payload, now * self.config.speed):
                     self._states[name] = message
             elif key in self._report_keys and isinstance(message, LinkReport):
-                self._forward(message, payload)
+                self._publish(self.keys.telemetry, payload)
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
                 self._on_leave(name, now)
@@ -227,6 +227,7 @@ class FreePlant(Side):
         self._gather(now)
 
     def _on_leave(self, name: str, now: float) -> None:
+        self.stop(self.keys.dismissal(name, self.instances[name]), f"{name} has left")
         self._drop(name)
         if self.phase in ("gathering", "running"):
             self._connect(name, False, now)

@@ -98,9 +98,20 @@ def perform(actions: Sequence[Action | Say], session: Session, log: logging.Logg
 
 
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
-    """Serve a core until it is over.
+    """Declare what a core needs and serve it until it is over; the rest as of `serve`.
 
     The token comes last of all that is declared: who sees it may count on the rest.
+    """
+    for key in core.subscriptions:
+        session.subscribe(key)
+    session.watch(core.watched)
+    session.hold_token(core.token)
+    core.start(monotonic())
+    serve(core, session, log)
+
+
+def serve(core: Core, session: Session, log: logging.Logger) -> None:
+    """Serve a core that has begun until it is over.
 
     Parameters
     ----------
@@ -116,13 +127,8 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
     StoppedError
         If a word to stop comes into the inbox.
     """
-    for key in core.subscriptions:
-        session.subscribe(key)
-    session.watch(core.watched)
-    session.hold_token(core.token)
     take = session.inbox.take
     now = monotonic()
-    core.start(now)
     while True:
         perform(core.take_actions(), session, log)
         if core.over:

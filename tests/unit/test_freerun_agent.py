@@ -297,7 +297,7 @@ def test_woken_late_it_drops_what_it_knew() -> None:
 
 
 def test_it_leaves_properly() -> None:
-    """Leave goes out before it closes; so when the plant stops it, but not when it was refused."""
+    """Leave goes out, of itself or at the plant's word; it closes when the plant answers; refused, it just closes."""
     asked, stopped, refused = running(), running(), Lab()
     asked.side.leave("asked to leave: SIGTERM")
     asked.do()
@@ -305,11 +305,31 @@ def test_it_leaves_properly() -> None:
     stopped.hear(KEYS.dismissal("inv1", "me"), stop)
     refused.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1: another agent", refused=True))
 
-    assert [lab.side.over for lab in (asked, stopped, refused)] == [True] * 3
+    assert [lab.side.over for lab in (asked, stopped, refused)] == [False, False, True]
+    for lab in (asked, stopped):
+        lab.go(T_C)
+        assert lab.decided()[1:] == []
+        lab.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1 has left"))
+
+    assert asked.side.over
+    assert stopped.side.over
     assert [lab.side.stopped for lab in (asked, stopped)] == ["asked to leave: SIGTERM", stop.reason]
     assert refused.side.failed == "inv1: another agent"
     leaves = [[m for m in lab.published if isinstance(m, Leave)] for lab in (asked, stopped, refused)]
     assert [len(leave) for leave in leaves] == [1, 1, 0]
+
+
+def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
+    """A plant that is frozen keeps nobody; where there is none, nothing is waited for."""
+    frozen, alone = running(), Lab()
+    frozen.side.leave("asked to leave: SIGTERM")
+    alone.side.leave("asked to leave: SIGTERM")
+    assert alone.side.over
+    for _ in range(50):
+        assert not frozen.side.over
+        frozen.go(T_C)
+
+    assert frozen.side.stopped == "asked to leave: SIGTERM"
 
 
 def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
