@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from agents.config import Gains
+from agents.config import Gains, Handling
+from agents.handling import gains_in_force
 from agents.law import P_set_step, V_set_step, towards
 
 Matrix = NDArray[np.float64]
@@ -53,40 +54,45 @@ def fleets(draw: st.DrawFn, spread: float = 10.0) -> tuple[Matrix, NDArray[np.bo
     return A, leader, rating
 
 
-def step_all(y: Matrix, A: Matrix, leader: NDArray[np.bool_], e: Matrix, T: float, gains: Gains = UNBOUNDED) -> Matrix:
-    """One period of the law for everybody, through the law itself; y = m_p P_set."""
+def step_all(
+    y: Matrix, A: Matrix, leader: NDArray[np.bool_], e: Matrix, T: float, *, kappa_c: float | None = None
+) -> Matrix:
+    """One period of the law for everybody, through the law itself; y = m_p P_set. With kappa_c degree-normalised."""
     d = A.sum(axis=1)
     y_bar = A @ y / np.maximum(d, 1.0)
+    sums = d if kappa_c is None else np.ones(len(y))
     stepped = [
-        P_set_step(y[i] / M_P, y_bar[i], d[i], e[i], leader=bool(leader[i]), m_p=M_P, gains=gains, T=T)
+        P_set_step(
+            y[i] / M_P, y_bar[i], sums[i], e[i], leader=bool(leader[i]), m_p=M_P, gains=UNBOUNDED, T=T, kappa_c=kappa_c
+        )
         for i in range(len(y))
     ]
     return M_P * np.array(stepped)
 
 
-def as_matrix(A: Matrix, leader: NDArray[np.bool_], w: Matrix, T: float) -> Matrix:
+def as_matrix(A: Matrix, leader: NDArray[np.bool_], w: Matrix, T: float, *, kappa_c: float | None = None) -> Matrix:
     """The map y -> y of one period, found by stepping the unit vectors, with the plant e = w y."""
     unit = np.eye(len(A))
-    return np.array([step_all(y, A, leader, np.full(len(A), w @ y), T) for y in unit]).T
+    return np.array([step_all(y, A, leader, np.full(len(A), w @ y), T, kappa_c=kappa_c) for y in unit]).T
 
 
-@settings(deadline=None, max_examples=150)
-@given(fleets(), PERIODS)
+@settings(deadline=None, max_examples=250)
+@given(fleets(), PERIODS, st.none() | st.floats(0.0, 3.0).map(lambda x: 10.0**x))
 def test_frequency_and_sharing_are_stable_at_any_period_on_any_connected_graph(
-    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float
+    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float, kappa_c: float | None
 ) -> None:
-    """With one leader or more every mode of P_set decays, for 1 ms <= T <= 10 s, up to 30 agents."""
+    """With one leader or more every mode of P_set decays, for 1 ms <= T <= 10 s, up to 30 agents, whatever the weights."""
     A, leader, rating = fleet
 
-    M = as_matrix(A, leader, rating / rating.sum(), T)
+    M = as_matrix(A, leader, rating / rating.sum(), T, kappa_c=kappa_c)
 
     assert np.abs(np.linalg.eigvals(M)).max() < 1.0
 
 
 @settings(deadline=None, max_examples=150)
-@given(fleets(spread=3.0), PERIODS, st.integers(0, 2**32 - 1))
+@given(fleets(spread=3.0), PERIODS, st.integers(0, 2**32 - 1), st.none() | st.floats(0.5, 30.0))
 def test_voltage_and_vars_are_stable_at_any_period_on_any_connected_graph(
-    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float, seed: int
+    fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float, seed: int, beta_c: float | None
 ) -> None:
     """With the plant v = H V_set, z = (1 - H) V_set of a random network every mode of V_set decays."""
     A, leader, rating = fleet
@@ -99,13 +105,17 @@ def test_voltage_and_vars_are_stable_at_any_period_on_any_connected_graph(
     K = X @ np.diag(rating) / 0.05
     H = np.linalg.solve(np.eye(n) + K, K)
     d = A.sum(axis=1)
+    paper = beta_c is None
+    gains = (
+        UNBOUNDED if beta_c is None else gains_in_force(UNBOUNDED, Handling(weights="degree-normalised", beta_c=beta_c))
+    )
 
     def step(V_set: Matrix) -> Matrix:
         v, z = 1.0 + H @ V_set, (np.eye(n) - H) @ V_set
-        z_bar = A @ z / d
+        z_bar, sums = A @ z / d, d if paper else np.ones(n)
         return np.array(
             [
-                V_set_step(V_set[i], z[i], z_bar[i], d[i], v[i], leader=bool(leader[i]), gains=UNBOUNDED, T=T)
+                V_set_step(V_set[i], z[i], z_bar[i], sums[i], v[i], leader=bool(leader[i]), gains=gains, T=T)
                 for i in range(n)
             ]
         )

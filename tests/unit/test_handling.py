@@ -1,0 +1,247 @@
+"""Each named way with bad links and saturation, against a tick worked out by hand."""
+
+from __future__ import annotations
+
+from math import exp
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.config import Control, Gains, Handling
+from agents.freerun import FreeAgent
+from agents.handling import Follows, Worth, gains_in_force
+from scenarios.spec import load_scenario
+from scenarios.sweep.one import run_one
+from tests.toy.toy_configs import agent_config
+from wire.actions import Publish
+from wire.codec import decode, encode
+from wire.messages import Measurement, State
+
+T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0
+KAPPA, K_Q = M_P / Gains().k_p, Gains().k_q
+ROSTER = ("inv1", "inv2", "inv3")
+
+
+def agent(name: str = "inv1", **handling: Any) -> Agent:
+    """An agent of the toy that knows the two others; inv1 is a leader."""
+    control = Control(secondary="all", graph="full", handling=Handling(**handling))
+    made = Agent(agent_config(name, control))
+    for other in ROSTER:
+        made.meet(Agent(agent_config(other)).nameplate)
+    return made
+
+
+def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
+    """What a neighbour decided at tick k."""
+    return State(sender=sender, incarnation=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
+
+
+def measured(k: int, **changes: Any) -> Measurement:
+    """What is measured in an island at nominal frequency and voltage, on the droop characteristic."""
+    values: dict[str, Any] = dict(
+        sender="plant", incarnation=1, seq=k, t=T * k, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
+        V_set=277.0, grid_connected=False, island="", roster=ROSTER,
+    )  # fmt: skip
+    return Measurement(**values | changes)
+
+
+def moved(P_set: float, P_bar: float, rate: float) -> float:
+    """P_set (pu) a tick later, at nominal frequency, where `rate` (1/s) is gain times the sum of weights."""
+    return P_set + 0.5 * (1.0 - exp(-2.0 * rate * T)) * (P_bar - P_set)
+
+
+def test_a_neighbour_that_sent_nothing_new_is_skipped() -> None:
+    """With "skip" a state counts at one tick; with "hold" at all that follow."""
+    skips, holds = agent(stale="skip"), agent()
+    for it in (skips, holds):
+        it.hear(state("inv2", 0, P_set=80e3))
+        it.hear(state("inv3", 0, P_set=60e3))
+    first = moved(0.5, 0.7, 2 * KAPPA)
+    assert [it.tick(measured(1), ROSTER[1:]).P_set / 1e5 for it in (skips, holds)] == pytest.approx([first, first])
+    for it in (skips, holds):
+        it.hear(state("inv3", 1, P_set=60e3))
+
+    assert skips.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(first, 0.6, KAPPA), rel=1e-12)
+    assert holds.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(first, 0.7, 2 * KAPPA), rel=1e-12)
+
+
+def test_what_came_while_on_hold_is_not_new_afterwards() -> None:
+    """A tick without the law uses up what has arrived, too."""
+    it = agent(stale="skip")
+    it.hear(state("inv2", 0))
+    it.tick(measured(1, grid_connected=True), ROSTER[1:])
+
+    assert it.tick(measured(2), ROSTER[1:]).P_set == pytest.approx(50e3)
+
+
+def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
+    """With "age-weighted" a link that is always 0.1 s late counts in full; one that falls silent fades with T_age."""
+    it = agent(stale="age-weighted", T_age=0.1)
+    P = 0.5
+    for k in range(5, 8):
+        it.hear(state("inv2", k - 5, P_set=80e3))
+        it.hear(state("inv3", k - 1, P_set=60e3))
+        P = moved(P, 0.7, 2 * KAPPA)
+        assert it.tick(measured(k), ROSTER[1:]).P_set / 1e5 == pytest.approx(P, rel=1e-12)
+    it.hear(state("inv2", 3, P_set=80e3))
+
+    r = exp(-T / 0.1)
+    P = moved(P, (0.8 + r * 0.6) / (1 + r), (1 + r) * KAPPA)
+    assert it.tick(measured(8), ROSTER[1:]).P_set / 1e5 == pytest.approx(P, rel=1e-12)
+
+
+@given(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.01, 10.0))
+def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float) -> None:
+    """From 1 for what is new down to 0, whatever the ages."""
+    worth = Worth(Handling(stale="age-weighted", T_age=T_age))
+    worth.arrived("inv2")
+    new, later = worth.at_tick({"inv2": age})["inv2"], worth.at_tick({"inv2": age + longer})["inv2"]
+
+    assert new == 1.0
+    assert 0.0 <= later <= 1.0
+    assert later == pytest.approx(exp(-longer / T_age), rel=1e-6, abs=1e-12)
+
+
+def test_a_neighbour_older_than_max_age_is_none() -> None:
+    """Beyond max_age it is left out of the sums and of the degree; by default the last value counts for ever."""
+    for handling, P_bar, rate in (
+        ({}, 0.7, 2 * KAPPA),
+        ({"max_age": 0.1}, 0.6, KAPPA),
+        ({"max_age": 0.1, "weights": "degree-normalised", "kappa_c": 5.0}, 0.6, 5.0),
+    ):
+        it = agent(**handling)
+        it.hear(state("inv2", 94, P_set=80e3))
+        it.hear(state("inv3", 96, P_set=60e3))
+
+        assert it.tick(measured(100), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, P_bar, rate), rel=1e-12)
+
+
+def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
+    """kappa_c for the mean of the neighbours, kappa for the leader's frequency; a skipped neighbour keeps its place."""
+    both = agent(weights="degree-normalised", kappa_c=5.0, beta_c=3.0)
+    half = agent(weights="degree-normalised", kappa_c=5.0, beta_c=3.0, stale="skip")
+    for it in (both, half):
+        it.hear(state("inv2", 0, P_set=80e3, Q=10e3))
+        it.hear(state("inv3", 0, P_set=60e3, Q=30e3))
+    decided = both.tick(measured(1, f=59.94, V=271.46), ROSTER[1:])
+    half.tick(measured(1, P_set=50e3, grid_connected=True), ROSTER[1:])
+    half.hear(state("inv2", 1))
+
+    leader = (1.0 - exp(-KAPPA * T)) * 0.001 / M_P
+    assert decided.P_set / 1e5 == pytest.approx(moved(0.5, 0.7, 5.0) + leader, rel=1e-12)
+    V_set = 1.0 + 0.5 * (1.0 - exp(-2.0 * 3.0 * T / K_Q)) * M_Q * 0.2 + (1.0 - exp(-ALPHA * T / K_Q)) * 0.02
+    assert decided.V_set / 277.0 == pytest.approx(V_set, rel=1e-12)
+    assert half.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, 0.8, 0.5 * 5.0), rel=1e-12)
+
+
+def overloaded(ticks: int, **handling: Any) -> list[float]:
+    """P_set (pu) of a lone leader that gives 0.9 pu and not more, at 59.88 Hz."""
+    it = agent(**handling)
+    P_set, held = [], 90e3
+    for k in range(ticks):
+        held = it.tick(measured(k, P=90e3, f=59.88, P_set=held)).P_set
+        P_set.append(held / 1e5)
+    return P_set
+
+
+def test_without_limits_p_set_winds_up() -> None:
+    """With "none", the paper's Remark 2, P_set grows as long as the frequency is low; "clamp" ends it at P_set_max."""
+    assert overloaded(200, anti_windup="none")[-1] == pytest.approx(0.9 + 200 * (1 - exp(-KAPPA * T)) * 0.2)
+    assert overloaded(200)[-1] == Gains().P_set_max
+
+
+def test_a_saturated_leader_stops_after_t_sat_and_goes_on_as_a_follower() -> None:
+    """With "conditional" it no more integrates the low frequency, but agrees with its neighbours."""
+    wide = replace(agent_config("inv1").control.gains, P_set_max=50.0)
+    control = Control(secondary="all", graph="full", gains=wide, handling=Handling(anti_windup="conditional"))
+    it = Agent(agent_config("inv1", control))
+    it.meet(Agent(agent_config("inv2")).nameplate)
+    P, held = [], 90e3
+    for k in range(60):
+        held = it.tick(measured(k, P=90e3, f=59.88, P_set=held)).P_set
+        P.append(held / 1e5)
+    it.hear(state("inv2", 59, P_set=100e3))
+    agreed = it.tick(measured(60, P=90e3, f=59.88, P_set=held), ("inv2",)).P_set / 1e5
+    down = it.tick(measured(61, P=90e3, f=60.06, P_set=held)).P_set / 1e5
+
+    step = (1 - exp(-KAPPA * T)) * 0.2
+    assert P[-1] == pytest.approx(0.9 + 25 * step)  # T_sat is 25 ticks, and the first tick is off already
+    assert agreed == pytest.approx(moved(P[-1], 1.0, KAPPA))
+    assert down == pytest.approx(agreed - 0.5 * step)
+
+
+def test_vars_that_do_not_follow_stop_v_set_on_that_side_only() -> None:
+    """A GFL at its var limit leaves V_set where it is while that is to rise, and lets it fall at once."""
+    it = agent("inv2", anti_windup="conditional")
+    V, held = [], 277.0
+    for k in range(60):
+        it.hear(state("inv1", k, P_set=50e3, Q=40e3))
+        held = it.tick(measured(k, to="inv2", V=260.0, Q=20e3, V_set=held), ("inv1",)).V_set
+        V.append(held)
+    it.hear(state("inv1", 60, P_set=50e3, Q=0.0))
+    falls = it.tick(measured(60, to="inv2", V=260.0, Q=20e3, V_set=held), ("inv1",)).V_set
+
+    assert V[0] < V[24] == V[-1]
+    assert falls < V[-1]
+
+
+@given(st.floats(0.01, 0.4), st.booleans())
+def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
+    """A first-order lag below T_sat is off its characteristic for seconds, but on the way to it."""
+    follows, sign = Follows(T_sat=0.5), 1 if up else -1
+    does = [sign * (1.0 - exp(-k * T / lag)) for k in range(300)]
+
+    assert {follows.short_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
+    assert [follows.short_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
+
+
+def test_the_default_is_the_papers() -> None:
+    """Without a word all gains and limits are as given, and every state heard counts in full."""
+    worth = Worth(Handling())
+
+    assert gains_in_force(Gains(P_set_max=0.7), Handling()) == Gains(P_set_max=0.7)
+    assert [worth.at_tick({"inv2": age}) for age in (0.02, 1e6)] == [{"inv2": 1.0}] * 2
+
+
+@pytest.mark.parametrize(("max_age", "pulls"), [(0.0, False), (0.5, True)])
+def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
+    """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
+    control = Control(secondary="all", graph="full", handling=Handling(max_age=max_age))
+    side = FreeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
+    keys = side.keys
+    side.start(0.0)
+    side.appeared(keys.alive_plant, 0.0)
+    side.appeared(keys.alive_agent("inv2", "a"), 0.0)
+    side.received(keys.nameplate("inv2", "a"), encode(Agent(agent_config("inv2")).nameplate), 0.0)
+    side.received(keys.state("inv2"), encode(state("inv2", 0)), 0.0)
+    side.received(keys.measurement("inv1"), encode(measured(0)), 0.2)
+    side.expire(0.3)
+
+    published = [action for action in side.take_actions() if isinstance(action, Publish)]
+    decided = [decode(action.payload) for action in published if action.key == keys.state("inv1")]
+    assert [message.P_set > 50e3 for message in decided if isinstance(message, State)] == [pulls]
+
+
+@pytest.mark.parametrize("handling", [
+    Handling(stale="skip"), Handling(stale="age-weighted"), Handling(max_age=0.1), Handling(anti_windup="none"),
+    Handling(anti_windup="conditional"), Handling(weights="degree-normalised"),
+    Handling(weights="degree-normalised", stale="age-weighted", anti_windup="conditional"),
+])  # fmt: skip
+def test_with_good_links_every_way_restores_and_shares(handling: Handling) -> None:
+    """Case IV on the real plant has 60 Hz and equal power within 1.2 s of the islanding, whatever the way."""
+    scenario, _ = load_scenario("islanding")
+    cases = {"IV": replace(scenario.cases["IV"], handling=handling)}
+    short = replace(scenario, cases=cases, events=scenario.events[:1], time=replace(scenario.time, end_s=2.6))
+
+    done = run_one(0, short, "IV")
+
+    restored, MQSI = done.measures["event1.t_restore_s"], done.measures["event1.MQSI"]
+    assert done.why == ""
+    assert restored is not None
+    assert MQSI is not None
+    assert restored < 1.2
+    assert MQSI < 0.1
