@@ -112,6 +112,17 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     action: Literal["open", "close"]
 
 
+class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The power that a grid-following inverter has available from a time of the scenario on, e.g. under clouds."""
+
+    t: float
+    """Time (s), a multiple of h."""
+    inverter: str
+    """Name of a GFL, e.g. "inv2"."""
+    P_max: float
+    """Upper bound of its P reference from then on (W)."""
+
+
 class Move(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An agent that the scenario lets leave, its inverter with it, die, without its inverter, or join."""
 
@@ -139,6 +150,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     gfl: GflParameters = GflParameters()
     events: tuple[SwitchEvent, ...] = ()
     """Switches operated on schedule."""
+    limits: tuple[PowerLimit, ...] = ()
+    """Available power that changes on schedule."""
     spares: tuple[str, ...] = ()
     """Spare inverters that are there, switched off at the start."""
 

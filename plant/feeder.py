@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from plant.config import PlantSettings
+from plant.config import PlantSettings, PowerLimit
 from plant.dynamics import Circuit, Dynamics, Inverter, PlantError
 from plant.loads import LoadBranches
 from plant.network import Network
@@ -118,6 +118,9 @@ class Plant:
         for event in settings.events:
             step = round(event.t / settings.h)
             self._schedule.setdefault(step, []).append((network.switch_name(event.switch), event.action))
+        self._limits: dict[int, list[PowerLimit]] = {}
+        for limit in settings.limits:
+            self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
         self._P_rated = np.array([unit.P_rated for unit in network.inverters])
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
         self._dynamics = Dynamics(
@@ -212,12 +215,14 @@ class Plant:
             If the network has no solution; the plant is then broken and says where and when.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
-        stops = sorted({s for s in self._schedule if first < s < last} | {last})
+        stops = sorted({s for s in (*self._schedule, *self._limits) if first < s < last} | {last})
         step = first
         for stop in stops:
             try:
                 if step in self._schedule:
                     self._operate(step)
+                for limit in self._limits.get(step, ()):
+                    self._limit(limit)
                 out = self._dynamics.run(stop - step)
             except PlantError as error:
                 raise PlantError(f"plant at t = {step * self._h:.3f} s: {error}") from None
@@ -272,6 +277,12 @@ class Plant:
             self._events.append(PlantEvent(t=t, kind="switch", subject=name, text=text))
         self._dynamics.connect(self._circuit(self._closed))
         self._report_islands(t)
+
+    def _limit(self, limit: PowerLimit) -> None:
+        """Change what an inverter has available; it acts from the next step on."""
+        self._dynamics.limit_power(self._row[limit.inverter], limit.P_max)
+        text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
+        self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))
 
     def _report_islands(self, t: float) -> None:
         island, _ = self._islands()

@@ -191,7 +191,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: float
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "inverter", "roster", "warning"]
+    kind: Literal["switch", "island", "dead", "inverter", "limit", "roster", "warning"]
     """What sort of event."""
     subject: str
     """The switch, island or agent concerned."""

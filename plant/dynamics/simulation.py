@@ -219,6 +219,18 @@ class Dynamics:
             self.gfl_state[k]["w_i"] = w
             self.gfl_state[k]["f"] = self.gfl_state[k]["f_m"] = gfl_model.F_NOM + w / (2.0 * np.pi)
 
+    def limit_power(self, i: int, P_max: float) -> None:
+        """Bound a grid-following inverter's P reference (W) from the next step on.
+
+        Raises
+        ------
+        ValueError
+            If the inverter is grid-forming: its power is what the network takes, not what a reference says.
+        """
+        if self.forming[i]:
+            raise ValueError(f"{self.inverters[i].name} is grid-forming; only a GFL has a P reference to bound")
+        self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
+
     def _island_speed(self, i: int) -> float:
         """Speed (rad/s, relative to nominal) of the island that inverter i stands in; 0 with a source or dead."""
         leader = self.reduction.leader[self.reduction.inverter_island[i]]

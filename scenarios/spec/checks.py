@@ -103,11 +103,11 @@ def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> No
     canonical |= {f"{switch.to_bus}-{switch.from_bus}": switch.name for switch in feeder.switches}
     buses = {bus.name for bus in feeder.buses}
     for i, event in enumerate(scenario.events):
-        keys = ("open", "close", "leave", "join")
+        keys = ("open", "close", "leave", "join", "P_max_kW")
         if not any(getattr(event, key) for key in keys) and not mistakes.touch(*(f"event[{i}].{key}" for key in keys)):
             mistakes.add(
                 f"event[{i}]",
-                f'event "{event.label}" operates nothing; give it open, close, leave or join, e.g. open = ["13-152"]',
+                f'event "{event.label}" does nothing; give it {", ".join(keys)}, e.g. open = ["13-152"]',
             )
         named: set[str] = set()
         for action, closed, names in (("open", False, event.open), ("close", True, event.close)):

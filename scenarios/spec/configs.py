@@ -7,6 +7,7 @@ from typing import Literal
 from agents.config import AgentConfig, Control
 from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
+from scenarios.spec.limits import limits_of
 from scenarios.spec.model import Event, Scenario
 from scenarios.spec.moves import inverters_of, moves_of
 from scenarios.spec.netem import deaths_of, is_calm, netem_of, setup_of
@@ -61,6 +62,7 @@ def configs(
             gfm=scenario.plant.gfm,
             gfl=scenario.plant.gfl,
             events=_switch_events(scenario),
+            limits=limits_of(scenario, case),
             spares=tuple(row.name for row in inverters if row.spare),
         ),
         agents=tuple(row.name for row in feeder.inverters),

@@ -13,6 +13,7 @@ import msgspec
 from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, read_feeder
 from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
+from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
@@ -121,6 +122,7 @@ def check_tables(
     if feeder:
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
+        check_limits(scenario, feeder, mistakes)
         check_netem(scenario, feeder, mistakes)
     return scenario, feeder
 

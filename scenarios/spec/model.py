@@ -60,6 +60,9 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Inverters whose agents end, e.g. ["inv2"]; each takes its inverter off the network."""
     join: tuple[str, ...] = ()
     """Inverters whose agents are started: those that have left, and spare ones. Each comes on line at no load."""
+    P_max_kW: dict[str, float] = {}
+    """What grid-following inverters have available from then on (kW), e.g. { inv2 = 275 }; in the beginning it is
+    P_max_pu of `[plant.gfl]`."""
 
 
 class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -73,6 +76,9 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", or "links" as listed."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
+    P_max_kW: dict[str, dict[str, float]] = {}
+    """What inverters have available from an event on (kW), in this case only and in place of what the event says, by
+    the event's label: { clouds = { inv2 = 225 } }."""
     gains: Gains = Gains()
     """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
     handling: Handling = Handling()
@@ -97,7 +103,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Name of the run folder; without it, that of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
-    paper: Literal["", "islanding", "plug-n-play"] = ""
+    paper: Literal["", "islanding", "intermittency", "communication", "switching", "plug-n-play"] = ""
     """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""

@@ -55,11 +55,11 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
             for item in value:
                 below += ["", f"[[{where}]]", *_table(item, where, common)]
-        elif isinstance(value, dict):
+        elif isinstance(value, dict) and any(isinstance(item, msgspec.Struct) for item in value.values()):
             for name, item in value.items():
                 below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", common)]
         elif value or not isinstance(value, tuple | dict):
-            yield f"{key} = {_value(value)}"
+            yield f"{key} = {_inline(value)}"
     yield from below
 
 
