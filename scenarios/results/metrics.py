@@ -173,7 +173,7 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
     f_errors = np.where(forming, np.abs(history.f[:, plates.GFM] - f_nom), 0.0)
     f_error = mean_over(f_errors, forming)
     sharing = MPSI(history, plates)
-    inside = _between(history.t, window)
+    inside = between(history.t, window)
     steady = inside & (history.t >= window.end - STEADY - 1e-9)
     restored = (f_errors < F_BAND).all(axis=1) & forming.any(axis=1) & (sharing < MPSI_BAND)
     total = history.P.sum(axis=1)
@@ -183,21 +183,27 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
         MPSI=float(sharing[steady].mean()),
         V_error=float(V_error(history, plates)[steady].mean()),
         MQSI=float(MQSI(history, plates)[steady].mean()),
-        t_restore_s=_for_good(history.t[inside], restored[inside], window.start),
+        t_restore_s=for_good(history.t[inside], restored[inside], window.start),
         p=dict(zip(plates.names, (history.P[steady].mean(axis=0) / plates.s).tolist(), strict=True)),
-        t_load_s=_for_good(history.t[inside], carried[inside], window.start),
+        t_load_s=for_good(history.t[inside], carried[inside], window.start),
     )
 
 
-def _between(t: Floats, window: Window) -> NDArray[np.bool_]:
+def between(t: Floats, window: Window) -> NDArray[np.bool_]:
     """Rows after the event and before the next one; the run's last row has no next event and belongs to the window."""
     tolerance = 1e-9
     last = window.end >= t[-1] - tolerance
     return (t > window.start + tolerance) & (t < window.end + (tolerance if last else -tolerance))
 
 
-def _for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
-    """Time (s) from `start` to the first row from which on all rows hold; None when the last one does not."""
+def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
+    """Time (s) from `start` to the first row from which on all rows hold; None when the last one does not.
+
+    Examples
+    --------
+    >>> for_good(np.array([1.0, 1.1, 1.2]), np.array([True, False, True]), 1.0)
+    0.2
+    """
     failing = np.flatnonzero(~holds)
     first = 0 if failing.size == 0 else int(failing[-1]) + 1
     return None if first >= t.size else round(float(t[first]) - start, 9)

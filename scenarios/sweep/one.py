@@ -26,6 +26,7 @@ from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.moves import as_they_came
 from scenarios.results.record import Tape
+from scenarios.results.settling import settling
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
@@ -78,7 +79,8 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
     measures: dict[str, float | None] = {}
     with np.errstate(all="ignore"):  # what is no number is told as such
         for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
-            measures |= flat(window.label, asdict(metrics.measure(history, plates, window, F_NOM)))
+            steady, settled = (of(history, plates, window, F_NOM) for of in (metrics.measure, settling))
+            measures |= flat(window.label, asdict(steady) | asdict(settled))
     return Done(number=number, status="ran", sha256=recorded.sha256, measures=measures)
 
 

@@ -11,6 +11,10 @@ WORDS = {
     "MQSI": "settled var sharing index, MQSI",
     "t_restore_s": "time to restore f and sharing (s)",
     "t_load_s": "time to take over the load (s)",
+    "t_f_s": "time to restore f (s)",
+    "t_share_s": "time to share power (s)",
+    "f_swing_Hz": "swing of f at the end (Hz)",
+    "V_swing_pu": "swing of V at the end (pu)",
     "graph.links": "links",
     "graph.lambda_2": "algebraic connectivity, lambda_2",
 }
