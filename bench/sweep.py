@@ -16,9 +16,10 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
 import platform
+import resource
 import tempfile
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
@@ -59,8 +60,11 @@ def main() -> None:
         read = perf_counter() - began
         run_one(0, plan.runs[0].scenario, plan.runs[0].case)  # loads the compiled step for all of them
         half = max(arguments.loop // 2, 1)
+        busy = process_time()
         before = loop(plan.runs[:half], folder / "before")
+        busy = process_time() - busy
         swept = sweep(plan, folder / "sweep")
+        workers = resource.getrusage(resource.RUSAGE_CHILDREN)
         after = loop(plan.runs[half : 2 * half], folder / "after")
     one, all_cores = 2 * half / (before + after), len(plan.runs) / swept
     print(f"{cores()} cores, load {os.getloadavg()[0]:.1f}; {platform.system()}, Python {platform.python_version()}")
@@ -68,7 +72,9 @@ def main() -> None:
     print(f"{len(plan.runs)} samples checked            {read:7.2f} s   {1e3 * read / len(plan.runs):.1f} ms a sample")
     print(f"plain loop, {2 * half} runs           {before + after:7.2f} s   {one:6.2f} runs per second")
     print(f"sweep on all cores, {len(plan.runs)} runs  {swept:7.2f} s   {all_cores:6.2f} runs per second")
-    print(f"\nsweep : plain loop {all_cores / one:5.2f}   (of which cores: at most {cores()})")
+    once, each = 1e3 * busy / half, 1e3 * (workers.ru_utime + workers.ru_stime) / len(plan.runs)
+    print(f"\nprocessor time of a run: loop {once:.0f} ms, workers {each:.0f} ms, their start included")
+    print(f"sweep : plain loop {all_cores / one:5.2f}   (of which cores: at most {cores()})")
 
 
 def loop(runs: tuple[Run, ...], folder: Path) -> float:

@@ -59,7 +59,7 @@ def choose(table: pa.Table) -> Choice:
     indexes: dict[str, list[str]] = {}
     for name in names[first + len(FATE) :]:
         window, _, index = name.rpartition(".")
-        if not window.endswith(".p"):
+        if window and not window.endswith(".p"):
             indexes.setdefault(window, []).append(index)
     gridded = len(varied) == 2 and all(_is_axis(columns[name]) for name in varied)
     return Choice(

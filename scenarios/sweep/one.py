@@ -19,17 +19,20 @@ import numpy as np
 
 from plant.build import build_plant
 from plant.config import PlantConfig
+from plant.equipment import Feeder
 from plant.feeder import Plant
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
+from scenarios.results.links import LinkRecord
 from scenarios.results.moves import as_they_came
 from scenarios.results.record import Tape
 from scenarios.results.settling import settling
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
+from scenarios.spec.netem import netem_of, setup_of
 from scenarios.sweep.blas import one_thread
 
 KEPT_PLANTS = 4
@@ -51,8 +54,13 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
     """Why it broke."""
     sha256: str = ""
     """Of the bytes that history.csv would have."""
+    links_sha256: str = ""
+    """Of all verdicts of the emulated links; "" without."""
+    link_warnings: str = ""
+    """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
     measures: dict[str, float | None] = {}
-    """Every index of every event's window, e.g. "event1.MPSI"; None where it is not a number, or never came to be."""
+    """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
+    and over all emulated links how many messages fared how, e.g. "links_dropped"."""
 
 
 def run_one(number: int, scenario: Scenario, case: str) -> Done:
@@ -70,7 +78,8 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
     feeder = _feeder(scenario.plant.feeder, scenario.plant.load_set)
     plant, agents = configs(scenario, feeder, case)
     tape = Tape()
-    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant))
+    links = LinkRecord()
+    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant), on_links=links)
     if outcome.broke:
         return Done(number=number, status="broke", why=outcome.broke)
     recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
@@ -81,7 +90,36 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
         for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
             steady, settled = (of(history, plates, window, F_NOM) for of in (metrics.measure, settling))
             measures |= flat(window.label, asdict(steady) | asdict(settled))
-    return Done(number=number, status="ran", sha256=recorded.sha256, measures=measures)
+    return Done(
+        number=number,
+        status="ran",
+        sha256=recorded.sha256,
+        links_sha256=links.sha256 if links.counts else "",
+        link_warnings=_warnings(scenario, feeder, case, links),
+        measures=measures | _accounts(links),
+    )
+
+
+def _accounts(links: LinkRecord) -> dict[str, float | None]:
+    """Messages over all emulated links together; nothing where there are none."""
+    books = links.counts.values()
+    if not books:
+        return {}
+    return {
+        "links_sent": float(sum(book.sent for book in books)),
+        "links_delivered": float(sum(book.delivered for book in books)),
+        "links_dropped": float(sum(sum(book.dropped.values()) for book in books)),
+    }
+
+
+def _warnings(scenario: Scenario, feeder: Feeder, case: str, links: LinkRecord) -> str:
+    """Hold the links against what they were told, as every run does."""
+    if not links.counts:
+        return ""
+    from scenarios.results.link_check import LinkCheck  # scipy.stats takes longer to import than a run
+
+    setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=False)
+    return "; ".join(LinkCheck(links, setup.netem, setup.microgrids).warnings)
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:

@@ -80,7 +80,9 @@ def _parallel(runs: Sequence[tuple[int, Run]]) -> Generator[Done, None, None]:
         # one run a batch: what is done is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)
     try:
-        yield from results
+        # not `yield from`, which would close the results, with a warning, before we can
+        for done in results:  # noqa: UP028
+            yield done
     except GeneratorExit:
         _close(results)
         raise

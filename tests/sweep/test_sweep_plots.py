@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from scenarios.sweep.choice import choose, values
 from scenarios.sweep.plots import draw_all
 from scenarios.sweep.statistics import spread_of
+from scenarios.sweep.table import FATE
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:
     """A table as a sweep writes it, case IV only."""
     n = len(next(iter(parameters.values())))
     head = {"sample": list(range(n)), "case": ["IV"] * n, "seed": [1] * n}
-    fate = {"status": ["ran"] * n, "why": [None] * n, "history_sha256": [""] * n}
+    fate = {name: ["ran"] * n for name in FATE}
     named = {f"event1.{name}": column for name, column in indexes.items()}
     return pa.table(head | parameters | fate | (named or {"event1.MPSI": [0.1] * n}) | {"event1.p.inv1": [0.5] * n})
 

@@ -15,6 +15,7 @@ import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from scipy.stats import binomtest
 
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
@@ -80,7 +81,7 @@ def test_a_killed_sweep_goes_on_and_gives_the_table_of_an_undisturbed_one(many: 
     with command("mine.toml", "--out", "killed", "--jobs", "2", cwd=tmp_path) as running:
         assert reached_a_tenth(running)
         os.killpg(running.pid, signal.SIGKILL)
-        running.communicate(timeout=20)  # ends when nobody holds the pipes any more
+        running.communicate(timeout=60)  # ends when nobody holds the pipes any more
     kept = journal.read_bytes()
     count = kept.count(b"\n")
     journal.write_bytes(kept + b'{"number":39,"status":"r')  # as if cut off in the middle of a line
@@ -101,7 +102,7 @@ def test_ctrl_c_keeps_what_is_done_says_how_to_go_on_and_leaves_no_worker(many: 
     with command("mine.toml", "--out", "here", "--jobs", "2", cwd=tmp_path) as running:
         assert reached_a_tenth(running)
         os.killpg(running.pid, signal.SIGINT)
-        _, err = running.communicate(timeout=20)  # workers hold the pipe: it ends with the last of them
+        _, err = running.communicate(timeout=60)  # workers hold the pipe: it ends with the last of them
         assert running.returncode == 130
     kept = (tmp_path / "here" / "runs.jsonl").read_text().count("\n")
 
@@ -136,6 +137,20 @@ def test_runs_that_break_are_rows_that_say_why(sweep_file: Write, tmp_path: Path
     assert [value is None for value in column["event1.MPSI"]] == [False, True, True]
     assert [value is None for value in column["history_sha256"]] == [False, True, True]
     assert sum(summary.broke.values()) == 2
+
+
+def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_path: Path) -> None:
+    """An entry of `[[link]]` by its number: what is lost is the loss's share, another seed loses others, by name."""
+    path = sweep_file('"link" = [{ on = "* -> inv4", loss = 0.0 }]\n\n[grid]\n"link[0].loss" = [0.1, 0.3]\n')
+    path.write_text("seeds = 2\n" + path.read_text())
+    column = pq.read_table(done(path, tmp_path / "here").table).to_pydict()
+
+    assert column["link[0].loss"] == [0.1, 0.1, 0.3, 0.3]
+    assert column["link_warnings"] == [None] * 4
+    assert len(set(column["links_sha256"])) == 4
+    for loss, sent, dropped in zip(column["link[0].loss"], column["links_sent"], column["links_dropped"], strict=True):
+        assert sent > 100
+        assert binomtest(int(dropped), int(sent), loss).pvalue > 0.001
 
 
 def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_path: Path) -> None:
