@@ -74,6 +74,8 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Rule of the communication graph."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the rule "links"."""
+    without: tuple[tuple[str, str], ...] = ()
+    """Undirected links that are missing from what the rule makes."""
     gains: Gains = Gains()
     """Gains of the law."""
     handling: Handling = Handling()

@@ -101,8 +101,11 @@ def in_neighbours(control: Control, name: str, members: Mapping[str, Member]) ->
     >>> members = {f"inv{i}": Plate(kind="GFL", microgrid="mg1") for i in (1, 2, 3, 4)}
     >>> in_neighbours(Control(secondary="all", graph="ring"), "inv1", members)
     ('inv2', 'inv4')
+    >>> in_neighbours(Control(secondary="all", graph="full", without=(("inv4", "inv1"),)), "inv1", members)
+    ('inv2', 'inv3')
     """
-    others = [other for other in members if other != name]
+    missing = _both_ways(control.without)
+    others = [other for other in members if other != name and (name, other) not in missing]
     if control.graph == "ring":
         ring = sorted(members, key=natural_order)
         at = ring.index(name)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from plant.equipment import Feeder
 from scenarios.spec.mistakes import Mistakes, suggestion
-from scenarios.spec.model import Case, Scenario
+from scenarios.spec.model import Scenario
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
@@ -85,6 +85,8 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistak
     for name, case in scenario.cases.items():
         if name in _RUN_FOLDER:
             mistakes.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
+        if inverters:
+            _check_links(f"case.{name}.without", case.without, inverters, mistakes)
         path = f"case.{name}.links"
         if mistakes.touch(path, f"case.{name}.graph"):
             continue
@@ -93,7 +95,7 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistak
         if case.graph != "links" and case.links:
             mistakes.add(path, f'links are listed, but the graph is "{case.graph}"; write graph = "links"')
         if inverters:
-            _check_links(path, case, inverters, mistakes)
+            _check_links(path, case.links, inverters, mistakes)
 
 
 def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
@@ -160,9 +162,9 @@ def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mi
         mistakes.add(f"{path}.{low_key}", f"{low:g} must be below {high_key} = {high:g}; swap them or set both")
 
 
-def _check_links(path: str, case: Case, inverters: tuple[str, ...], mistakes: Mistakes) -> None:
+def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple[str, ...], mistakes: Mistakes) -> None:
     seen: set[frozenset[str]] = set()
-    for i, pair in enumerate(case.links):
+    for i, pair in enumerate(links):
         for name in pair:
             if name not in inverters:
                 mistakes.add(f"{path}[{i}]", f'no inverter "{name}"; {suggestion(name, inverters, "inverters")}')

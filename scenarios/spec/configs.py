@@ -49,7 +49,12 @@ def configs(
     links = "" if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_text()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
     control = Control(
-        secondary=rule.secondary, graph=rule.graph, links=rule.links, gains=rule.gains, handling=rule.handling
+        secondary=rule.secondary,
+        graph=rule.graph,
+        links=rule.links,
+        without=rule.without,
+        gains=rule.gains,
+        handling=rule.handling,
     )
     plant = PlantConfig(
         run=run,

@@ -76,6 +76,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", or "links" as listed."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
+    without: tuple[tuple[str, str], ...] = ()
+    """Undirected links that are missing from what the graph has, e.g. [["inv4", "inv7"]]."""
     P_max_kW: dict[str, dict[str, float]] = {}
     """What inverters have available from an event on (kW), in this case only and in place of what the event says, by
     the event's label: { clouds = { inv2 = 225 } }."""

@@ -128,3 +128,14 @@ def test_all_wrong_links_are_told_at_once() -> None:
         'links[1]: no inverter "inv9"; inverters are inv1, inv2',
         "links[2]: inv1 is linked to itself; a link joins two inverters",
     )
+
+
+def test_missing_links_are_left_out_of_any_rule_both_ways() -> None:
+    """The full graph less the link 4-7, the paper's link failure: neither hears the other, everybody else hears all."""
+    control = Control(secondary="all", graph="full", without=(("inv4", "inv7"),))
+
+    missing = {
+        (name, other) for name in PAPER for other in PAPER if other not in (name, *in_neighbours(control, name, PAPER))
+    }
+
+    assert missing == {("inv4", "inv7"), ("inv7", "inv4")}
