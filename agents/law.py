@@ -40,8 +40,8 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   graph tried, of up to 30 inverters with one leader or more, for every T, with one rating up to thirtyfold the others.
   Where one inverter far from the leaders on a sparse graph outweighs all others by hundredfold, the paper's own
   continuous law loses stability too. For the voltage, over random networks v = H V_set, z = (1 - H) V_set and periods:
-  none of 8000 unstable with equal ratings, nor with ratings up to threefold apart and periods up to 30 ms. With long
-  periods 1 of 10000 was, by 0.1 % a period: long paths with a bigger inverter far from the leaders.
+  none of 8000 unstable with equal ratings, nor with ratings up to threefold apart and periods up to 30 ms. With longer
+  periods 2 of 45000 were, by 0.2 % a period at most: long paths with a bigger inverter far from the leaders.
   `tests/unit/test_law.py` repeats both searches, for the paper's weights and for degree-normalised ones.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
