@@ -20,7 +20,7 @@ class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Probability that an arriving copy of a message is corrupted."""
     checksum: bool = False
     """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
-    False: the copy is handed on, and whoever decodes it must cope."""
+    False: the copy is handed on, and the receiver finds it by the message's own CRC-32: a reject, of kind "corrupt"."""
 
     def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
         """From message number, copy and size (bytes) to the bit that is flipped, None if none is."""

@@ -2,16 +2,22 @@ from __future__ import annotations
 
 import math
 from typing import Any, get_args
+from zlib import crc32
 
 import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.codec import KINDS, LIMIT, RejectedError, Rejects, decode, encode
+from wire.codec import CRC, KINDS, LIMIT, RejectedError, Rejects, decode, encode
 from wire.messages import MESSAGES, AnyMessage, PlantEvent, State, Telemetry
 
 STATE = State(sender="inv1", incarnation=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
+
+
+def sealed(body: bytes) -> bytes:
+    """Bytes with a checksum that is right."""
+    return body + crc32(body).to_bytes(CRC, "little")
 
 
 def kind_of(payload: bytes) -> str:
@@ -33,7 +39,7 @@ def test_every_message_survives_the_wire(kind: type[msgspec.Struct]) -> None:
         words = {"sender": "inv1", "to": "inv1", "island": "grid", "microgrid": "mg1", "reason": "end", "outcome": ""}
         flags |= {"refused": True, "ok": False}
         words |= {"verb": "open", "argument": "sw1_2", "reply_to": "a1", "text": "done", "phase": "running"}
-        words |= {"waits_for": "", "pacing": None}
+        words |= {"waits_for": "", "pacing": None, "data": b"book", "instance": "a1"}
         lists = {"neighbours": ("inv2", "inv3"), "ages": (0.01, -1.0), "used": ("inv2",), "awaited": ("inv2",)}
         counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 9)
         return (examples | more | flags | words | lists | counts).get(field.name, 0.1 + 0.2)
@@ -60,40 +66,53 @@ def test_numbers_must_be_finite(number: float) -> None:
 
 
 def test_rejects_are_told_apart() -> None:
-    """Oversized, unknown and garbled bytes are three kinds."""
+    """Oversized, corrupt, unknown and garbled bytes are four kinds."""
     whole = msgspec.to_builtins(STATE)
 
+    def kind_of_changed(**changes: Any) -> str:
+        return kind_of(sealed(msgspec.msgpack.encode(whole | changes)))
+
     assert kind_of(b"\xc1" * (LIMIT + 1)) == "oversized"
-    assert kind_of(msgspec.msgpack.encode(whole | {"type": "Bomb"})) == "unknown"
-    assert kind_of(b"") == "garbled"
-    assert kind_of(encode(STATE)[:-1]) == "garbled"
-    assert kind_of(msgspec.msgpack.encode(whole | {"P_set": "high"})) == "garbled"
-    assert kind_of(msgspec.msgpack.encode(whole | {"extra": 1})) == "garbled"
-    assert kind_of(msgspec.msgpack.encode(whole | {"seq": -1})) == "garbled"
-    assert kind_of(msgspec.msgpack.encode(whole | {"sender": "x" * 65})) == "garbled"
-    assert kind_of(b"\x91" * 5000) == "garbled"
+    assert kind_of(b"") == kind_of(encode(STATE)[:-1]) == kind_of(encode(STATE)[:-4]) == "corrupt"
+    assert kind_of(sealed(b"")) == "garbled"
+    assert kind_of_changed(type="Bomb") == "unknown"
+    assert kind_of_changed(P_set="high") == "garbled"
+    assert kind_of_changed(extra=1) == "garbled"
+    assert kind_of_changed(seq=-1) == "garbled"
+    assert kind_of_changed(sender="x" * 65) == "garbled"
+    assert kind_of(sealed(b"\x91" * 5000)) == "garbled"
 
 
-@given(st.binary(max_size=300))
-def test_no_bytes_raise_anything_but_a_reject(payload: bytes) -> None:
-    """No message may stop an agent."""
+@given(st.binary(max_size=300), st.booleans())
+def test_no_bytes_raise_anything_but_a_reject(payload: bytes, right: bool) -> None:
+    """No message may stop an agent, whether or not its checksum is right."""
     with pytest.raises(RejectedError) as rejected:
-        decode(payload)
+        decode(sealed(payload) if right else payload)
 
     assert rejected.value.kind in KINDS
 
 
 @given(st.data())
 def test_a_damaged_message_is_rejected_or_whole(data: st.DataObject) -> None:
-    """After any damage to its bytes a message is refused, or has finite numbers."""
-    payload = bytearray(encode(STATE))
+    """After damage that the checksum does not show a message is refused, or has finite numbers."""
+    payload = bytearray(encode(STATE)[:-4])
     payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
     try:
-        message = decode(bytes(payload))
+        message = decode(sealed(bytes(payload)))
     except RejectedError:
         return
 
     assert all(math.isfinite(x) for x in msgspec.structs.astuple(message) if isinstance(x, float))
+
+
+def test_every_flipped_bit_is_caught() -> None:
+    """Whichever bit of a message or of its checksum is flipped, in a number too, the message is refused as corrupt."""
+    payload = encode(STATE)
+    flipped = [bytearray(payload) for _ in range(8 * len(payload))]
+    for bit, damaged in enumerate(flipped):
+        damaged[bit // 8] ^= 1 << bit % 8
+
+    assert {kind_of(bytes(damaged)) for damaged in flipped} == {"corrupt"}
 
 
 def test_one_line_is_kept_for_each_kind() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import random
+from zlib import crc32
 
 import msgspec
 import pytest
@@ -153,7 +154,9 @@ def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
     ghost = Stop(sender="plant", incarnation=0, seq=0, t=0.0, reason="a ghost")
     forged = State(sender="inv2", incarnation=1, seq=0, t=0.0, P_set=0.0, V_set=0.0, Q=0.0)
     late = Ready(sender="inv1", incarnation=1, seq=99, t=0.0)
-    payloads = [rng.randbytes(40), b"", b"x" * 70_000, encode(ghost), encode(late)]
+    torn = encode(ghost)[1:-4]
+    sealed = torn + crc32(torn).to_bytes(4, "little")
+    payloads = [rng.randbytes(40), sealed, b"x" * 70_000, encode(ghost), encode(late)]
     while not run.plant.over:
         run.step()
         for side in (run.plant, *run.agents):
@@ -163,6 +166,7 @@ def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
             side.received(run.plant.keys.state("inv1"), encode(forged), 0.0)
 
     assert run.rows == reference(n=3, end=0.1)
+    assert run.plant.rejects.counts["corrupt"] > 0
     assert run.plant.rejects.counts["garbled"] > 0
     assert run.plant.rejects.counts["foreign"] > 0
     assert len(run.plant.rejects.take_lines()) == len(run.plant.rejects.counts)
