@@ -24,12 +24,12 @@ from plant.equipment import Feeder
 from plant.pacing import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
-from scenarios.results import claims, metrics
+from scenarios.results.claims import CLAIMS, judge
+from scenarios.results.findings import Findings, find
 from scenarios.results.folder import set_status, shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
 from scenarios.results.moves import as_they_came, late_moves
-from scenarios.results.plug_claims import PLUG_CLAIMS
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import Report, plain
 from scenarios.spec import Scenario
@@ -130,23 +130,19 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         )
     plates = Plates.of(inverters_of(scenario, request.feeder))
     histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
-    events = as_they_came(scenario, recorded[list(recorded)[-1]].events)  # in wall-clock time each case has its own
-    results = {
-        case: {
-            window.label: metrics.measure(history, plates, window, F_NOM)
-            for window in metrics.windows(as_they_came(scenario, recorded[case].events), scenario.time.end_s)
-        }
-        for case, history in histories.items()
-    }
+    came = {case: as_they_came(scenario, record.events) for case, record in recorded.items()}
+    events = came[list(came)[-1]]  # in wall-clock time each case has its own
+    found = find(scenario, request.feeder, plates, histories, came)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
-    write_whole(folder / "metrics.json", metrics_json(request, results, sha256, pacing, links_sha256))
+    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256))
     titles = {case: rule.title for case, rule in scenario.cases.items()}
     _draw(histories, titles, plates, events, folder / "plots", moves=any(e.leave or e.join for e in scenario.events))
     report = Report(
         scenario=scenario.name,
         titles=titles,
-        results=results,
-        verdicts=_judge(request, plates, results),
+        found=found,
+        verdicts=judge(found, CLAIMS[scenario.paper]) if scenario.paper else (),
+        experiment=scenario.paper,
         notes=[*notes, *_notes(recorded, request.clock)],
         folder=shown(folder) + "/",
     )
@@ -157,15 +153,17 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
 
 def metrics_json(
     request: Request,
-    results: claims.Results,
+    found: Findings,
     sha256: Mapping[str, str],
     pacing: Mapping[str, Pacing],
     links_sha256: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time."""
     cases: dict[str, dict[str, Any]] = {}
-    for case, steady in results.items():
+    for case, steady in found.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
+        for label, islands in found.islands.get(case, {}).items():
+            cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
         cases[case]["history_sha256"] = sha256[case]
         if case in links_sha256:
             cases[case]["links_sha256"] = links_sha256[case]
@@ -177,7 +175,7 @@ def metrics_json(
     return json.dumps(whole, indent=2, allow_nan=False) + "\n"
 
 
-def _numbers(steady: dict[str, Any]) -> dict[str, float | None]:
+def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
     measures = {name: value for name, value in steady.items() if name != "p"}
     return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
 
@@ -254,14 +252,6 @@ def _draw(
 
     drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM, moves=moves)
     plots.draw_all(drawing, folder)
-
-
-def _judge(request: Request, plates: Plates, results: claims.Results) -> tuple[claims.Verdict, ...]:
-    if not request.scenario.paper:
-        return ()
-    GFL = tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM)
-    start = claims.Start(P_set0=request.scenario.plant.P_set0_pu, GFL=GFL)
-    return claims.judge(results, start, PLUG_CLAIMS if request.scenario.paper == "plug-n-play" else claims.CLAIMS)
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:

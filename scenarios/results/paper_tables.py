@@ -1,4 +1,4 @@
-"""The numbers that the paper prints, and how near ours must come.
+"""The numbers that the paper prints: its Tables I to V, as data. How near ours must come is in `tolerances`.
 
 Singhal, Vu, Du, "Consensus Control for Coordinating Grid-Forming and Grid-Following Inverters in Microgrids",
 IEEE Trans. Smart Grid 2022.
@@ -6,77 +6,190 @@ IEEE Trans. Smart Grid 2022.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
-Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]
-"""A column of Tables I and II, named as in metrics.json."""
+from scenarios.results.tolerances import TABLE, Number, Quantity, Tolerance
+
+HEADINGS: dict[Quantity, str] = {
+    "f_error_Hz": "abs(f-60) Hz",
+    "MPSI": "MPSI",
+    "V_error": "V_error pu",
+    "MQSI": "MQSI",
+}
+"""Heading of a column, with the unit."""
+
+UNITS: dict[Quantity, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": ""}
+"""Unit as it follows a number."""
+
+DIGITS: dict[Quantity, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 2}
+"""Decimals that the paper prints."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
-    """What one column of a table of the paper shows."""
+class Cell:
+    """One number of a table."""
 
-    table: Literal["I", "II"]
-    """Number of the table."""
+    table: Number
+    case: str
+    """Case of our scenario."""
+    event: str
+    """Event of our scenario after which it is measured."""
+    island: str
+    """First inverter of the island that it is about; "" for the whole microgrid."""
     quantity: Quantity
-    heading: str
-    """Heading, with the unit."""
+    paper: float
+    """What the paper prints."""
     digits: int
-    """Decimals the paper prints."""
-    tolerance: float | None
-    """Largest difference that passes, in the column's unit; None where the paper does not determine the number."""
-    reason: str
-    """Why that much."""
+    """Decimals that it prints."""
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """How near ours must come."""
+        return TABLE[self.table, self.quantity]
+
+    @property
+    def where(self) -> str:
+        """Place for people, e.g. "case II, event2"."""
+        return f"case {self.case}, {self.event}" + (f", island of {self.island}" if self.island else "")
+
+    def within(self, ours: float) -> bool | None:
+        """Whether our number is near enough; None where the table's number is not judged.
+
+        Both count at the precision of the computation: the paper's printed 0.14 stands for exactly 0.14.
+        """
+        return None if self.tolerance.value is None else abs(ours - self.paper) <= self.tolerance.value
 
 
-COLUMNS: tuple[Column, ...] = (
-    Column(
-        table="I",
-        quantity="f_error_Hz",
-        heading="abs(f-60) Hz",
-        digits=2,
-        tolerance=0.01,
-        reason="the paper prints 0.01 Hz; that is 65 kW of 3900 kW, less than what our loads may differ from its loads",
+@dataclass(frozen=True, kw_only=True)
+class PaperTable:
+    """One table."""
+
+    number: Number
+    experiment: str
+    """Key `paper` of its scenario."""
+    title: str
+    cells: tuple[Cell, ...]
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Its columns, each once."""
+        return tuple(dict.fromkeys(cell.quantity for cell in self.cells))
+
+
+def tables_of(experiment: str) -> tuple[PaperTable, ...]:
+    """Tables of an experiment, named as in the scenario's key `paper`."""
+    return tuple(table for table in TABLES if table.experiment == experiment)
+
+
+def paper_cell(experiment: str, case: str, event: str, quantity: str, island: str = "") -> Cell | None:
+    """The paper's number at a place of our results, or None where it prints none."""
+    wanted = (case, event, quantity, island)
+    for table in tables_of(experiment):
+        for cell in table.cells:
+            if (cell.case, cell.event, cell.quantity, cell.island) == wanted:
+                return cell
+    return None
+
+
+def _cells(
+    table: Number, columns: tuple[tuple[str, Quantity], ...], rows: dict[str, tuple[float, ...]], island: bool = False
+) -> Iterator[Cell]:
+    """Cells of a table with a row per case (or per island of case IV) and columns (event, quantity)."""
+    for row, numbers in rows.items():
+        for (event, quantity), paper in zip(columns, numbers, strict=True):
+            digits = 3 if (table, quantity) == ("III", "MQSI") else DIGITS[quantity]
+            case, of = ("IV", row) if island else (row, "")
+            yield Cell(table=table, case=case, event=event, island=of, quantity=quantity, paper=paper, digits=digits)
+
+
+def _of_events(*quantities: Quantity) -> tuple[tuple[str, Quantity], ...]:
+    return tuple((event, quantity) for event in ("event1", "event2") for quantity in quantities)
+
+
+_ALL: tuple[Quantity, ...] = ("f_error_Hz", "MPSI", "V_error", "MQSI")
+_CLOUDS: tuple[tuple[str, Quantity], ...] = tuple(
+    ("clouds", quantity) for quantity in ("MPSI", "f_error_Hz", "V_error", "MQSI")
+)
+
+TABLES: tuple[PaperTable, ...] = (
+    PaperTable(
+        number="I",
+        experiment="islanding",
+        title="Frequency and power sharing after islanding and after loss of load",
+        cells=tuple(
+            _cells(
+                "I",
+                _of_events("f_error_Hz", "MPSI"),
+                {
+                    "I": (0.14, 0.00, 0.07, 0.00),
+                    "II": (0.08, 0.12, 0.00, 0.24),
+                    "III": (0.08, 0.12, 0.00, 0.24),
+                    "IV": (0.00, 0.00, 0.00, 0.00),
+                },
+            )
+        ),
     ),
-    Column(
-        table="I",
-        quantity="MPSI",
-        heading="MPSI",
-        digits=2,
-        tolerance=0.02,
-        reason="the paper prints 0.01, and 0.01 of pu power at each GFL moves it by as much",
+    PaperTable(
+        number="II",
+        experiment="islanding",
+        title="Voltage and var sharing after islanding and after loss of load",
+        cells=tuple(
+            _cells(
+                "II",
+                _of_events("V_error", "MQSI"),
+                {
+                    "I": (0.015, 0.22, 0.006, 0.30),
+                    "II": (0.001, 2.03, 0.000, 1.66),
+                    "III": (0.002, 1.77, 0.002, 1.07),
+                    "IV": (0.002, 0.04, 0.001, 0.05),
+                },
+            )
+        ),
     ),
-    Column(
-        table="II",
-        quantity="V_error",
-        heading="V_error pu",
-        digits=3,
-        tolerance=0.003,
-        reason="it depends on where loads and capacitors stand, which the paper does not print",
+    PaperTable(
+        number="III",
+        experiment="intermittency",
+        title="Intermittency: available power of inverters 2, 5 and 8",
+        cells=tuple(
+            _cells(
+                "III",
+                _CLOUDS,
+                {
+                    f"{kW}kW": (MPSI, 0.00, 0.002, 0.004)
+                    for kW, MPSI in ((350, 0.00), (275, 0.07), (250, 0.11), (225, 0.15), (200, 0.20))
+                },
+            )
+        ),
     ),
-    Column(
-        table="II",
-        quantity="MQSI",
-        heading="MQSI",
-        digits=2,
-        tolerance=None,
-        reason="circulating vars depend on the places of inverters and capacitors, which the paper does not print; "
-        "what the paper claims of it is the order of the cases and the distance between them",
+    PaperTable(
+        number="IV",
+        experiment="communication",
+        title="Reduced communication and link failure",
+        cells=tuple(
+            _cells(
+                "IV",
+                tuple(("event1", quantity) for quantity in _ALL),
+                {
+                    "full": (0.00, 0.00, 0.002, 0.04),
+                    "reduced": (0.00, 0.00, 0.002, 0.14),
+                    "link-failure": (0.00, 0.00, 0.002, 0.05),
+                },
+            )
+        ),
+    ),
+    PaperTable(
+        number="V",
+        experiment="switching",
+        title="Microgrid switching: three islands",
+        cells=tuple(
+            _cells(
+                "V",
+                tuple(("event2", quantity) for quantity in _ALL),
+                dict.fromkeys(("inv1", "inv4", "inv7"), (0.00, 0.00, 0.000, 0.00)),
+                island=True,
+            )
+        ),
     ),
 )
-"""Columns of Tables I and II."""
-
-ISLANDING: dict[str, dict[str, dict[Quantity, float]]] = {
-    case: {
-        event: dict(zip(("f_error_Hz", "MPSI", "V_error", "MQSI"), numbers, strict=True))
-        for event, numbers in (("event1", event1), ("event2", event2))
-    }
-    for case, event1, event2 in (
-        ("I", (0.14, 0.00, 0.015, 0.22), (0.07, 0.00, 0.006, 0.30)),
-        ("II", (0.08, 0.12, 0.001, 2.03), (0.00, 0.24, 0.000, 1.66)),
-        ("III", (0.08, 0.12, 0.002, 1.77), (0.00, 0.24, 0.002, 1.07)),
-        ("IV", (0.00, 0.00, 0.002, 0.04), (0.00, 0.00, 0.001, 0.05)),
-    )
-}
-"""Tables I and II: by case, event and quantity."""
+"""The paper's tables."""

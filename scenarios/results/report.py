@@ -9,8 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.results.claims import Results, Verdict, within
-from scenarios.results.paper_tables import COLUMNS, ISLANDING, Column
+from scenarios.results.claims import Verdict
+from scenarios.results.findings import Findings
+from scenarios.results.metrics import Steady
+from scenarios.results.paper_tables import DIGITS, HEADINGS, paper_cell, tables_of
+from scenarios.results.tolerances import Quantity
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 
@@ -23,10 +26,12 @@ class Report:
     """Name."""
     titles: Mapping[str, str]
     """A few words on each case that was run."""
-    results: Results
-    """Steady values by case and event."""
+    found: Findings
+    """What was measured."""
     verdicts: Sequence[Verdict]
     """Claims judged; empty for a scenario of no experiment of the paper."""
+    experiment: str = ""
+    """Experiment of the paper whose numbers stand beside ours; "" for none."""
     notes: Sequence[str]
     """What a reader must know besides, e.g. that an agent died."""
     folder: str
@@ -42,11 +47,18 @@ class Grid:
     rows: tuple[tuple[str, ...], ...]
 
 
+_GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
+    ("Frequency and power sharing", ("f_error_Hz", "MPSI")),
+    ("Voltage and var sharing", ("V_error", "MQSI")),
+)
+"""Titles and columns of the two tables."""
+
+
 def grids(report: Report) -> tuple[Grid, ...]:
-    """Tables I and II for our results, with the paper's numbers beside where there are any."""
-    if not any(report.results.values()):
+    """Tables for our results, laid out as the paper's Tables I and II, with its numbers beside where there are any."""
+    if not any(report.found.results.values()):
         return ()  # without events there is no window to measure in
-    return tuple(_grid(report, table) for table in ("I", "II"))
+    return tuple(_grid(report, title, quantities) for title, quantities in _GRIDS)
 
 
 def plain(report: Report) -> str:
@@ -91,37 +103,58 @@ def show(report: Report, console: Console) -> None:
     console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
 
 
-def _grid(report: Report, table: str) -> Grid:
-    columns = [column for column in COLUMNS if column.table == table]
-    events = list(dict.fromkeys(event for steady in report.results.values() for event in steady))
-    judged = any(event in ISLANDING.get(case, {}) for case in report.results for event in events) and bool(
-        report.verdicts
-    )
+def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
+    results = report.found.results
+    events = list(dict.fromkeys(event for steady in results.values() for event in steady))
+    timed = quantities[0] == "f_error_Hz"
     header = ["case"]
     for event in events:
-        header += [f"{event}\n{column.heading}" for column in columns]
-        header += [f"{event}\nrestored in"] if table == "I" else []
+        header += [f"{event}\n{HEADINGS[quantity]}" for quantity in quantities]
+        header += [f"{event}\nrestored in"] if timed else []
     rows = []
-    for case, steady in report.results.items():
-        row = [f"{case} {report.titles.get(case, '')}".strip()]
-        for event in events:
-            row += [_cell(column, case, event, getattr(steady[event], column.quantity), judged) for column in columns]
-            if table == "I":
-                t = steady[event].t_restore_s
-                row.append("never" if t is None else f"{t:.2f} s")
-        rows.append(tuple(row))
-    against = f", ours | paper's Table {table}" if judged else ""
-    title = "Frequency and power sharing" if table == "I" else "Voltage and var sharing"
+    for case, steady in results.items():
+        rows.append(_row(report, f"{case} {report.titles.get(case, '')}".strip(), case, steady, events, quantities))
+        islands = report.found.islands.get(case, {})
+        for name in dict.fromkeys(name for parts in islands.values() for name in parts):
+            parts = {event: islands[event][name] for event in islands if name in islands[event]}
+            rows.append(_row(report, f"  island of {name}", case, parts, events, quantities, name))
+    numbers = [
+        table.number
+        for table in tables_of(report.experiment)
+        if any(cell.quantity in quantities and report.found.has(cell) for cell in table.cells)
+    ]
+    against = f", ours | paper's Table {' and '.join(numbers)}" if numbers else ""
     return Grid(title=f"{title} after each event{against}", header=tuple(header), rows=tuple(rows))
 
 
-def _cell(column: Column, case: str, event: str, ours: float, judged: bool) -> str:
+def _row(
+    report: Report,
+    title: str,
+    case: str,
+    steady: Mapping[str, Steady],
+    events: Sequence[str],
+    quantities: tuple[Quantity, ...],
+    island: str = "",
+) -> tuple[str, ...]:
+    row = [title]
+    for event in events:
+        if event not in steady:
+            row += [""] * (len(quantities) + (quantities[0] == "f_error_Hz"))
+            continue
+        values = steady[event]
+        row += [_cell(report.experiment, case, event, name, getattr(values, name), island) for name in quantities]
+        if quantities[0] == "f_error_Hz":
+            row.append("never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s")
+    return tuple(row)
+
+
+def _cell(experiment: str, case: str, event: str, quantity: Quantity, ours: float, island: str) -> str:
     """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough."""
-    text = f"{ours:.{column.digits + 1}f}"
-    if not judged or event not in ISLANDING.get(case, {}):
+    paper = paper_cell(experiment, case, event, quantity, island) if experiment else None
+    text = f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
+    if paper is None:
         return text
-    mark = " !" if within(column, case, event, ours) is False else ""
-    return f"{text} | {ISLANDING[case][event][column.quantity]:.{column.digits}f}{mark}"
+    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if paper.within(ours) is False else ''}"
 
 
 def _plain_grid(grid: Grid) -> str:

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import pytest
 
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results import metrics
-from scenarios.results.claims import Start
+from scenarios.results.claims import CLAIMS, judge
+from scenarios.results.findings import Findings, Results, find
 from scenarios.results.history import History, Plates
-from scenarios.results.metrics import Steady
 from scenarios.spec import load_scenario
-from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.configs import configs
 from wire.messages import Telemetry
 
 
@@ -20,8 +19,21 @@ class Experiment:
 
     plates: Plates
     histories: dict[str, History]
-    steady: dict[str, dict[str, Steady]]
-    start: Start
+    found: Findings
+
+    @property
+    def steady(self) -> Results:
+        """Steady values by case and event."""
+        return self.found.results
+
+    def statuses(self, experiment: str) -> dict[str, str]:
+        """Verdict on each claim of an experiment, by its name."""
+        return {verdict.claim.name: verdict.status for verdict in judge(self.found, CLAIMS[experiment])}
+
+
+def expected(experiment: str) -> dict[str, str]:
+    """What the documentation says of each claim: it holds, or is a known miss."""
+    return {claim.name: "MISS" if claim.known_miss else "PASS" for claim in CLAIMS[experiment]}
 
 
 @pytest.fixture(scope="session")
@@ -36,12 +48,30 @@ def plug_n_play() -> Experiment:
     return experiment("plug-n-play")
 
 
+@pytest.fixture(scope="session")
+def intermittency() -> Experiment:
+    """The paper's intermittency experiment, by the driver without processes."""
+    return experiment("intermittency")
+
+
+@pytest.fixture(scope="session")
+def communication() -> Experiment:
+    """The paper's reduced communication and link failure, by the driver without processes."""
+    return experiment("reduced-communication")
+
+
+@pytest.fixture(scope="session")
+def switching() -> Experiment:
+    """The paper's microgrid switching, by the driver without processes."""
+    return experiment("microgrid-switching")
+
+
 def experiment(name: str) -> Experiment:
     """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)
     plates = Plates.of(feeder.inverters)
-    windows = metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
-    histories, steady = {}, {}
+    events = [(event.label, event.t_s) for event in scenario.events]
+    histories = {}
     for case in scenario.cases:
         rows: list[tuple[float, ...]] = []
 
@@ -52,6 +82,5 @@ def experiment(name: str) -> Experiment:
         assert not outcome.broke
         assert outcome.reproducible
         histories[case] = History.of(plates.names, rows)
-        steady[case] = {w.label: metrics.measure(histories[case], plates, w, F_NOM) for w in windows}
-    GFL = tuple(row.name for row in feeder.inverters if row.kind == "GFL")
-    return Experiment(plates, histories, steady, Start(P_set0=scenario.plant.P_set0_pu, GFL=GFL))
+    found = find(scenario, feeder, plates, histories, dict.fromkeys(histories, events))
+    return Experiment(plates, histories, found)

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from scenarios.results import metrics
-from scenarios.results.claims import judge
-from scenarios.results.plug_claims import PLUG_CLAIMS
 
-from .conftest import Experiment
+from .conftest import Experiment, expected
 
 EVENTS = ("leave", "return")
 INV2 = 1
@@ -78,8 +76,4 @@ def test_mean_sharing_is_that_of_eight_while_one_is_away(plug_n_play: Experiment
 
 def test_every_claim_holds(plug_n_play: Experiment) -> None:
     """What `gridpeers run plug-n-play` says of our run. Section 4."""
-    verdicts = judge(plug_n_play.steady, plug_n_play.start, PLUG_CLAIMS)
-
-    assert {verdict.claim.name: verdict.status for verdict in verdicts} == dict.fromkeys(
-        (claim.name for claim in PLUG_CLAIMS), "PASS"
-    )
+    assert plug_n_play.statuses("plug-n-play") == expected("plug-n-play")

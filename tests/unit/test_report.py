@@ -5,30 +5,37 @@ import io
 import pytest
 from rich.console import Console
 
-from scenarios.results.claims import Start, judge
+from scenarios.results.claims import CLAIMS, judge
+from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
-from scenarios.results.paper_tables import ISLANDING
+from scenarios.results.paper_tables import tables_of
 from scenarios.results.report import Report, plain, show
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
     """A report whose numbers are the paper's, but for one frequency error."""
+    numbers: dict[str, dict[str, dict[str, float]]] = {}
+    for table in tables_of("islanding"):
+        for cell in table.cells:
+            numbers.setdefault(cell.case, {}).setdefault(cell.event, {})[cell.quantity] = cell.paper
     results = {
         case: {
-            event: Steady(**numbers, t_restore_s=0.65 if case == "IV" else None, p={"inv2": 0.65})
-            for event, numbers in events.items()
+            event: Steady(**values, t_restore_s=0.65 if case == "IV" else None, p={"inv2": 0.65})
+            for event, values in events.items()
         }
-        for case, events in ISLANDING.items()
+        for case, events in numbers.items()
     }
     first = results["I"]["event1"]
     results["I"]["event1"] = Steady(
         f_error_Hz=f_error, MPSI=first.MPSI, V_error=first.V_error, MQSI=first.MQSI, t_restore_s=None, p=first.p
     )
+    found = Findings(results=results, P_set0=0.65, GFL=("inv2",))
     return Report(
         scenario="islanding",
         titles={"I": "no control"},
-        results=results,
-        verdicts=judge(results, Start(P_set0=0.65, GFL=("inv2",))) if judged else (),
+        found=found,
+        verdicts=judge(found, CLAIMS["islanding"]) if judged else (),
+        experiment="islanding" if judged else "",
         notes=["case I: inv3 [died] at t = 2 s"],
         folder="runs/islanding/x/",
     )

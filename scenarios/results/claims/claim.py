@@ -1,0 +1,118 @@
+"""A claim of the paper and its verdict.
+
+A claim is a sentence, its place in the paper, the cases and events it needs, and a function from what we found to
+whether it holds. Tolerances are in `scenarios.results.tolerances`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from scenarios.results.findings import Findings
+from scenarios.results.paper_tables import UNITS, Cell, tables_of
+from scenarios.results.tolerances import Number, Quantity
+
+Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
+"""MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
+
+Judge = Callable[[Findings], tuple[bool, str]]
+"""Whether it holds, and what we found, with units."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One sentence of the paper that a run can confirm or refute."""
+
+    name: str
+    """Short name, for tests and files."""
+    text: str
+    """The claim."""
+    source: str
+    """Where the paper says it."""
+    judge: Judge
+    cases: tuple[str, ...] = ()
+    """Cases that must have been run."""
+    events: tuple[str, ...] = ()
+    """Events that must have been measured in them."""
+    figure: str = ""
+    """Figure of the report that shows it; "" for a claim about a table."""
+    known_miss: str = ""
+    """Why it cannot hold here, where that is known. It is shown as a miss then, and does not fail the run."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """A claim judged."""
+
+    claim: Claim
+    status: Status
+    found: str
+    """Our value, with its unit."""
+
+
+def judge(found: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
+    """Judge claims by what was found."""
+    return tuple(_verdict(claim, found) for claim in claims)
+
+
+def _verdict(claim: Claim, found: Findings) -> Verdict:
+    results = found.results
+    missing = [case for case in claim.cases if case not in results]
+    if missing:
+        return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
+    absent = [event for event in claim.events if any(event not in results[case] for case in claim.cases)]
+    if absent:
+        return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
+    holds, text = claim.judge(found)
+    if not holds and claim.known_miss:
+        return Verdict(claim=claim, status="MISS", found=text)
+    return Verdict(claim=claim, status="PASS" if holds else "FAIL", found=text)
+
+
+def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim:
+    """The claim that all numbers of one column of a table are near the paper's."""
+    table = next(table for table in tables_of(experiment) if table.number == number)
+    cells = tuple(cell for cell in table.cells if cell.quantity == quantity)
+    unit, tolerance = UNITS[quantity], cells[0].tolerance.value
+    name = "abs(f-60)" if quantity == "f_error_Hz" else quantity
+
+    def compare(found: Findings) -> tuple[bool, str]:
+        ours = {cell: found.value(cell) for cell in cells}
+
+        def off(cell: Cell) -> float:
+            difference = abs(ours[cell] - cell.paper)
+            return math.inf if math.isnan(difference) else difference
+
+        worst = max(cells, key=off)
+        holds = all(cell.within(ours[cell]) for cell in cells)
+        return holds, f"at most off by {abs(ours[worst] - worst.paper):.4f}{unit} ({worst.where})"
+
+    return Claim(
+        name=f"table_{number}_{quantity}",
+        text=f"all {_WORDS.get(len(cells), str(len(cells)))} {name} within {tolerance:g}{unit} of Table {number}",
+        source=f"Table {number}",
+        cases=tuple(dict.fromkeys(cell.case for cell in cells)),
+        events=tuple(dict.fromkeys(cell.event for cell in cells)),
+        judge=compare,
+    )
+
+
+def ratio(before: float, after: float) -> float:
+    """How many times smaller; nothing left is infinitely better."""
+    return before / after if after else math.inf
+
+
+def by_event(events: Iterable[str], values: Iterable[str]) -> str:
+    """Words on several events."""
+    return ", ".join(f"{event} {value}" for event, value in zip(events, values, strict=True))
+
+
+def seconds(t: float | None) -> str:
+    """Write a time that may never have come."""
+    return "never" if t is None else f"{t:.2f} s"
+
+
+_WORDS = {3: "three", 5: "five", 8: "eight"}

@@ -1,0 +1,112 @@
+"""What an experiment came to, measured: the one thing that claims, tables and reports are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from plant.equipment import Feeder
+from scenarios.results import metrics
+from scenarios.results.history import History, Plates
+from scenarios.results.islands import islands_of, part_of
+from scenarios.results.metrics import Steady
+from scenarios.results.paper_tables import Cell
+from scenarios.results.settling import Settling, settling
+from scenarios.spec import Scenario
+from scenarios.spec.configs import F_NOM
+from scenarios.spec.limits import limits_of
+
+Results = Mapping[str, Mapping[str, Steady]]
+"""Steady values by case and event."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphRun:
+    """One run of the experiment with random communication graphs."""
+
+    links: int
+    """Links of the graph."""
+    settled: Settling
+    steady: Steady
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """What one experiment came to."""
+
+    results: Results
+    """Steady values by case and event."""
+    P_set0: float = float("nan")
+    """First P_set of every inverter (pu)."""
+    GFL: tuple[str, ...] = ()
+    """Names of the grid-following inverters."""
+    settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
+    """How each event settled, by case and event."""
+    islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
+    """Steady values of each island, by case, event and the island's first inverter; only where there are several."""
+    available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
+    graphs: tuple[GraphRun, ...] = ()
+    """Runs over random graphs."""
+
+    def value(self, cell: Cell) -> float:
+        """Our number at the place of one of the paper's."""
+        steady = self.results[cell.case][cell.event]
+        if cell.island:
+            steady = self.islands[cell.case][cell.event][cell.island]
+        return float(getattr(steady, cell.quantity))
+
+    def has(self, cell: Cell) -> bool:
+        """Whether there is such a number."""
+        events = self.results.get(cell.case, {})
+        return cell.event in events and (
+            not cell.island or cell.island in self.islands.get(cell.case, {}).get(cell.event, {})
+        )
+
+
+def find(
+    scenario: Scenario,
+    feeder: Feeder,
+    plates: Plates,
+    histories: Mapping[str, History],
+    events: Mapping[str, Sequence[tuple[str, float]]],
+) -> Findings:
+    """Measure all cases of a run.
+
+    Parameters
+    ----------
+    scenario, feeder : Scenario, Feeder
+        What was run.
+    plates : Plates
+        Nameplates in the order of the histories' columns.
+    histories : Mapping[str, History]
+        Recorded cases.
+    events : Mapping[str, Sequence[tuple[str, float]]]
+        Label and time (s) of each event, by case, as they came.
+    """
+    results: dict[str, dict[str, Steady]] = {}
+    settled: dict[str, dict[str, Settling]] = {}
+    islands: dict[str, dict[str, dict[str, Steady]]] = {}
+    where = islands_of(scenario, feeder)
+    for case, history in histories.items():
+        results[case], settled[case], islands[case] = {}, {}, {}
+        for window in metrics.windows(events[case], scenario.time.end_s):
+            results[case][window.label] = metrics.measure(history, plates, window, F_NOM)
+            settled[case][window.label] = settling(history, plates, window, F_NOM)
+            if len(where[window.label]) > 1:
+                islands[case][window.label] = {
+                    name: metrics.measure(*part_of(history, plates, members), window, F_NOM)
+                    for name, members in where[window.label].items()
+                }
+    rating = dict(zip(plates.names, plates.s.tolist(), strict=True))
+    return Findings(
+        results=results,
+        P_set0=scenario.plant.P_set0_pu,
+        GFL=tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM),
+        settled=settled,
+        islands=islands,
+        available={
+            case: {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
+            for case in histories
+        },
+    )

@@ -1,0 +1,52 @@
+"""Who stands in which island after each event of a scenario, and the part of a history that is one island's."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from plant.equipment import Feeder
+from plant.network import Network
+from scenarios.results.history import History, Plates
+from scenarios.spec import Scenario
+from scenarios.spec.moves import inverters_of
+
+Islands = dict[str, tuple[str, ...]]
+"""Inverters of each island; an island is known by its first inverter."""
+
+
+def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
+    """Islands with inverters in them after each event, by its label.
+
+    Switches alone decide: an inverter that has left is still counted where it stands.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> islands_of(*load_scenario("microgrid-switching"))["event2"]["inv4"]
+    ('inv4', 'inv5', 'inv6')
+    """
+    network = Network(feeder)
+    closed = network.closed0
+    rows = inverters_of(scenario, feeder)
+    found = {}
+    for event in scenario.events:
+        closed = closed - {network.switch_name(name) for name in event.open}
+        closed = closed | {network.switch_name(name) for name in event.close}
+        members = [tuple(row.name for row in rows if row.bus in buses) for buses in network.islands(closed)]
+        known = {names[0]: names for names in members if names}
+        found[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
+    return found
+
+
+def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[History, Plates]:
+    """The columns of some inverters alone, as if there were no others."""
+    at = np.array([history.inverters.index(name) for name in names])
+    columns = {
+        field.name: getattr(history, field.name)[:, at]
+        for field in fields(history)
+        if field.name not in ("inverters", "t")
+    }
+    mine = {field.name: getattr(plates, field.name)[at] for field in fields(plates) if field.name != "names"}
+    return replace(history, inverters=names, **columns), replace(plates, names=names, **mine)

@@ -1,0 +1,57 @@
+"""What the paper says of reduced communication and of a link failure, a test for each claim."""
+
+import pytest
+
+from agents.topology import adjacency
+from scenarios.spec import load_scenario
+from scenarios.spec.configs import configs
+
+from .conftest import Experiment, expected
+
+EVENT = "event1"
+
+
+@pytest.mark.parametrize(("case", "links"), [("full", 36), ("reduced", 12), ("untuned", 12), ("link-failure", 35)])
+def test_graphs_have_the_papers_links(case: str, links: int) -> None:
+    """36 links; 12 with clusters around three leaders; 35 without the link 4-7. Section 4, Table IV."""
+    _, agents = configs(*load_scenario("reduced-communication"), case)
+    members = {agent.name: agent for agent in agents}
+
+    assert sum(map(sum, adjacency(agents[0].control, members))) == 2 * links
+
+
+def test_steady_frequency_and_sharing_do_not_depend_on_the_links(communication: Experiment) -> None:
+    """abs(f-60) and MPSI are 0 with all links, few, and one missing. Table IV, figure."""
+    for case in ("full", "reduced", "link-failure", "untuned"):
+        steady = communication.steady[case][EVENT]
+        assert steady.f_error_Hz < 0.001
+        assert steady.MPSI < 0.001
+
+
+def test_a_missing_link_costs_least_and_reduced_communication_most(communication: Experiment) -> None:
+    """MQSI: full, then link failure, then reduced. Table IV, (17)."""
+    full, failure, reduced = (communication.steady[case][EVENT].MQSI for case in ("full", "link-failure", "reduced"))
+
+    assert full <= failure < reduced < 0.2
+
+
+def test_the_gains_of_the_full_graph_share_vars_worse_over_few_links(communication: Experiment) -> None:
+    """Re-tuned alpha and beta more than halve MQSI and leave V_error as it was. Section 4, (15)."""
+    before, after = (communication.steady[case][EVENT] for case in ("untuned", "reduced"))
+
+    assert after.MQSI < 0.5 * before.MQSI
+    assert after.V_error == pytest.approx(before.V_error, abs=0.0005)
+
+
+def test_over_few_links_sharing_from_equal_powers_is_not_slower(communication: Experiment) -> None:
+    """Ours needs no 0.5 s more, as the paper's does: a known miss, explained in docs/reproduction.md. Figure."""
+    full, reduced = (communication.found.settled[case][EVENT].t_share_s for case in ("full", "reduced"))
+
+    assert full is not None
+    assert reduced is not None
+    assert abs(full - reduced) < 0.1
+
+
+def test_every_claim_holds_but_for_the_known_miss(communication: Experiment) -> None:
+    """What `gridpeers run reduced-communication` says of our run. Section 4, Table IV."""
+    assert communication.statuses("communication") == expected("communication")
