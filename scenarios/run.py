@@ -25,6 +25,7 @@ from plant.pacing import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.results.claims import CLAIMS, judge
+from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import Findings, find
 from scenarios.results.folder import set_status, shown, write_whole
 from scenarios.results.history import History, Plates
@@ -33,7 +34,7 @@ from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import Report, plain
 from scenarios.spec import Scenario
-from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.netem import netem_of, setup_of
 from scenarios.spec.writing import to_toml
@@ -135,11 +136,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     found = find(scenario, request.feeder, plates, histories, came)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256))
-    titles = {case: rule.title for case, rule in scenario.cases.items()}
-    _draw(histories, titles, plates, events, folder / "plots", moves=any(e.leave or e.join for e in scenario.events))
+    _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     report = Report(
         scenario=scenario.name,
-        titles=titles,
+        titles={case: rule.title for case, rule in scenario.cases.items()},
         found=found,
         verdicts=judge(found, CLAIMS[scenario.paper]) if scenario.paper else (),
         experiment=scenario.paper,
@@ -237,21 +237,10 @@ def _timed(
     return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)
 
 
-def _draw(
-    histories: Mapping[str, History],
-    titles: Mapping[str, str],
-    plates: Plates,
-    events: list[tuple[str, float]],
-    folder: Path,
-    *,
-    moves: bool,
-) -> None:
-    from scenarios.results import (
-        plots,  # matplotlib takes longer to import than a case to run; nothing else waits for it
-    )
+def _draw(drawing: Drawing, folder: Path) -> None:
+    from scenarios.results.plots import draw_all  # matplotlib takes longer to import than a case to run
 
-    drawing = plots.Drawing(histories=histories, titles=titles, plates=plates, events=events, f_nom=F_NOM, moves=moves)
-    plots.draw_all(drawing, folder)
+    draw_all(drawing, folder)
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:

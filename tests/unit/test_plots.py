@@ -57,8 +57,8 @@ def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
 
     for axes in page.axes:
         colours = {line.get_label(): line.get_color() for line in axes.get_lines() if " " in str(line.get_label())}
-        assert colours == {"IV made up": CASE_STYLES["IV"][0], "II made up": CASE_STYLES["II"][0]}
-    assert len({colour for colour, _, _ in CASE_STYLES.values()}) == 4
+        assert colours == {"IV: made up": CASE_STYLES["IV"][0], "II: made up": CASE_STYLES["II"][0]}
+    assert len({CASE_STYLES[case][0] for case in ("I", "II", "III", "IV")}) == 4
     assert len({case_style("x", number) for number in range(6)}) == 6
 
 

@@ -1,0 +1,125 @@
+"""The paper's topology figure: islanding over random communication graphs, connected ones and ones that are not."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+
+from msgspec.structs import replace
+
+from scenarios.results.findings import Findings, GraphRun
+from scenarios.results.metrics import Steady
+from scenarios.results.settling import Settling
+from scenarios.spec import Case, Scenario, load_scenario
+from scenarios.sweep.file.graphs import Edges, connected_graph, connected_graphs
+from scenarios.sweep.one import Done, run_one
+
+LINKS = (8, 9, 10, 12, 16, 20, 28, 36)
+"""Links of the connected graphs; most where the paper's curve bends."""
+
+PER_COUNT = 6
+"""Connected graphs for each number of links; with 36 there is but one."""
+
+BELOW = (4, 5, 6, 7)
+"""Links of graphs that cannot be connected, which are trees less some links."""
+
+PER_COUNT_BELOW = 2
+"""Graphs for each of these."""
+
+END_S = 6.0
+"""End of the runs (s): a path of nine inverters shares within 5 s of the event at 1 s."""
+
+Told = Callable[[int, int], None]
+"""Told how many runs are done, and of how many."""
+
+
+def graphs(inverters: int, seed: int) -> Iterator[Edges]:
+    """All graphs of the study, those that are not connected first.
+
+    Examples
+    --------
+    >>> drawn = list(graphs(9, seed=1))
+    >>> len(drawn), sorted({len(edges) for edges in drawn})
+    (51, [4, 5, 6, 7, 8, 9, 10, 12, 16, 20, 28, 36])
+    """
+    for links in BELOW:
+        for number in range(PER_COUNT_BELOW):
+            rng = random.Random(f"{seed}/below/{links}/{number}")
+            tree = list(connected_graph(inverters, inverters - 1, rng))
+            while len(tree) > links:
+                tree.pop(int(rng.random() * len(tree)))
+            yield tuple(tree)
+    for links in LINKS:
+        yield from connected_graphs(inverters, links, PER_COUNT, seed)
+
+
+def study(seed: int, tell: Told, *, jobs: int) -> Findings:
+    """Run the islanding of case IV on every graph, always in one process each.
+
+    Parameters
+    ----------
+    seed : int
+        Of the graphs.
+    tell : Told
+        Told of progress.
+    jobs : int
+        How many runs at a time; with joblib not installed, one.
+    """
+    scenario, feeder = load_scenario("islanding")
+    names = tuple(row.name for row in feeder.inverters)
+    drawn = list(graphs(len(names), seed))
+    done = dict.fromkeys(range(len(drawn)), Done(number=0, status="broke"))
+    tell(0, len(drawn))
+    for count, end in enumerate(_run([_on(scenario, names, edges) for edges in drawn], jobs), start=1):
+        if end.status == "broke":
+            raise RuntimeError(f"topology, graph {end.number} with {len(drawn[end.number])} links: {end.why}")
+        done[end.number] = end
+        tell(count, len(drawn))
+    return Findings(results={}, graphs=tuple(_graph_run(len(edges), done[i]) for i, edges in enumerate(drawn)))
+
+
+def _on(scenario: Scenario, names: tuple[str, ...], edges: Edges) -> Scenario:
+    """The islanding alone, on one graph."""
+    links = tuple((names[i], names[j]) for i, j in edges)
+    case: Case = replace(scenario.cases["IV"], graph="links", links=links)
+    time = replace(scenario.time, end_s=END_S)
+    return replace(scenario, time=time, events=scenario.events[:1], cases={"IV": case}, paper="")
+
+
+def _run(scenarios: list[Scenario], jobs: int) -> Iterator[Done]:
+    if jobs == 1 or find_spec("joblib") is None:
+        for number, scenario in enumerate(scenarios):
+            yield run_one(number, scenario, "IV")
+        return
+    from scenarios.sweep.file import Run
+    from scenarios.sweep.workers import on_this_machine
+
+    runs = [(i, Run(sample=i, case="IV", scenario=scenario, shown={})) for i, scenario in enumerate(scenarios)]
+    yield from on_this_machine(runs, jobs)
+
+
+def _graph_run(links: int, done: Done) -> GraphRun:
+    at = {name.removeprefix("event1."): value for name, value in done.measures.items()}
+
+    def number(name: str) -> float:
+        value = at[name]
+        return float("nan") if value is None else value
+
+    return GraphRun(
+        links=links,
+        settled=Settling(
+            t_f_s=at["t_f_s"],
+            t_share_s=at["t_share_s"],
+            f_swing_Hz=number("f_swing_Hz"),
+            V_swing_pu=number("V_swing_pu"),
+        ),
+        steady=Steady(
+            f_error_Hz=number("f_error_Hz"),
+            MPSI=number("MPSI"),
+            V_error=number("V_error"),
+            MQSI=number("MQSI"),
+            t_restore_s=at["t_restore_s"],
+            p={name.removeprefix("p."): number(name) for name in at if name.startswith("p.")},
+        ),
+    )

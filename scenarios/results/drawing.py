@@ -1,0 +1,63 @@
+"""What all figures of a run share; made without matplotlib, which takes longer to import than a case to run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from plant.equipment import Feeder
+from scenarios.results.history import History, Plates
+from scenarios.results.islands import islands_of
+from scenarios.spec import Scenario
+from scenarios.spec.configs import F_NOM
+from scenarios.spec.limits import limits_of
+from scenarios.spec.moves import inverters_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """What all figures of a run share."""
+
+    histories: Mapping[str, History]
+    """Recorded cases by name."""
+    titles: Mapping[str, str]
+    """A few words on each case."""
+    plates: Plates
+    """Nameplates, in the order of the histories' columns."""
+    events: Sequence[tuple[str, float]]
+    """Label and time (s) of each event."""
+    f_nom: float
+    """Nominal frequency (Hz)."""
+    moves: bool = False
+    """Whether inverters leave or join, which has a figure of its own."""
+    limited: Sequence[str] = ()
+    """Inverters whose available power changes, which has one too."""
+    islands: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Inverters of each island where there come to be several, by the first of them; they have a figure as well."""
+    island_titles: Mapping[str, str] = field(default_factory=dict)
+    """A few words on each island."""
+
+
+def drawing_of(
+    scenario: Scenario,
+    feeder: Feeder,
+    plates: Plates,
+    histories: Mapping[str, History],
+    events: Sequence[tuple[str, float]],
+) -> Drawing:
+    """What to draw of a run: the figures of all experiments, and those that belong to what happens in this one."""
+    limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
+    most = max(islands_of(scenario, feeder).values(), key=len, default={})
+    microgrid = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
+    whole = {name: {microgrid[member] for member in members} for name, members in most.items()}
+    return Drawing(
+        histories=histories,
+        titles={case: rule.title for case, rule in scenario.cases.items()},
+        plates=plates,
+        events=events,
+        f_nom=F_NOM,
+        moves=any(event.leave or event.join for event in scenario.events),
+        limited=tuple(limited),
+        islands=most if len(most) > 1 else {},
+        island_titles={name: f"microgrid {of.pop().removeprefix('MG')}" for name, of in whole.items() if len(of) == 1},
+    )

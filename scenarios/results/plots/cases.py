@@ -1,0 +1,85 @@
+"""The paper's curves of all cases: f, MPSI, mean V and MQSI, alone and on one page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scenarios.results import metrics
+from scenarios.results.drawing import Drawing
+from scenarios.results.history import Floats, History, Plates
+from scenarios.results.plots.style import PAGE, case_style, columns, from_zero, mark_events, time_axis, words
+
+
+def overview(drawing: Drawing) -> Figure:
+    """All four measures of all cases on one page."""
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(9.0, 5.2), layout="constrained")
+        axes = figure.subplots(2, 2, sharex=True)
+        for panel, draw in zip(axes.flat, (frequency, MPSI, voltage, MQSI), strict=True):
+            draw(panel, drawing)
+            mark_events(panel, drawing, labelled=draw in (frequency, MPSI))
+        for panel in axes[0]:
+            panel.set_xlabel("")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 9.0))
+    return figure
+
+
+def single(drawing: Drawing, draw: Callable[[Axes, Drawing], None]) -> Figure:
+    """One quantity of all cases on a page of its own."""
+    figure = Figure(figsize=(6.4, 3.2), layout="constrained")
+    axes = figure.subplots()
+    draw(axes, drawing)
+    mark_events(axes, drawing, labelled=True)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 6.4))
+    return figure
+
+
+def frequency(axes: Axes, drawing: Drawing) -> None:
+    """Frequency over time."""
+    curves(axes, drawing, metrics.mean_frequency)
+    axes.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
+    axes.set_title("Frequency", loc="left")
+    axes.set_ylabel("mean of the GFM, f (Hz)")
+    axes.ticklabel_format(axis="y", useOffset=False)
+
+
+def MPSI(axes: Axes, drawing: Drawing) -> None:
+    """Mean power sharing index over time, (16)."""
+    curves(axes, drawing, metrics.MPSI)
+    axes.set_title("Mean power sharing index, MPSI", loc="left")
+    axes.set_ylabel("MPSI")
+    from_zero(axes, drawing, metrics.MPSI)
+
+
+def voltage(axes: Axes, drawing: Drawing) -> None:
+    """Mean voltage over time."""
+    curves(axes, drawing, metrics.mean_voltage)
+    axes.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
+    axes.set_title("Voltage", loc="left")
+    axes.set_ylabel("mean of all inverters, V (pu)")
+    axes.ticklabel_format(axis="y", useOffset=False)
+
+
+def MQSI(axes: Axes, drawing: Drawing) -> None:
+    """Mean var sharing index over time, (17)."""
+    curves(axes, drawing, metrics.MQSI)
+    axes.set_title("Mean var sharing index, MQSI", loc="left")
+    axes.set_ylabel("MQSI")
+    from_zero(axes, drawing, metrics.MQSI)
+
+
+def curves(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:
+    """One curve per case; the later ones lie on top."""
+    for number, (case, history) in enumerate(drawing.histories.items()):
+        colour, dashes, width = case_style(case, number)
+        label = words(drawing, case)
+        axes.plot(
+            history.t, quantity(history, drawing.plates), color=colour, linestyle=dashes, linewidth=width, label=label
+        )
+    time_axis(axes, drawing)

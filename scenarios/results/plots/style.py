@@ -1,0 +1,140 @@
+"""What all figures have in common: one style per case, the page, axes of time, marks of events.
+
+One colour and one dash pattern per case, the same in every figure, after Okabe and Ito's palette, which stays apart
+for colour-blind readers; with the patterns the curves can be told in a black-and-white print too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from scenarios.results.drawing import Drawing
+from scenarios.results.history import Floats, History, Plates
+
+Style = tuple[str, Any, float]
+"""Colour, dash pattern and line width."""
+
+CASE_STYLES: dict[str, Style] = {
+    "I": ("#7a7a7a", "-", 1.8),
+    "II": ("#d55e00", "-", 2.0),
+    "III": ("#009e73", "--", 1.6),
+    "IV": ("#0072b2", "-", 2.0),
+    "full": ("#0072b2", "-", 2.2),
+    "untuned": ("#e69f00", "--", 1.6),
+    "reduced": ("#d55e00", "-", 1.6),
+    "link-failure": ("#009e73", (0, (1, 1)), 1.8),
+    "350kW": ("#0072b2", "-", 2.0),
+    "275kW": ("#440154", "-", 1.6),
+    "250kW": ("#31688e", "--", 1.6),
+    "225kW": ("#21918c", "-.", 1.6),
+    "200kW": ("#8fbc3f", "-", 1.6),
+    "175kW": ("#d55e00", ":", 2.0),
+    "none": ("#d55e00", "-", 2.0),
+    "clamp": ("#0072b2", "-", 2.2),
+    "conditional": ("#000000", (0, (1, 3)), 1.6),
+}
+"""Styles of the paper's cases. The full graph under full coordination is always blue. III is dashed and thinner: where
+it lies upon II, both are seen. Less and less available power goes from dark to light, after the palette viridis."""
+
+OTHER_STYLES: tuple[Style, ...] = (
+    ("#0072b2", "-", 1.8),
+    ("#d55e00", "-", 1.8),
+    ("#009e73", "--", 1.8),
+    ("#cc79a7", "-.", 1.8),
+    ("#e69f00", "-", 1.8),
+    ("#56b4e9", "--", 1.8),
+)
+"""Styles of other cases, and of inverters, in turn."""
+
+MOVER: Style = ("#d55e00", "-", 2.2)
+"""Style of an inverter that leaves or joins, among all others."""
+
+STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "--", 1.2)}
+"""Styles of the others: grid-forming, or not."""
+
+PAGE: Any = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titlepad": 14,
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "figure.dpi": 150,
+    "savefig.dpi": 150,
+}
+"""Layout of every figure."""
+
+
+def case_style(case: str, number: int) -> Style:
+    """Style of a case: fixed for the paper's four, else in turn.
+
+    Examples
+    --------
+    >>> case_style("IV", 0) == CASE_STYLES["IV"], case_style("ring", 1) == OTHER_STYLES[1]
+    (True, True)
+    """
+    return CASE_STYLES.get(case, OTHER_STYLES[number % len(OTHER_STYLES)])
+
+
+def from_zero(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:
+    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
+    values = np.concatenate([quantity(history, drawing.plates) for history in drawing.histories.values()])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return
+    top, peak = max(float(np.quantile(values, 0.995)) * 1.15, 0.05), float(values.max())
+    axes.set_ylim(0.0, top)
+    if peak > top:
+        note_above(axes, f"spikes reach {peak:.2g}", 1.0, "axes fraction", "right")
+
+
+def time_axis(axes: Axes, drawing: Drawing) -> None:
+    """Name the axis of time, from 0 to the end of the run."""
+    axes.set_xlabel("time (s)")
+    axes.set_xlim(0.0, max(float(history.t[-1]) for history in drawing.histories.values()))
+
+
+def mark_events(axes: Axes, drawing: Drawing, *, labelled: bool) -> None:
+    """Draw a fine line at each event, with its label above the frame, clear of the curves."""
+    for label, t in drawing.events:
+        axes.axvline(t, color="#000000", linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
+        if labelled:
+            note_above(axes, label, t, "data", "center")
+
+
+def note_above(axes: Axes, text: str, x: float, of: str, side: Literal["center", "right"]) -> None:
+    """Write small words above the frame, at x of the data or of the frame."""
+    axes.annotate(
+        text,
+        (x, 1.0),
+        xycoords=(of, "axes fraction"),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha=side,
+        fontsize=7,
+        color="#444444",
+    )
+
+
+def words(drawing: Drawing, case: str) -> str:
+    """Name of a case and what it is, for legends and titles."""
+    title = drawing.titles.get(case, "")
+    return f"{case}: {title}" if title else case
+
+
+def columns(labels: Sequence[str], width: float) -> int:
+    """How many columns of a legend fit below a figure of this width (inches), without a lonely last entry."""
+    longest = max((len(label) for label in labels), default=1)
+    fit = max(1, int(width / (0.075 * longest + 0.6)))
+    rows = -(-len(labels) // fit)
+    return -(-len(labels) // rows) if labels else 1
