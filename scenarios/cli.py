@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from scenarios.experiments.command import experiment
 from scenarios.live.commands import register
 from scenarios.predict.command import predict
 from scenarios.sweep.command import sweep
@@ -221,4 +222,5 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
 
 app.command()(sweep)
 app.command()(predict)
+app.command()(experiment)
 register(app)

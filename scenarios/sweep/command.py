@@ -17,7 +17,7 @@ _PACKAGES = {"joblib": "the runs over all cores", "pyarrow": "the table", "matpl
 
 
 def sweep(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a sweep file, or a name: gains, topology.")],
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a sweep file, or a name, e.g. gains, topology.")],
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
@@ -39,7 +39,7 @@ def sweep(
     """
     from scenarios.spec import ScenarioError
 
-    _require(_PACKAGES | ({"distributed": "--dask"} if dask else {}))
+    check_packages(dask=bool(dask))
     from scenarios.sweep.file import read_sweep
 
     try:
@@ -50,18 +50,42 @@ def sweep(
     if dry_run:
         typer.echo(_size(file, plan))
         return
-    _run(file, plan, out, jobs, dask or "")
-
-
-def _run(file: str, plan: Plan, out: Path | None, jobs: int | None, dask: str) -> None:
     import shlex
+
+    from scenarios.sweep.folder import folder_of
+
+    again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
+    for line in _told(summary):
+        typer.echo(line)
+    raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
+
+
+def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: str) -> Summary:
+    """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
+
+    Parameters
+    ----------
+    file : str
+        What the user calls it.
+    plan : Plan
+        The sweep.
+    path : Path
+        Its folder.
+    jobs : int or None
+        Processes; None is one per core.
+    dask : str
+        Address of a scheduler to use instead, or nothing.
+    again : str
+        The command that goes on with what was interrupted.
+    """
     import signal
 
     from rich.console import Console
 
     from scenarios.results.folder import FolderError, shown
     from scenarios.run import TerminatedError
-    from scenarios.sweep.folder import SweepFolder, folder_of
+    from scenarios.sweep.folder import SweepFolder
     from scenarios.sweep.progress import progress
     from scenarios.sweep.study import study
     from scenarios.sweep.workers import WorkersError, cores
@@ -70,15 +94,13 @@ def _run(file: str, plan: Plan, out: Path | None, jobs: int | None, dask: str) -
         raise TerminatedError
 
     before = signal.signal(signal.SIGTERM, terminate)
-    path = folder_of(out, plan.name)
-    again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
     console = Console()
     try:
         with SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
             try:
                 with progress(console, len(plan.runs)) as tell:
-                    summary = study(plan, folder, tell, jobs=jobs or cores(), dask=dask)
+                    return study(plan, folder, tell, jobs=jobs or cores(), dask=dask)
             except (KeyboardInterrupt, WorkersError) as error:
                 kept = f"{len(folder.done)} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
                 if isinstance(error, WorkersError):
@@ -88,9 +110,6 @@ def _run(file: str, plan: Plan, out: Path | None, jobs: int | None, dask: str) -
         fail([str(error)], BAD_INPUT)
     finally:
         signal.signal(signal.SIGTERM, before)
-    for line in _told(summary):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
 
 
 def _told(summary: Summary) -> list[str]:
@@ -115,10 +134,11 @@ def _size(file: str, plan: Plan, done: int = 0) -> str:
     return f"{file}: {len(plan.runs)} runs ({samples} samples of {plan.base.name}) over {varied}{left}"
 
 
-def _require(modules: dict[str, str]) -> None:
+def check_packages(*, dask: bool = False) -> None:
     """End with what to install when a package of the extra `sweep` is missing."""
     from importlib.util import find_spec
 
+    modules = _PACKAGES | ({"distributed": "--dask"} if dask else {})
     missing = [
         f"{name} is not installed; {what} cannot do without" for name, what in modules.items() if not find_spec(name)
     ]

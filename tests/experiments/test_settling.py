@@ -20,7 +20,7 @@ PLATES = Plates(
 
 
 def test_frequency_and_sharing_are_timed_apart_and_a_swing_is_seen_where_it_is() -> None:
-    """f comes back at 1.5 s, sharing at 2.5 s after the event; then V of the follower swings by 0.02 pu, f by 0.004 Hz."""
+    """The frequency is back after 1.5 s, sharing after 2.5 s; then V of one swings by 0.02 pu, f by 0.004 Hz."""
     t = np.arange(0.0, 10.005, 0.01)
     late = 1.0 + 1e-9
     f = np.where(t < late + 1.49, 59.9, 60.0) + 0.002 * np.cos(2.0 * np.pi * t)

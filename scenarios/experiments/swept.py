@@ -1,0 +1,108 @@
+"""The rows of a sweep that an experiment draws from, and what theory says of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from netem.spec.netem import Netem
+from plant.equipment import Feeder
+from plant.tables import read_feeder
+from scenarios.predict.fleet import Fleet, fleet_of
+from scenarios.predict.loads import load_steps
+from scenarios.predict.sensitivity import Sensitivity, sensitivity
+from scenarios.predict.times import LoadStep
+from scenarios.results.history import Floats
+from scenarios.spec import Scenario
+
+Row = Mapping[str, Any]
+"""Columns of one run."""
+
+_ALL: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swept:
+    """A sweep that is done.
+
+    Examples
+    --------
+    >>> rows = [{"case": "a", "link[0].delay": d, "e.t_f_s": t} for d, t in ((0.1, 2.0), (0.0, 1.0), (0.2, None))]
+    >>> swept = Swept(rows=rows, base=None, window="e")
+    >>> swept.curve("link[0].delay", "t_f_s", {"case": "a"})
+    (array([0. , 0.1, 0.2]), array([ 1.,  2., inf]))
+    """
+
+    rows: Sequence[Row]
+    """All runs, in the order of the sweep."""
+    base: Scenario
+    """The scenario that was varied."""
+    window: str
+    """Label of the event that is measured."""
+    _fleets: dict[str, Fleet] = field(default_factory=dict)
+
+    def where(self, equal: Mapping[str, Any] = _ALL) -> Iterator[Row]:
+        """Rows whose columns have these values."""
+        return (row for row in self.rows if all(row[name] == value for name, value in equal.items()))
+
+    def values(self, column: str, equal: Mapping[str, Any] = _ALL) -> list[Any]:
+        """Different values of a column, sorted."""
+        return sorted({row[column] for row in self.where(equal)})
+
+    def measure(self, row: Row, index: str) -> float:
+        """An index of a row: infinite for a time that never came, not a number where a run broke."""
+        value = row[f"{self.window}.{index}"]
+        if value is not None:
+            return float(value)
+        return np.inf if index.startswith("t_") and row.get("status") != "broke" else np.nan
+
+    def median(self, index: str, equal: Mapping[str, Any]) -> float:
+        """Median of an index over the rows whose columns have these values."""
+        return float(np.median([self.measure(row, index) for row in self.where(equal)]))
+
+    def curve(
+        self, x: str, index: str, equal: Mapping[str, Any], over: Callable[[Floats], Any] = np.median
+    ) -> tuple[Floats, Floats]:
+        """An index against a column, by default the median over all other columns."""
+        at = self.values(x, equal)
+        found = [
+            float(over(np.array([self.measure(row, index) for row in self.where({**equal, x: value})]))) for value in at
+        ]
+        return np.array(at, float), np.array(found)
+
+    # ---------------------------------------------------------------- what theory needs
+
+    @cached_property
+    def feeder(self) -> Feeder:
+        """The feeder."""
+        return read_feeder(self.base.plant.feeder, self.base.plant.load_set)
+
+    @cached_property
+    def calm(self) -> Scenario:
+        """The scenario with links that do nothing, and an end before long."""
+        time = msgspec.structs.replace(self.base.time, end_s=self.base.events[0].t_s + 3.0)
+        return msgspec.structs.replace(self.base, netem=Netem(), time=time)
+
+    @cached_property
+    def load(self) -> LoadStep:
+        """The step of load of the event, from the plant on droop alone."""
+        (step,) = (step for step in load_steps(self.calm, self.feeder) if step.label == self.window)
+        assert step.load is not None
+        return step.load
+
+    @cached_property
+    def answers(self) -> Sensitivity:
+        """How voltages and vars answer to V_set."""
+        return sensitivity(self.calm, self.feeder)
+
+    def fleet(self, case: str) -> Fleet:
+        """The inverters under the rule of a case."""
+        if case not in self._fleets:
+            self._fleets[case] = fleet_of(self.base, self.feeder, case)
+        return self._fleets[case]

@@ -1,0 +1,88 @@
+"""The cases of a scenario with their histories, for experiments that are seen over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import msgspec
+import numpy as np
+
+from netem.spec.netem import Netem
+from plant.equipment import Feeder
+from scenarios.predict.fleet import Fleet, fleet_of
+from scenarios.predict.loads import load_steps
+from scenarios.predict.times import LoadStep
+from scenarios.results import metrics
+from scenarios.results.history import Floats, History, Plates
+from scenarios.results.metrics import Window
+from scenarios.results.settling import Settling, settling
+from scenarios.spec import Scenario
+from scenarios.spec.configs import F_NOM
+from scenarios.spec.moves import inverters_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """A scenario that was run."""
+
+    scenario: Scenario
+    feeder: Feeder
+    histories: Mapping[str, History]
+    """By case."""
+
+    @cached_property
+    def plates(self) -> Plates:
+        """Nameplates in the order of the histories' columns."""
+        return Plates.of(inverters_of(self.scenario, self.feeder))
+
+    def f(self, case: str) -> Floats:
+        """Frequency (Hz), mean of the GFM."""
+        return metrics.mean_frequency(self.histories[case], self.plates)
+
+    def MPSI(self, case: str) -> Floats:
+        """Mean power sharing index, (16)."""
+        return metrics.MPSI(self.histories[case], self.plates)
+
+    def MQSI(self, case: str) -> Floats:
+        """Mean var sharing index, (17)."""
+        return metrics.MQSI(self.histories[case], self.plates)
+
+    def t(self, case: str) -> Floats:
+        """Time of the rows (s)."""
+        return self.histories[case].t
+
+    def settling(self, case: str, start: float, end: float) -> Settling:
+        """How a case settled from a time to another (s)."""
+        return settling(self.histories[case], self.plates, Window(label="", start=start, end=end), F_NOM)
+
+    def mean(self, x: Floats, case: str, end: float) -> float:
+        """Mean (of what x is) over the 0.2 s before a time (s), as steady values are measured."""
+        t = self.t(case)
+        return float(x[(t >= end - metrics.STEADY - 1e-9) & (t < end - 1e-9)].mean())
+
+    def fleet(self, case: str) -> Fleet:
+        """The inverters under the rule of a case."""
+        return fleet_of(self.scenario, self.feeder, case)
+
+    @cached_property
+    def loads(self) -> dict[str, LoadStep]:
+        """The step of load of each event, from the plant on droop alone."""
+        calm = msgspec.structs.replace(self.scenario, netem=Netem())
+        return {step.label: step.load for step in load_steps(calm, self.feeder) if step.load is not None}
+
+
+def cut_between(fleet: Fleet, groups: Mapping[str, str]) -> set[tuple[str, str]]:
+    """Links (src, dst) between members of different groups."""
+    names = [name for name in fleet.names if name in groups]
+    return {(a, b) for a in names for b in names if groups[a] != groups[b]}
+
+
+def without(fleet: Fleet, links: set[tuple[str, str]]) -> Fleet:
+    """The fleet as if these links (src, dst) were not there."""
+    A = np.array(fleet.A)
+    for src, dst in links:
+        A[fleet.names.index(dst), fleet.names.index(src)] = 0.0
+    fields = {name: getattr(fleet, name) for name in ("GFM", "acts", "s", "m_p", "m_q", "gains", "T_c", "gfm", "gfl")}
+    return Fleet(names=fleet.names, A=A, **fields)
