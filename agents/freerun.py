@@ -25,11 +25,12 @@ from msgspec.structs import replace
 
 from agents.config import AgentConfig
 from agents.hearing import PATIENCE, Hearing, patience_after
+from agents.orders import Orders
 from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
 from wire.links import Links
-from wire.messages import PLANT, AgentStatus, AnyMessage, Leave, Measurement, Nameplate, State, Stop
+from wire.messages import PLANT, AgentStatus, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop
 from wire.timer import Timer
 
 Phase = Literal["seeking", "waiting", "running"]
@@ -65,6 +66,8 @@ class FreeAgent(Side):
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
         super().__init__(config, instance, links)
+        self._orders = Orders(config.name, config.incarnation, links)
+        self._routes[self.keys.order(config.name)] = (PLANT, self._on_order)
         self.phase: Phase = "seeking"
         self.astray = False
         """Whether it closes only to begin again with a new session."""
@@ -92,6 +95,8 @@ class FreeAgent(Side):
         self._measurement: Measurement | None = None
         self._measured_at = 0.0
         """When the last measurement arrived, over the links."""
+        self._run_time = 0.0
+        """That of the last measurement that came off the wire (s)."""
         self._claims: dict[str, list[str]] = {}
         """Tokens that are there: name -> its instances, the one that counts first."""
         self._met: set[str] = set()
@@ -110,7 +115,7 @@ class FreeAgent(Side):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         keys, name = self.keys, self._name
-        return keys.state(name), keys.leave(name), keys.status(name), keys.report(name)
+        return keys.state(name), keys.leave(name), keys.status(name), keys.report(name), keys.obeyed(name)
 
     @property
     def over(self) -> bool:
@@ -309,17 +314,31 @@ class FreeAgent(Side):
     def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
+        self._check_life(message)
+        self._count(message, now)
+        self._run_time = message.t
+        if not self._is_offered(message, payload, now * self._config.speed):
+            self._measurement, self._measured_at = message, now
+
+    def _check_life(self, message: AnyMessage) -> None:
+        """Refuse what an earlier plant said; of another one, begin anew."""
         life = self._plant_incarnation
         if message.incarnation < life:
             raise RejectedError("ghost", f"life {message.incarnation} of the plant, now it lives {life}")
         if message.incarnation > life:
             if life:
                 self._hold("the plant has a new life; starts from what it measures")
+                self._orders.restart()
             self._plant_incarnation = message.incarnation
             self._came.pop(PLANT, None)
-        self._count(message, now)
-        if not self._is_offered(message, payload, now * self._config.speed):
-            self._measurement, self._measured_at = message, now
+
+    def _on_order(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        if not isinstance(message, LinkOrder):
+            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a LinkOrder")
+        self._check_life(message)
+        answer = self._orders.take(message, self._run_time)
+        if answer is not None:
+            self._publish(self.keys.obeyed(self._name), encode(answer))
 
     def _count(self, message: AnyMessage, now: float) -> None:
         """Note what came off the wire, and how many did not."""
@@ -355,6 +374,8 @@ class FreeAgent(Side):
         if reason:
             raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
         self._count(message, now)
+        if self._links is not None and PLANT not in self._came:
+            return  # the plant tells what was ordered before it sends a measurement: till then no link is known
         if not self._is_offered(message, payload, now * self._config.speed):
             self._agent.hear(message)
             self._heard[message.sender] = message, now
@@ -430,6 +451,7 @@ class FreeAgent(Side):
             ticks=self.ticks,
             missed=self.missed,
             lateness=self._lateness,
+            impaired=() if self._links is None else self._links.impaired(self._run_time),
         )
         self._lateness = 0.0
         self._publish(self.keys.status(self._name), encode(status))

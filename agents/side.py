@@ -139,10 +139,8 @@ class Side:
 
     def _report_links(self, *, final: bool = False) -> None:
         """Send what the emulated links did of late."""
-        if self._links is None:
-            return
-        *first, last = self._links.report()
-        for data in (*first, last):
+        parts = () if self._links is None else self._links.report(last=final)
+        for data in parts:
             report = LinkReport(
                 sender=self._name,
                 incarnation=self._config.incarnation,
@@ -150,7 +148,7 @@ class Side:
                 t=0.0,
                 data=data,
                 instance=self._instance,
-                final=final and data is last,
+                final=final and data is parts[-1],
             )
             self._publish(self.keys.report(self._name), encode(report))
 

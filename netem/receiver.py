@@ -17,7 +17,7 @@ from netem.channel import FOREVER, NEVER, Channel
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models.corrupt import flip
 from netem.spec.change import Change, Heal, changed, schedule_of
-from netem.spec.fault import Fault
+from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
 
@@ -104,6 +104,11 @@ class Receiver:
     def touched(self, src: str) -> bool:
         """Whether a fault may ever act on the link from somebody: if not, its messages need not come here at all."""
         return not self._link(src).channel.is_clear
+
+    def holding(self, src: str, t: float) -> dict[str, Span]:
+        """What the link from somebody does to messages sent at t (s of run time), by kind."""
+        channel = self._link(src).channel
+        return {} if channel.is_clear else channel.schedule.at(t).active
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
         """Judge a message.

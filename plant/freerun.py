@@ -21,15 +21,17 @@ from typing import Literal
 
 from plant.config import PlantConfig
 from plant.interface import LivePlant
+from plant.orders import Orders
 from plant.pacing import TOLERATED, Pacer, sentence
 from plant.reporting import measurement_of
-from plant.service import Service
+from plant.service import NO_LINKS, Service
 from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Fetch, Say
+from wire.clock import time_of
 from wire.codec import RejectedError, decode, encode
 from wire.keys import check_name
 from wire.links import Links
-from wire.messages import PLANT, Command, Leave, LinkReport, Nameplate, PlantEvent, State
+from wire.messages import PLANT, Command, Leave, LinkAnswer, LinkOrder, LinkReport, Nameplate, PlantEvent, State
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
@@ -81,6 +83,8 @@ class FreePlant(Side):
         self._deadline = 0.0
         self._complained = False
         self._service = Service(self)
+        self._orders = Orders(config.incarnation)
+        self._obeyed_keys = {self.keys.obeyed(name): name for name in plant.inverters}
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
         self._report_keys = {self.keys.report(name) for name in plant.inverters}
         self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
@@ -90,12 +94,14 @@ class FreePlant(Side):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return *self._state_keys, *self._leave_keys, *self._report_keys, self.keys.command
+        return *self._state_keys, *self._leave_keys, *self._report_keys, *self._obeyed_keys, self.keys.command
 
     @property
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
-        return self.keys.control, self.keys.telemetry, *map(self.keys.measurement, self.plant.inverters)
+        inverters = self.plant.inverters
+        each = (*map(self.keys.measurement, inverters), *map(self.keys.order, inverters))
+        return self.keys.control, self.keys.telemetry, *each
 
     @property
     def over(self) -> bool:
@@ -186,6 +192,7 @@ class FreePlant(Side):
 
     def _drop(self, name: str) -> None:
         del self.instances[name]
+        self._orders.forget(name)
         for known in (self.plates, self._states, self._last, self._asked, self._heard, self._set_by):
             known.pop(name, None)
 
@@ -205,6 +212,10 @@ class FreePlant(Side):
                     self._states[name] = message
             elif key in self._report_keys and isinstance(message, LinkReport):
                 self._publish(self.keys.telemetry, payload)
+            elif key in self._obeyed_keys and isinstance(message, LinkAnswer):
+                self._check_sender(self._obeyed_keys[key], message)
+                self._orders.done(name, message.seq)
+                self._pass_on(message)
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
                 self._on_leave(name, now)
@@ -224,6 +235,7 @@ class FreePlant(Side):
         self.plates[name] = plate
         self._connect(name, True, now)
         self._note(name, f"{name} joined")
+        self._send_orders(now)
         self._gather(now)
 
     def _on_leave(self, name: str, now: float) -> None:
@@ -240,6 +252,10 @@ class FreePlant(Side):
             raise RejectedError("garbled", str(error)) from None
         answer = self._service.serve(command)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
+        if answer.ok and command.verb == "link":
+            self._send_orders(now)
+        elif answer.ok and command.verb == "links":
+            self._ask_links(command.reply_to)
         if command.verb == "down":
             self.close("the run was ended by command", now)
 
@@ -249,6 +265,70 @@ class FreePlant(Side):
         except RuntimeError as error:
             self.cause = error
             self.abort(str(error), now)
+
+    # ---------------------------------------------------------------- emulated links
+
+    def order(self, text: str, reply_to: str) -> LinkOrder:
+        """Have links do what a person ordered, from the tick after the next measurement on: till then all know of it.
+
+        Raises
+        ------
+        ValueError
+            If it is no order, or the run has no emulated links.
+        """
+        if self._links is None:
+            raise ValueError(NO_LINKS)
+        said = self._links.told(text)
+        t = time_of(self.tick + 1, self.config.T_c) if self.phase == "running" else self.t
+        self._links.order(text, t)
+        order = self._orders.give(text, t, reply_to)
+        text = f"order {order.seq} to links: {said}, from t = {t:g} s on"
+        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=text))
+        self._publish(self.keys.telemetry, encode(order))
+        return order
+
+    def _send_orders(self, now: float) -> None:
+        """Send everybody the orders that he has not been sent, or not answered."""
+        for name in self.plates:
+            for order in self._orders.due(name, now):
+                self._publish(self.keys.order(name), encode(order))
+
+    def _ask_links(self, reply_to: str) -> None:
+        """Have everybody tell how his links stand, and tell it of the own."""
+        question = encode(self._orders.question(self.t, reply_to))
+        for name in self.plates:
+            self._publish(self.keys.order(name), question)
+        assert self._links is not None
+        self._pass_on(
+            LinkAnswer(
+                sender=PLANT,
+                incarnation=self.config.incarnation,
+                seq=0,
+                t=self.t,
+                ok=True,
+                text="",
+                reply_to=reply_to,
+                data=self._links.standing(self.t),
+            )
+        )
+
+    def _pass_on(self, answer: LinkAnswer) -> None:
+        """Give the answer to an order to who gave it."""
+        try:
+            check_name("reply_to", answer.reply_to)
+        except ValueError as error:
+            raise RejectedError("garbled", str(error)) from None
+        self._publish(self.keys.answer(answer.reply_to), encode(answer))
+
+    @property
+    def has_links(self) -> bool:
+        """Whether orders to emulated links can be given."""
+        return self._links is not None
+
+    @property
+    def impaired(self) -> tuple[str, ...]:
+        """Agents between whom and the plant a fault holds now."""
+        return () if self._links is None else self._links.impaired(self.t)
 
     # ---------------------------------------------------------------- steps
 
@@ -287,6 +367,7 @@ class FreePlant(Side):
             self._keep_pace(now)
             if self.phase == "running":
                 self._move()
+                self._send_orders(now)
                 self._measure(now)
                 for name in sorted(self.instances.keys() - self.plates.keys()):
                     if now - self._asked[name] >= AGAIN:
@@ -368,4 +449,6 @@ class FreePlant(Side):
 
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
-        self._telemetry(final=final, reproducible=False, awaited=awaited, pacing=self.pacer.report())
+        self._telemetry(
+            final=final, reproducible=False, awaited=awaited, pacing=self.pacer.report(), impaired=self.impaired
+        )

@@ -79,6 +79,7 @@ class Reporter:
         reproducible: bool,
         pacing: Pacing | None = None,
         awaited: tuple[str, ...] = (),
+        impaired: tuple[str, ...] = (),
     ) -> Iterator[Telemetry]:
         """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
         inverters = self._plant.inverters
@@ -101,6 +102,7 @@ class Reporter:
                 reproducible=reproducible,
                 pacing=pacing,
                 awaited=() if rows else awaited,
+                impaired=impaired,
             )
             self._seq += 1
             if not rows:

@@ -11,6 +11,9 @@ from wire.messages import PLANT, Answer, Command
 if TYPE_CHECKING:
     from plant.freerun import FreePlant
 
+NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
+"""What is answered to an order in vain."""
+
 
 class Service:
     """Serves commands.
@@ -30,14 +33,16 @@ class Service:
         try:
             if side.phase not in ("gathering", "running"):
                 raise ValueError("the run is ending")
-            text = self._do(command.verb, command.argument)
+            text = self._do(command)
             ok = True
         except ValueError as error:
             text, ok = str(error), False
         return Answer(sender=PLANT, incarnation=side.config.incarnation, seq=command.seq, t=side.t, ok=ok, text=text)
 
-    def _do(self, verb: str, argument: str) -> str:
-        side = self._side
+    def _do(self, command: Command) -> str:
+        side, verb, argument = self._side, command.verb, command.argument
+        if verb in ("link", "links"):
+            return msgspec.json.encode(self._ordered(command)).decode()
         if verb == "status":
             return msgspec.json.encode(self.status()).decode()
         if verb == "down":
@@ -51,6 +56,17 @@ class Service:
             return f"{argument} was asked to leave at t = {side.t:g} s"
         side.plant.switch(argument, verb)
         return f"switch {argument}: {verb} at t = {side.t:g} s"
+
+    def _ordered(self, command: Command) -> dict[str, Any]:
+        """Number of an order and when it begins to hold (s), and who will answer: the agents that are there."""
+        side = self._side
+        agents = [name for name in side.plant.inverters if name in side.plates]
+        if command.verb == "link":
+            order = side.order(command.argument, command.reply_to)
+            return {"number": order.seq, "t": order.t, "asked": agents}
+        if not side.has_links:
+            raise ValueError(NO_LINKS)
+        return {"number": 0, "t": side.t, "asked": agents}
 
     def status(self) -> dict[str, Any]:
         """How the run stands: times in s, delays in s of wall time."""
@@ -66,5 +82,6 @@ class Service:
             "agents": [name for name in side.plant.inverters if name in side.plates],
             "absent": [name for name in side.plant.inverters if name not in side.plates],
             "events": list(side.events),
+            "impaired": list(side.impaired),
             "rejected": sum(side.rejects.counts.values()),
         }

@@ -145,7 +145,7 @@ class Side:
         """Send the last telemetry, if it has not been sent."""
         if self._last_due:
             self._last_due = False
-            self._report_links()
+            self._report_links(last=True)
             self._report(final=True)
 
     def _forward(self, report: LinkReport, payload: bytes) -> None:
@@ -158,9 +158,9 @@ class Side:
                 raise RejectedError("garbled", str(error)) from None
             self.stop(self.keys.dismissal(report.sender, report.instance), "its report is here")
 
-    def _report_links(self) -> None:
+    def _report_links(self, *, last: bool = False) -> None:
         """Send what the emulated links to the plant did of late."""
-        for data in self._links.report() if self._links is not None else ():
+        for data in () if self._links is None else self._links.report(last=last):
             report = LinkReport(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, data=data)
             self._publish(self.keys.telemetry, encode(report))
 
@@ -171,10 +171,17 @@ class Side:
         reproducible: bool,
         awaited: tuple[str, ...] = (),
         pacing: Pacing | None = None,
+        impaired: tuple[str, ...] = (),
     ) -> None:
         """Send rows and events, and who is to be started."""
         messages = self._reporter.report(
-            self.t, final=final, outcome=self.outcome, reproducible=reproducible, pacing=pacing, awaited=awaited
+            self.t,
+            final=final,
+            outcome=self.outcome,
+            reproducible=reproducible,
+            pacing=pacing,
+            awaited=awaited,
+            impaired=impaired,
         )
         for message in messages:
             self._publish(self.keys.telemetry, encode(message))

@@ -98,6 +98,14 @@ class Keys:
         """What the emulated links into an agent did."""
         return f"{self._root}/report/{inverter}"
 
+    def order(self, inverter: str) -> str:
+        """What emulated links into an agent shall do."""
+        return f"{self._root}/order/{inverter}"
+
+    def obeyed(self, inverter: str) -> str:
+        """Orders that the links into an agent have taken."""
+        return f"{self._root}/obeyed/{inverter}"
+
     def status(self, inverter: str) -> str:
         """How the agent of an inverter fares."""
         return f"{self._root}/status/{inverter}"
@@ -194,12 +202,21 @@ def describe() -> tuple[KeySpec, ...]:
             "at every tick, once its measurement and the neighbours' states of the tick before are in",
         ),
         row(
-            keys.telemetry, "publication", "Telemetry, LinkReport", "plant", "recorders",
+            keys.telemetry, "publication", "Telemetry, LinkReport, LinkOrder", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
         ),
         row(
             keys.report(agent), "publication", "LinkReport", "agent", "plant, who publishes it on telemetry",
             "in a run with emulated links: every 100 ticks, and when it ends",
+        ),
+        row(
+            keys.order(agent), "publication", "LinkOrder", "plant", "agent",
+            "wall-clock: when somebody gives an order to emulated links, and all of them to who comes later; again "
+            "every second, until it is answered",
+        ),
+        row(
+            keys.obeyed(agent), "publication", "LinkAnswer", "agent", "plant, who publishes it on the asker's key",
+            "wall-clock: one for every LinkOrder that came in its turn",
         ),
         row(
             keys.leave(agent), "publication", "Leave", "agent", "plant",
@@ -218,7 +235,7 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: once the plant's token is there",
         ),
         row(
-            keys.answer("ASKER"), "publication", "Answer", "plant", "the command line that asked",
-            "wall-clock: one for every command",
+            keys.answer("ASKER"), "publication", "Answer, LinkAnswer", "plant", "the command line that asked",
+            "wall-clock: one Answer for every command; to an order to links the LinkAnswer of everybody, too",
         ),
     )  # fmt: skip

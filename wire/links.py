@@ -66,6 +66,28 @@ class Links(Protocol):
         """
         ...
 
-    def report(self) -> tuple[bytes, ...]:
-        """Take out what the links did since last asked, for the record."""
+    def told(self, text: str) -> str:
+        """Say an order for people, in one line.
+
+        Raises
+        ------
+        ValueError
+            If it is no order to links, or none that can be meant.
+        """
+        ...
+
+    def impaired(self, t: float) -> tuple[str, ...]:
+        """From whom links have a fault at t (s of run time)."""
+        ...
+
+    def standing(self, t: float) -> bytes:
+        """How the links stand at t (s of run time), for who asked."""
+        ...
+
+    def restart(self) -> None:
+        """Begin anew, without what was ordered and what is on its way: the run's time starts from 0 again."""
+        ...
+
+    def report(self, *, last: bool = False) -> tuple[bytes, ...]:
+        """Take out what the links did since last asked, for the record; the last time, something in any case."""
         ...

@@ -17,8 +17,8 @@ PLANT = "plant"
 Name = Annotated[str, msgspec.Meta(max_length=64)]
 """A name on the wire: never longer than 64 characters."""
 
-Text = Annotated[str, msgspec.Meta(max_length=200)]
-"""What a person typed: never longer than a line."""
+Words = Annotated[str, msgspec.Meta(max_length=4000)]
+"""An order to links, as text that no core reads."""
 
 Number = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
 """A finite number: NaN and the infinities fail these bounds, and the message with them."""
@@ -135,13 +135,36 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
     """Whether this is the last part: the sender closes once it is told."""
 
 
+class LinkOrder(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """What emulated links shall do to messages sent at `t` or later; number 0 asks how they stand (plant -> agent)."""
+
+    text: Words
+    """What a person ordered, for the agent's links."""
+    reply_to: Name
+    """Who wants to know: last part of the key under which the plant passes the `LinkAnswer` on."""
+
+
+class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """Links have taken the order of number `seq`, or stand as asked (agent -> plant -> command line)."""
+
+    ok: bool
+    """Whether it was done."""
+    text: str
+    """Which links it concerned, or why it was not done."""
+    reply_to: Name
+    """Of the order."""
+    data: bytes = b""
+    """How the links stand, to number 0; no core looks into it."""
+
+
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A person wants something of the plant (command line -> plant, wall-clock time)."""
 
-    verb: Literal["open", "close", "stop", "down", "status"]
-    """Open or close a switch; have an agent leave; end the run; tell how it stands."""
-    argument: Text = ""
-    """Name of the switch or of the agent; empty for the others."""
+    verb: Literal["open", "close", "stop", "down", "status", "link", "links"]
+    """Open or close a switch; have an agent leave; end the run; tell how it stands; order emulated links to do
+    something; ask all of them how they stand."""
+    argument: Words = ""
+    """Name of the switch or of the agent; the order; empty for the others."""
     reply_to: Name
     """Unique id of who asks: last part of the key of the `Answer`."""
 
@@ -152,7 +175,7 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
     ok: bool
     """Whether it was done."""
     text: str
-    """One sentence for a person; the answer to "status" is one JSON object."""
+    """One sentence for a person; the answers to "status", "link", "links" are one JSON object each."""
 
 
 class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -184,6 +207,8 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Ticks skipped since its start, as their time was over."""
     lateness: Number
     """Longest delay of a tick behind its time since the last status (s of wall time)."""
+    impaired: tuple[Name, ...] = ()
+    """Senders between whom and this agent an emulated fault holds now."""
 
 
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -191,7 +216,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: float
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "inverter", "limit", "roster", "warning"]
+    kind: Literal["switch", "island", "dead", "inverter", "limit", "roster", "link", "warning"]
     """What sort of event."""
     subject: str
     """The switch, island or agent concerned."""
@@ -240,6 +265,8 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     """How well the plant keeps real time; only in wall-clock time."""
     awaited: tuple[Name, ...] = ()
     """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
+    impaired: tuple[Name, ...] = ()
+    """Agents between whom and the plant an emulated fault holds now; only in wall-clock time."""
 
 
 AnyMessage = (
@@ -251,6 +278,8 @@ AnyMessage = (
     | Stop
     | Leave
     | LinkReport
+    | LinkOrder
+    | LinkAnswer
     | Command
     | Answer
     | AgentStatus
@@ -259,6 +288,7 @@ AnyMessage = (
 """Everything that can arrive."""
 
 MESSAGES = (
-    Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, LinkReport, Command, Answer, AgentStatus, Telemetry,
+    Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, LinkReport, LinkOrder, LinkAnswer, Command, Answer,
+    AgentStatus, Telemetry,
 )  # fmt: skip
 """The types of `AnyMessage`, for documentation that is made from the code."""

@@ -16,6 +16,7 @@ from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.runtime import READY
 from scenarios.drivers.children import Child, Children
+from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.drivers.outcome import Outcome
 from wire.codec import RejectedError, Rejects, decode
 from wire.keys import Keys
@@ -51,8 +52,8 @@ def run_processes(
 ) -> Outcome:
     """Run a scenario with a plant process and one process per agent, in simulated or in wall-clock time.
 
-    In wall-clock time the plant ends the run after end / speed, and an agent that dies is only an event. Where the
-    scenario lets an agent join, or join again, its process is started when the plant says so.
+    In wall-clock time the plant ends the run after end / speed, an agent that dies is only an event, and whom the
+    scenario kills or pauses really is. Who joins, or joins again, is started when the plant says so.
 
     Parameters
     ----------
@@ -184,6 +185,7 @@ class _Watch:
         """Agents that the scenario lets join, and whose process is yet to be started."""
         self._inbox, self._T_c = session.inbox, config.T_c
         self._wall = config.clock == "wall"
+        self._misfortunes = Misfortunes(config.links if self._wall else "", config.speed)
         self._patience = 1.5 * config.deadline + 1.0
         """Longer than the plant's: it knows better what is wrong, unless it is what is wrong."""
         if self._wall:
@@ -203,7 +205,7 @@ class _Watch:
         since = self._began
         while not self._ended:
             patience = self._patience if self._standing else BUILD_DEADLINE
-            events = self._inbox.take(1, patience)
+            events = self._inbox.take(1, min(patience, self._misfortunes.wait))
             if events:
                 since = monotonic()
             elif monotonic() - since >= patience:
@@ -218,6 +220,8 @@ class _Watch:
                     self._standing = self._standing or key == _WORD + READY
                     self._on_status(key.removeprefix(_WORD))
             self._start_the_awaited(children)
+            self._misfortunes.strike(children)
+        self._misfortunes.end(children)
 
     def _start_the_awaited(self, children: Children) -> None:
         """Start whom the plant awaits, once the former process of the name has really ended."""
@@ -243,6 +247,8 @@ class _Watch:
             self._started = monotonic()
         self._last = telemetry
         self._t = telemetry.t
+        if telemetry.rows and not telemetry.final:
+            self._misfortunes.heard(telemetry.t - self._T_c, monotonic())  # it is a step ahead
         self._ticks = round(telemetry.t / self._T_c)
         self._events += telemetry.events
         self._awaited.update(telemetry.awaited)
@@ -253,6 +259,8 @@ class _Watch:
     def _note_exit(self, child: Child) -> None:
         if self._ended:
             return
+        if child.name in self._misfortunes.killed:
+            return  # as the scenario says; the plant tells it as an event
         if child.name != PLANT and child.status == 0:
             return  # it was asked to leave, perhaps by a Stop that is faster than the telemetry which goes with it
         report = child.report(self._when)
@@ -272,7 +280,7 @@ class _Watch:
     def note_failures(self, children: Children) -> None:
         """Note who ended badly, or has not ended though the run has."""
         for child in children:
-            told = child.name in self._notes or child.name == PLANT
+            told = child.name in self._notes or child.name == PLANT or child.name in self._misfortunes.killed
             if child.status != 0 and not told and not (self.broke and child.status is None):
                 self._notes[child.name] = child.report(self._when)
 

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from netem.receiver import Arrival, Receiver
-from netem.spec.change import Heal
 from netem.spec.fault import Fault
 from netem.spec.node import NodeFault
 from netem.spec.pattern import parse
 from scenarios.emulation.orders import Order
-from scenarios.emulation.report import parts
+from scenarios.emulation.report import LinkStand, encode_stands, parts
 from scenarios.emulation.setup import Setup
+from scenarios.emulation.words import words
+from wire.messages import PLANT
 
 
 class _Spell(NamedTuple):
@@ -38,8 +39,9 @@ class EmulatedLinks:
     """
 
     def __init__(self, name: str, setup: Setup) -> None:
-        self._name, self._microgrids = name, setup.microgrids
-        self._receiver = Receiver(name, setup.netem, setup.microgrids, keep_trace=setup.keep_trace)
+        self._name, self._microgrids, self._setup = name, setup.microgrids, setup
+        self._senders = tuple(src for src in (*setup.microgrids, PLANT) if src != name)
+        self.restart()
         self._spells: dict[str, list[_Spell]] = {}
         self._paused: Counter[str] = Counter()
         """Messages of each sender that it never sent, as it was paused: only the lock-step needed them."""
@@ -81,8 +83,9 @@ class EmulatedLinks:
         ValueError
             If it is no order.
         """
-        change = Order.of_text(text).change
-        links = [src for src in (*self._microgrids, "plant") if src != self._name and self._concerns(change, src)]
+        change = Order.of_text(text).at(t)
+        pattern = parse(change.on)
+        links = [src for src in self._senders if pattern.matches(src, self._name, self._microgrids)]
         if not links:
             return ""
         if isinstance(change, Fault):
@@ -91,13 +94,39 @@ class EmulatedLinks:
             self._receiver.heal(change.on, t, change.kinds)
         return f"{', '.join(links)} -> {self._name}"
 
-    def _concerns(self, change: Fault | Heal, src: str) -> bool:
-        return parse(change.on).matches(src, self._name, self._microgrids)
+    def told(self, text: str) -> str:
+        """Say an order in words; ValueError if it is none, or has mistakes."""
+        order = Order.of_text(text)
+        mistakes = order.mistakes(self._microgrids)
+        if mistakes:
+            raise ValueError("; ".join(f"{path}: {what}" for path, what in mistakes))
+        return str(order)
 
-    def report(self) -> tuple[bytes, ...]:
-        """Take out what the links did since last asked, as parts of a `LinkBook`."""
-        receiver = self._receiver
-        return parts(receiver.take_trace(), receiver.counts(), receiver.trace_sha256)
+    def impaired(self, t: float) -> tuple[str, ...]:
+        """From whom links have a fault at t (s of run time)."""
+        return tuple(src for src in self._senders if self._receiver.holding(src, t))
+
+    def standing(self, t: float) -> bytes:
+        """How the links stand at t (s of run time) that do something, or once did: `LinkStand` of each sender."""
+        counts, stands = self._receiver.counts(), {}
+        for src in self._senders:
+            holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
+            book = counts.get(src)
+            if holds or (book is not None and book.sent):
+                stands[src] = LinkStand(holds=holds, counts=book)
+        return encode_stands(stands)
+
+    def restart(self) -> None:
+        """Begin anew with what the scenario says: the run's time starts from 0 again."""
+        setup = self._setup
+        self._receiver = Receiver(self._name, setup.netem, setup.microgrids, keep_trace=setup.keep_trace)
+
+    def report(self, *, last: bool = False) -> tuple[bytes, ...]:
+        """Take out what the links did since last asked, as parts of a `LinkBook`; none if nothing was ever judged."""
+        receiver, counts = self._receiver, self._receiver.counts()
+        if not last and not any(book.sent for book in counts.values()):
+            return ()
+        return parts(receiver.take_trace(), counts, receiver.trace_sha256)
 
 
 def _spell(node: NodeFault) -> _Spell:

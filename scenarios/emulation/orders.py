@@ -1,28 +1,79 @@
-"""An order of a person to the links of a running run, as it travels."""
+"""An order of a person to the links of a running run: as it travels, what is wrong with it, and in words."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import msgspec
 
+from netem.mistakes import Mistake, seconds
 from netem.spec.change import Change, Heal
-from netem.spec.fault import Fault
+from netem.spec.fault import LONGEST_RUN, Fault
+from netem.spec.pattern import objections
+from scenarios.emulation.words import words
+
+EVERYTHING = "{*, plant} <-> {*, plant}"
+"""Pattern of all links there are."""
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Either a fault or its end."""
+    """Either a fault or its end. When it begins to hold is said beside it; times in it do not count."""
 
     fault: Fault | None = None
     """What links shall do."""
     heal: Heal | None = None
     """On which links what holds shall end."""
+    for_s: float | None = None
+    """For how long a fault holds (s of run time); without it, until it is healed."""
 
     @property
-    def change(self) -> Change:
+    def on(self) -> str:
+        """Which links."""
+        return self._change.on
+
+    @property
+    def _change(self) -> Change:
         """The one of the two that is given."""
         found = self.fault or self.heal
         if found is None or (self.fault and self.heal):
             raise ValueError("an order is either a fault or a heal")
         return found
+
+    def at(self, t: float) -> Change:
+        """What changes if it begins to hold at t (s of run time)."""
+        to_s = None if self.for_s is None else round(t + self.for_s, 9)
+        times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
+        return msgspec.structs.replace(self._change, **times)
+
+    def mistakes(self, microgrids: Mapping[str, str]) -> list[Mistake]:
+        """All that is wrong with it in a run of these inverters."""
+        links = [Mistake("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
+        return links + self.wrong_values()
+
+    def wrong_values(self) -> list[Mistake]:
+        """Values that cannot be meant, in whatever run."""
+        found = []
+        if self.fault is not None:
+            found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).mistakes()
+        if self.for_s is not None:
+            found += seconds("for", self.for_s, "a time of the run", high=LONGEST_RUN, above_zero=True)
+        return found
+
+    def __str__(self) -> str:
+        """As people are told.
+
+        Examples
+        --------
+        >>> print(Order(fault=Fault(on="inv1 -> inv4", delay=0.1, loss=0.2), for_s=5.0))
+        inv1 -> inv4: loss 0.2, delay 0.1 s, for 5 s
+        >>> print(Order(heal=Heal(on=EVERYTHING, from_s=0.0)))
+        all links: healed
+        """
+        where = "all links" if self.on == EVERYTHING else self.on
+        if self.fault is None:
+            return f"{where}: healed"
+        faults = [words(kind, model) for kind, model in self.fault.models().items()]
+        return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def to_text(self) -> str:
         """As it travels."""
@@ -35,5 +86,5 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             order = msgspec.json.decode(text, type=cls)
         except msgspec.DecodeError as error:
             raise ValueError(f"no order to links: {error}") from None
-        order.change  # noqa: B018  that it is one of the two
+        order.on  # noqa: B018  that it is one of the two
         return order

@@ -18,6 +18,21 @@ class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Hash (hex) of all verdicts so far."""
 
 
+class LinkStand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How a link stands while the run goes on."""
+
+    holds: tuple[str, ...] = ()
+    """What it does now, each fault in words."""
+    counts: LinkCounts | None = None
+    """How its messages have fared so far; None if none was judged."""
+
+
+encode_stands = msgspec.msgpack.Encoder().encode
+"""Bytes of the stands of a receiver's links, by sender."""
+
+decode_stands = msgspec.msgpack.Decoder(dict[str, LinkStand]).decode
+"""Stands of the bytes; msgspec.DecodeError if there are none."""
+
 encode_book = msgspec.msgpack.Encoder().encode
 """Bytes of a book."""
 

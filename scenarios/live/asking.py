@@ -15,7 +15,7 @@ from scenarios.live.visit import NobodyError, Visit
 from wire.codec import RejectedError, decode, encode
 from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
 
-Verb = Literal["open", "close", "stop", "down", "status"]
+Verb = Literal["open", "close", "stop", "down", "status", "link", "links"]
 
 ANSWER = 5.0
 """Longest wait (s) for the answer of a plant that is there."""
@@ -76,18 +76,24 @@ def configuration(visit: Visit, name: str) -> AgentConfig:
     NobodyError
         If there is no such inverter.
     """
-    known: dict[str, AgentConfig] = {}
-    visit.fetch(visit.keys.config("*"))
-    end = monotonic() + PLATES
-    while name not in known and (left := end - monotonic()) > 0.0:
-        for _, payload in visit.take(left):
-            config = _plate(payload)
-            if config is not None:
-                known[config.name] = config
+    known = configurations(visit, name)
     if name not in known:
         there = f"inverters are {', '.join(in_order(known))}" if known else "the plant names none"
         raise NobodyError(f'no inverter "{name}" in {visit.where}; {there}')
     return known[name]
+
+
+def configurations(visit: Visit, name: str = "") -> dict[str, AgentConfig]:
+    """What the plant hands to agents, by name: of all those that came until that of `name`, or any, was there."""
+    known: dict[str, AgentConfig] = {}
+    visit.fetch(visit.keys.config("*"))
+    end = monotonic() + PLATES
+    while not (name in known if name else known) and (left := end - monotonic()) > 0.0:
+        for _, payload in visit.take(left):
+            config = _plate(payload)
+            if config is not None:
+                known[config.name] = config
+    return known
 
 
 def look(visit: Visit) -> Look:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Collection
 from pathlib import Path
+from time import monotonic
 
+from scenarios.live.book import Book
 from scenarios.live.show.events import line_of
 from scenarios.results.record import Recorder, RecordError
 from wire.codec import RejectedError, decode
 from wire.keys import Keys
-from wire.messages import Pacing, Telemetry
+from wire.messages import LinkOrder, LinkReport, Pacing, Telemetry
 from wire.session import Session
 
 _STOP = "stop"
@@ -33,6 +35,8 @@ class Chronicle:
         Folder for history.csv and events.csv; None records nothing.
     untold : Collection[str], optional
         Kinds of events that are told by others.
+    book : Book, optional
+        Takes what the plant tells of emulated links.
     """
 
     NAME = "chronicle"
@@ -46,14 +50,17 @@ class Chronicle:
         folder: Path | None = None,
         *,
         untold: Collection[str] = (),
+        book: Book | None = None,
     ) -> None:
         keys = Keys(run)
-        self._tell, self._untold = tell, untold
+        self._tell, self._untold, self._book = tell, untold, book
         self._recorder = None if folder is None else Recorder(folder)
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far."""
         self.t = 0.0
         """How far the run has come (s)."""
+        self.told_at: float | None = None
+        """When that was told (s, monotonic); None before the run began."""
         self.ended = False
         """Whether the last telemetry is in."""
         self._trouble = ""
@@ -74,6 +81,8 @@ class Chronicle:
         self._session.inbox.put(("word", _STOP, b""))
         self._thread.join()
         self._session.close()
+        for line in () if self._book is None else self._book.close(self.t):
+            self._tell(line)
         if self._recorder is None:
             return
         rows = self._recorder.rows
@@ -104,8 +113,12 @@ class Chronicle:
             message = decode(payload)
         except RejectedError:
             return True
+        if isinstance(message, LinkReport | LinkOrder) and self._book is not None:
+            return self._noted(message)
         if not isinstance(message, Telemetry):
             return True
+        if message.rows:
+            self.told_at = monotonic()
         self.t, self.pacing = message.t, message.pacing or self.pacing
         self.ended = message.final
         for event in message.events:
@@ -116,5 +129,15 @@ class Chronicle:
                 self._recorder(message)
         except (RecordError, OSError) as error:
             self._trouble = f"the record ends at {self.t:g} s: {error}"
+            return False
+        return True
+
+    def _noted(self, message: LinkReport | LinkOrder) -> bool:
+        """Write down what was told of links; False if that is impossible."""
+        assert self._book is not None
+        try:
+            self._book(message)
+        except OSError as error:
+            self._trouble = f"the record of links ends at {self.t:g} s: {error}"
             return False
         return True

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from scenarios.live.link_commands import link
+from scenarios.live.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
 from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
 
 if TYPE_CHECKING:
     from scenarios.live.hand import Ended
-    from scenarios.live.visit import Visit
 
-RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
-"""As in `scenarios.live.place`, which a test holds them against."""
-
-_Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
-_Connect = Annotated[
-    list[str] | None,
-    typer.Option("--connect", metavar="ENDPOINT", help=f"Where the plant listens, {ENDPOINT} if left out; repeatable."),
-]
-_Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest wait for the plant.")]
 _Scenario = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
 ]
@@ -45,18 +35,23 @@ _Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 3 wh
 _Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Record history.csv and events.csv in a new folder.")
 ]
+_Record = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Write a scenario that replays what gridpeers link did, for run."),
+]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     for command in (plant, agent, up, down, status, watch, stop, event):
         app.command()(command)
+    app.add_typer(link, name="link")
 
 
 def plant(
     scenario: _Scenario,
     case: _Case = "",
-    run: _Run = RUN,
+    run: Run = RUN,
     listen: _Listen = ENDPOINT,
     connect: _Beyond = None,
     speed: _Speed = 1.0,
@@ -64,6 +59,7 @@ def plant(
     duration: _For = None,
     strict: _Strict = False,
     out: _Out = None,
+    record: _Record = None,
 ) -> None:
     """Run the plant of a scenario in this terminal, in real time. Agents come from others.
 
@@ -71,13 +67,13 @@ def plant(
 
     Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
     """
-    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, agents=False)
+    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, record, agents=False)
 
 
 def up(
     scenario: _Scenario,
     case: _Case = "",
-    run: _Run = RUN,
+    run: Run = RUN,
     listen: _Listen = ENDPOINT,
     connect: _Beyond = None,
     speed: _Speed = 1.0,
@@ -85,6 +81,7 @@ def up(
     duration: _For = None,
     strict: _Strict = False,
     out: _Out = None,
+    record: _Record = None,
 ) -> None:
     """Run the plant and all its agents at once, in real time, until `gridpeers down` or Ctrl-C.
 
@@ -92,20 +89,20 @@ def up(
 
     Example:  gridpeers up islanding --speed 0.5
     """
-    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, agents=True)
+    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, record, agents=True)
 
 
 def agent(
     inverter: Annotated[
         str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2; spare ones too.")
     ],
-    run: _Run = RUN,
-    connect: _Connect = None,
+    run: Run = RUN,
+    connect: Connect = None,
     listen: Annotated[
         list[str] | None,
         typer.Option("--listen", metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
     ] = None,
-    wait: _Wait = 60.0,
+    wait: Wait = 60.0,
 ) -> None:
     """Run the agent of one inverter in this terminal. Ctrl-C leaves properly: the inverter is switched off.
 
@@ -114,7 +111,7 @@ def agent(
     Example:  gridpeers agent inv2 --connect tcp/192.168.1.10:7447
     """
     require({"zenoh": "an agent"})
-    with _told():
+    with told():
         from scenarios.live.hand import agent_here
         from scenarios.live.place import check_inverter, check_wait, claim, place, return_path
 
@@ -125,12 +122,12 @@ def agent(
         _finish(agent_here(where, inverter, listening, wait))
 
 
-def status(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None:
+def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
     """Look once at a run: time, pacing, a line per agent, latest events.
 
     Example:  gridpeers status
     """
-    with _visit(run, connect, wait, meet_agents=True) as visit:
+    with visit_to(run, connect, wait, meet_agents=True) as visit:
         from scenarios.live.asking import look
         from scenarios.live.show.render import plain
 
@@ -138,9 +135,9 @@ def status(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None
 
 
 def watch(
-    run: _Run = RUN,
-    connect: _Connect = None,
-    wait: _Wait = 5.0,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
     duration: Annotated[
         float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
     ] = None,
@@ -149,7 +146,7 @@ def watch(
 
     Example:  gridpeers watch --connect tcp/192.168.1.10:7447
     """
-    with _visit(run, connect, wait, meet_agents=True) as visit:
+    with visit_to(run, connect, wait, meet_agents=True) as visit:
         from rich.console import Console
 
         from scenarios.live.show.watching import watch as watch_run
@@ -159,9 +156,9 @@ def watch(
 
 def stop(
     inverter: Annotated[str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2.")],
-    run: _Run = RUN,
-    connect: _Connect = None,
-    wait: _Wait = 5.0,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
 ) -> None:
     """Have an agent leave properly: its inverter is switched off, the others take over.
 
@@ -169,7 +166,7 @@ def stop(
 
     Example:  gridpeers stop inv2
     """
-    with _visit(run, connect, wait) as visit:
+    with visit_to(run, connect, wait) as visit:
         from scenarios.live.asking import LEAVING, ask, has_left
 
         typer.echo(ask(visit, "stop", inverter))
@@ -180,9 +177,9 @@ def stop(
 def event(
     action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
     switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
-    run: _Run = RUN,
-    connect: _Connect = None,
-    wait: _Wait = 5.0,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
 ) -> None:
     """Open or close a switch of a running plant.
 
@@ -192,20 +189,20 @@ def event(
     """
     if action not in ("open", "close"):
         fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
-    with _visit(run, connect, wait) as visit:
+    with visit_to(run, connect, wait) as visit:
         from scenarios.live.asking import ask
 
         typer.echo(ask(visit, "open" if action == "open" else "close", switch))
 
 
-def down(run: _Run = RUN, connect: _Connect = None, wait: _Wait = 5.0) -> None:
+def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
     """End a run: its agents leave, its plant ends.
 
     Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
 
     Example:  gridpeers down --run lab
     """
-    with _visit(run, connect, wait) as visit:
+    with visit_to(run, connect, wait) as visit:
         from scenarios.live.asking import LEAVING, ask, has_ended
 
         typer.echo(ask(visit, "down"))
@@ -224,19 +221,22 @@ def _start(
     duration: float | None,
     strict: bool,
     out: Path | None,
+    record: Path | None,
     *,
     agents: bool,
 ) -> None:
     spec, feeder = load(scenario)
     require({"numba": "the plant", "zenoh": "the processes"})
-    with _told():
+    with told():
+        from scenarios.live.book import Book, check_new
         from scenarios.live.folders import folders
         from scenarios.live.hand import all_here, plant_here, say
         from scenarios.live.place import check_endpoint, check_run, claim
-        from scenarios.live.setup import Wishes, chosen_case, set_up
+        from scenarios.live.setup import Wishes, chosen_case, real_nodes, set_up
         from scenarios.live.visit import check_alone
 
         check_run(run)
+        check_new("--record", record)
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         spec = chosen(spec, chosen_case(spec, case), None)
         wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
@@ -245,11 +245,14 @@ def _start(
         config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
+            book = Book(spec, config.links, kept.record, record, None if out is None else out / "replay.toml")
+            if left := real_nodes(spec) if not agents else "":
+                say(left)
             if agents:
                 say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
-                ended = all_here(config, everyone, kept.logs, kept.record)
+                ended = all_here(config, everyone, kept.logs, kept.record, book)
             else:
-                ended = plant_here(config, kept.record)
+                ended = plant_here(config, kept.record, book)
             kept.note(
                 "broken: interrupted" if ended.interrupted else f"broken: {ended.broke}" if ended.broke else "complete"
             )
@@ -262,33 +265,3 @@ def _finish(ended: Ended) -> None:
         fail([f"{ended.interrupted}: everything that was started here has ended"], code)
     if ended.broke:
         fail([ended.broke], BROKEN)
-
-
-@contextmanager
-def _visit(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[Visit]:
-    """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
-    require({"zenoh": "the connection to a run"})
-    with _told():
-        from scenarios.live.place import check_wait, place
-        from scenarios.live.visit import Visit
-
-        check_wait(wait)
-        with Visit(place(run, connect), meet_agents=meet_agents) as visit:
-            visit.find_plant(wait)
-            yield visit
-
-
-@contextmanager
-def _told() -> Iterator[None]:
-    """What a person did wrong, or what is not there, in one line and exit code 2."""
-    from scenarios.live.asking import RefusedError
-    from scenarios.live.place import UsageError
-    from scenarios.live.visit import NobodyError
-    from scenarios.results.folder import FolderError
-    from wire.process import ConfigurationError
-    from wire.session import SessionError
-
-    try:
-        yield
-    except (ConfigurationError, FolderError, NobodyError, RefusedError, SessionError, UsageError) as error:
-        fail([str(error)], BAD_INPUT)

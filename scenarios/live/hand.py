@@ -21,7 +21,10 @@ from plant.config import PlantConfig
 from plant.pacing import sentence
 from plant.runtime import COMPILING, READY, run_plant
 from scenarios.drivers.children import Child, Children
+from scenarios.drivers.misfortunes import Misfortunes
+from scenarios.emulation.links import links_of
 from scenarios.live.asking import configuration
+from scenarios.live.book import Book
 from scenarios.live.chronicle import Chronicle
 from scenarios.live.place import Place, near
 from scenarios.live.show.look import short
@@ -34,6 +37,9 @@ LOGGED = ("roster", "warning")
 
 RECORDER_WAIT = 1.0
 """Least wait (s) of a plant that is recorded: without its recorder the first row would be missing."""
+
+CHECK = 0.25
+"""Time (s) between two looks at how far the run has come, for what befalls agents at certain times."""
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
@@ -84,7 +90,7 @@ def meaning(word: str, config: PlantConfig) -> str:
     return ""
 
 
-def plant_here(config: PlantConfig, folder: Path | None) -> Ended:
+def plant_here(config: PlantConfig, folder: Path | None, book: Book) -> Ended:
     """Run the plant in this process until it is told to end.
 
     Parameters
@@ -93,6 +99,8 @@ def plant_here(config: PlantConfig, folder: Path | None) -> Ended:
         The plant.
     folder : Path or None
         Where to record the run.
+    book : Book
+        Takes what is told of emulated links.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -101,10 +109,10 @@ def plant_here(config: PlantConfig, folder: Path | None) -> Ended:
     def tell(line: str) -> None:
         say(line, terminal)
 
-    with Chronicle(config.run, near(config.listen[0]), tell, folder, untold=LOGGED) as chronicle:
+    with Chronicle(config.run, near(config.listen[0]), tell, folder, untold=LOGGED, book=book) as chronicle:
         try:
             with contextlib.redirect_stdout(_Words(tell, config)):
-                broke = run_plant(config)
+                broke = run_plant(config, make_links=links_of)
         except (StoppedError, KeyboardInterrupt) as stop:
             farewell(chronicle, config)
             return Ended(interrupted=str(stop) or "SIGINT")
@@ -140,12 +148,14 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) ->
             visit.find_plant(wait, lambda line: say(f"{name}: {line}"))
             config = configuration(visit, name)
         config = msgspec.structs.replace(config, connect=where.connect, listen=listen)
-        return Ended(broke=run_agent(config))
+        return Ended(broke=run_agent(config, links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
         return Ended(interrupted=str(stop) or "SIGINT")
 
 
-def all_here(config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None) -> Ended:
+def all_here(
+    config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None, book: Book
+) -> Ended:
     """Run the plant and all its agents as processes of their own, until the run is ended.
 
     Parameters
@@ -158,16 +168,19 @@ def all_here(config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, f
         Folder for what the processes print.
     folder : Path or None
         Where to record the run.
+    book : Book
+        Takes what is told of emulated links.
     """
     signal.signal(signal.SIGTERM, _stop)
     config = _recorded(config, folder)
     endpoint = near(config.listen[0])
     over = threading.Event()
+    misfortunes = Misfortunes(config.links, config.speed)
 
     def on_exit(child: Child) -> None:
         if child.name == PLANT:
             over.set()
-        elif child.status != 0 and not over.is_set():
+        elif child.status != 0 and not over.is_set() and child.name not in misfortunes.killed:
             say(child.report(f"after t = {chronicle.t:.2f} s"))
 
     def on_word(word: str) -> None:
@@ -175,16 +188,26 @@ def all_here(config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, f
             say(said)
 
     try:
-        with Chronicle(config.run, endpoint, say, folder) as chronicle, Children() as children:
-            children.add(Child(PLANT, ["-m", "plant"], config, logs / "plant.log", on_exit, on_word))
+        with Chronicle(config.run, endpoint, say, folder, book=book) as chronicle, Children() as children:
+            children.add(
+                Child(PLANT, ["-m", "scenarios.emulation.plant"], config, logs / "plant.log", on_exit, on_word)
+            )
             for agent in agents:
                 if agent.name in config.agents:
                     agent = msgspec.structs.replace(agent, connect=(endpoint,))
-                    children.add(Child(agent.name, ["-m", "agents"], agent, logs / f"{agent.name}.log", on_exit))
+                    children.add(
+                        Child(
+                            agent.name, ["-m", "scenarios.emulation.agent"], agent, logs / f"{agent.name}.log", on_exit
+                        )
+                    )
             try:
-                over.wait()
+                while not over.wait(min(misfortunes.wait, CHECK)):
+                    if chronicle.told_at is not None:
+                        misfortunes.heard(chronicle.t - config.T_c, chronicle.told_at)
+                    misfortunes.strike(children)
                 children.wait(LEAVING)
             finally:
+                misfortunes.end(children)
                 farewell(chronicle, config)
             plant = children[PLANT]
             return Ended(broke="" if plant.status == 0 else plant.report(f"after t = {chronicle.t:.2f} s"))

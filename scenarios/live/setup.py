@@ -13,6 +13,7 @@ from plant.equipment import Feeder
 from scenarios.live.place import UsageError, check_wait
 from scenarios.spec import Scenario, suggestion
 from scenarios.spec.configs import configs
+from scenarios.spec.netem import netem_of, setup_of
 
 SPEEDS = (0.1, 50.0)
 """Least and greatest speed (s of run time per s of wall time) that is of any use."""
@@ -79,8 +80,11 @@ def set_up(
     (None, ('inv10',), 'inv10')
     """
     _check(wishes)
-    plant, agents = configs(scenario, feeder, chosen_case(scenario, wishes.case), listen)
-    live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed}
+    case = chosen_case(scenario, wishes.case)
+    plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
+    # links are emulated even if none has a fault yet: somebody may give them some while the run goes on
+    links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_text()
+    live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed, "links": links}
     first = [agent for agent in agents if agent.name in plant.agents]
     everyone = tuple(
         msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
@@ -98,6 +102,22 @@ def set_up(
         handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
     )
     return plant, everyone
+
+
+def real_nodes(scenario: Scenario) -> str:
+    """What people have to do to agents whose processes are theirs, as the scenario would have it; empty if nothing.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With its one case.
+    """
+    (case,) = scenario.cases
+    nodes = [node for node in netem_of(scenario, case).nodes if node.kill or node.pause]
+    if not nodes:
+        return ""
+    names = ", ".join(dict.fromkeys(node.name for node in nodes))
+    return f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
 
 
 def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:

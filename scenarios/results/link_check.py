@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from netem.check.rows import Row
 from netem.check.verify import verify
+from netem.spec.change import Change, schedule_of
 from netem.spec.fault import Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
@@ -26,11 +27,15 @@ class LinkCheck:
         What they were told; partitions by island resolved.
     microgrids : Mapping[str, str]
         Microgrid of every inverter that may take part.
+    changes : Sequence[Change], optional
+        What they were told while the run went on.
     """
 
-    def __init__(self, record: LinkRecord, netem: Netem, microgrids: Mapping[str, str]) -> None:
+    def __init__(
+        self, record: LinkRecord, netem: Netem, microgrids: Mapping[str, str], changes: Sequence[Change] = ()
+    ) -> None:
         self._record = record
-        spans = _spans(record, netem, microgrids)
+        spans = _spans(record, netem, microgrids, changes)
         counts = {Link(*link): counts for link, counts in record.counts.items()}
         found = verify(record.traces, spans, netem.seed, counts)
         self.rows: tuple[Row, ...] = found.rows
@@ -58,7 +63,7 @@ class LinkCheck:
 
     def lines(self) -> Iterable[str]:
         """Sentences for the report."""
-        books = self._record.counts.values()
+        books = [book for book in self._record.counts.values() if book.sent]
         sent = sum(book.sent for book in books)
         dropped: Counter[str] = Counter()
         for book in books:
@@ -76,8 +81,12 @@ def _share(part: int, whole: int) -> str:
     return f"{100.0 * part / whole:.2f} %" if whole else "0 %"
 
 
-def _spans(record: LinkRecord, netem: Netem, microgrids: Mapping[str, str]) -> dict[Link, tuple[Span, ...]]:
+def _spans(
+    record: LinkRecord, netem: Netem, microgrids: Mapping[str, str], changes: Sequence[Change]
+) -> dict[Link, tuple[Span, ...]]:
     """What each link was told over which anything was sent."""
     names = (*microgrids, PLANT)
     links = [Link(src, dst) for src in names for dst in names if (src, dst) in record.counts]
-    return {link: spans for link in links if (spans := netem.spans(link, microgrids))}
+    if not changes:
+        return {link: spans for link in links if (spans := netem.spans(link, microgrids))}
+    return {link: spans for link in links if (spans := schedule_of(link, netem, changes, microgrids).flat())}

@@ -61,9 +61,9 @@ def _keys() -> Iterator[str]:
 def _messages() -> Iterator[str]:
     yield "# Messages"
     yield ""
-    yield f"msgpack maps with a field `type` that names the message, then their CRC-32; SI units; at most {LIMIT} bytes."
-    yield "Another CRC-32, unknown fields, missing fields, wrong types and numbers that are not finite are refused: counted"
-    yield "by kind, logged once and dropped."
+    yield f"msgpack maps with a field `type` that names the message, and their CRC-32; SI units; at most {LIMIT} bytes."
+    yield "Another CRC-32, unknown fields, missing fields, wrong types and numbers that are not finite are refused:"
+    yield "counted by kind, logged once and dropped."
     common = {doc.name for doc in field_docs(messages.Message)}
     yield from _section("Fields of every message", messages.Message, "")
     for kind in (*typing.get_args(messages.AnyMessage), messages.PlantEvent):

@@ -40,7 +40,13 @@ def test_every_message_survives_the_wire(kind: type[msgspec.Struct]) -> None:
         flags |= {"refused": True, "ok": False}
         words |= {"verb": "open", "argument": "sw1_2", "reply_to": "a1", "text": "done", "phase": "running"}
         words |= {"waits_for": "", "pacing": None, "data": b"book", "instance": "a1"}
-        lists = {"neighbours": ("inv2", "inv3"), "ages": (0.01, -1.0), "used": ("inv2",), "awaited": ("inv2",)}
+        lists = {
+            "impaired": ("inv2",),
+            "neighbours": ("inv2", "inv3"),
+            "ages": (0.01, -1.0),
+            "used": ("inv2",),
+            "awaited": ("inv2",),
+        }
         counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 9)
         return (examples | more | flags | words | lists | counts).get(field.name, 0.1 + 0.2)
 

@@ -41,6 +41,8 @@ class Line:
     """Messages that were sent to it and never came."""
     rejected: int | None = None
     """Messages that came in and could not be used."""
+    impaired: tuple[str, ...] = ()
+    """Senders between whom and it an emulated fault holds."""
     note: str = ""
     """What a person should know: "no agent", "waits for ...", "silent for 3 s"."""
 
@@ -54,6 +56,8 @@ class Look:
     """Run time (s)."""
     pace: str = ""
     """How well the plant keeps real time, in a few words."""
+    impaired: tuple[str, ...] = ()
+    """Agents between whom and the plant an emulated fault holds."""
     lines: tuple[Line, ...] = ()
     """In the order of the inverters."""
     events: tuple[str, ...] = ()

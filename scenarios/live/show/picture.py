@@ -39,6 +39,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     """Agents that take part."""
     events: tuple[PlantEvent, ...] = ()
     """The latest, oldest first."""
+    impaired: tuple[str, ...] = ()
+    """Agents between whom and the plant an emulated fault holds."""
 
 
 class Picture:
@@ -60,6 +62,7 @@ class Picture:
         self._life = 0
         """Which life of the plant it is of."""
         self._pacing: Pacing | None = None
+        self._impaired: tuple[str, ...] = ()
         self._standing: Standing | None = None
         self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
         self._status: dict[str, tuple[AgentStatus, float]] = {}
@@ -83,7 +86,7 @@ class Picture:
 
     def standing(self, standing: Standing) -> None:
         """Note how the plant says the run stands."""
-        self._standing = standing
+        self._standing, self._impaired = standing, standing.impaired
         if standing.phase != "gathering":
             self._t, self._pacing = standing.t, standing.pacing
         self._events.extend(standing.events)
@@ -97,6 +100,7 @@ class Picture:
             self._life = message.incarnation
         self._inverters, self._t, self._told = message.inverters, message.t, now
         self._pacing = message.pacing or self._pacing
+        self._impaired = message.impaired
         if message.rows:
             self._row = message.rows[-1]
         self._events.extend(event for event in message.events if event not in self._events)
@@ -123,6 +127,7 @@ class Picture:
             run=self._run,
             t=self._t,
             pace=pace,
+            impaired=self._impaired,
             lines=tuple(self._line(name, name in present, now) for name in names),
             events=tuple(line_of(event) for event in self._events),
         )
@@ -153,6 +158,7 @@ class Picture:
             sent=status.sent if status else None,
             lost=status.lost if status else None,
             rejected=status.rejected if status else None,
+            impaired=status.impaired if status else (),
             note=self._note(name, present, status, now - at),
         )
 

@@ -53,9 +53,17 @@ _COLUMNS = (
     _Column("in", "", lambda line: _count(line.received)),
     _Column("out", "", lambda line: _count(line.sent)),
     _Column("lost", "", lambda line: _count(line.lost)),
+    _Column("impaired", "", lambda line: short(line.impaired) if line.impaired else "", right=False),
     _Column("", "", lambda line: line.note, right=False),
 )
-"""What is shown of each agent; "age" is that of the oldest of what it heard from the neighbours that count."""
+"""What is shown of each agent; "age" is that of the oldest of what it heard from the neighbours that count, "impaired"
+are those between whom and it an emulated fault holds."""
+
+
+def _columns(look: Look) -> tuple[_Column, ...]:
+    """The columns that there is something to show in."""
+    calm = not any(line.impaired for line in look.lines)
+    return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
 def head(look: Look) -> str:
@@ -63,6 +71,7 @@ def head(look: Look) -> str:
     t = "has not begun" if look.t is None else f"t = {look.t:.2f} s"
     islands = list(dict.fromkeys(line.island for line in look.lines if line.island))
     parts = [f"run {look.run}", t, look.pace, f"islands: {', '.join(islands)}" if islands else ""]
+    parts.append(f"impaired to the plant: {short(look.impaired)}" if look.impaired else "")
     return "   ".join(part for part in parts if part)
 
 
@@ -74,14 +83,15 @@ def plain(look: Look) -> str:
     look : Look
         What to show.
     """
-    titles = [f"{column.head} {column.unit}".strip() for column in _COLUMNS]
-    rows = [titles, *([column.text(line) for column in _COLUMNS] for line in look.lines)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(_COLUMNS))]
+    columns = _columns(look)
+    titles = [f"{column.head} {column.unit}".strip() for column in columns]
+    rows = [titles, *([column.text(line) for column in columns] for line in look.lines)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(columns))]
     text = [head(look)]
     for row in rows if look.lines else []:
         cells = [
             cell.rjust(width) if column.right else cell.ljust(width)
-            for cell, width, column in zip(row, widths, _COLUMNS, strict=True)
+            for cell, width, column in zip(row, widths, columns, strict=True)
         ]
         text.append("  ".join(cells).rstrip())
     text += look.events[-EVENTS:]
@@ -99,11 +109,12 @@ def table(look: Look, keys: str = "q: quit") -> Group:
         What can be typed.
     """
     grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for column in _COLUMNS:
+    columns = _columns(look)
+    for column in columns:
         title = f"{column.head}\n{column.unit}" if column.head else ""
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
     for line in look.lines:
-        grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in _COLUMNS))
+        grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in columns))
     events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in look.events[-EVENTS:]]
     return Group(Text(head(look), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
 
@@ -113,6 +124,6 @@ def _style(column: _Column, line: Line) -> str:
         return "yellow"  # to be in another island is no fault
     if column.head == "age" and max(line.ages.values(), default=0.0) >= OLD:
         return "yellow"
-    if column.head == "lost" and line.lost:
+    if (column.head == "lost" and line.lost) or column.head == "impaired":
         return "yellow"
     return ""

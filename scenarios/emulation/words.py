@@ -1,0 +1,62 @@
+"""What a link does, in few words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from netem.models.cut import Cut
+from netem.models.delay import Constant, Uniform
+from netem.models.loss import Bernoulli
+from netem.models.rate import Rate
+from netem.spec.profiles import PROFILES
+
+
+def words(kind: str, model: Any) -> str:
+    """One fault for people: plain for those of one or two numbers, else the profile that has it, or its keys.
+
+    Parameters
+    ----------
+    kind : str
+        Of `netem.spec.fault.KINDS`, or "partition".
+    model : Any
+        The struct of `netem.models`.
+
+    Examples
+    --------
+    >>> words("delay", Uniform(low_s=0.08, high_s=0.12))
+    'delay 0.08 to 0.12 s'
+    >>> from netem.models.delay import Normal
+    >>> words("delay", Normal(mean_s=0.05, std_s=0.02, correlation=0.5))
+    'delay normal (correlation 0.5, mean_s 0.05, std_s 0.02)'
+    >>> words("loss", PROFILES["lte"].loss)
+    'loss of lte'
+    """
+    match model:
+        case Cut(hold=hold):
+            return f"{kind}, messages kept" if hold else kind
+        case Constant(delay_s=delay, fifo=False):
+            return f"{kind} {delay:g} s"
+        case Uniform(low_s=low, high_s=high, fifo=False, correlation=0.0):
+            return f"{kind} {low:g} to {high:g} s"
+        case Bernoulli(p=p):
+            return f"{kind} {p:g}"
+        case Rate(bytes_per_s=rate):
+            return f"{kind} {rate:g} bytes/s"
+    for name, profile in PROFILES.items():
+        if getattr(profile, kind, None) == model:
+            return f"{kind} of {name}"
+    fields = msgspec.structs.fields(model)
+    given = [(field.name, getattr(model, field.name), field.default) for field in fields]
+    keys = [f"{name} {_shown(value)}" for name, value, default in given if value != default]
+    if fields[0].name == "p" and len(keys) == 1:
+        return f"{kind} {keys[0].removeprefix('p ')}"
+    model_name = model.__struct_config__.tag
+    return f"{kind} {model_name} ({', '.join(keys)})" if model_name else f"{kind} ({', '.join(keys)})"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value) if not isinstance(value, tuple) else "..."

@@ -1,0 +1,126 @@
+"""What emulated links did and were ordered in a run by hand: its record, and the scenario that replays it."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from netem.spec.change import Change, replayed
+from netem.spec.netem import Netem
+from scenarios.emulation.orders import Order
+from scenarios.emulation.setup import Setup
+from scenarios.live.place import UsageError
+from scenarios.results.folder import shown, write_whole
+from scenarios.results.links import LinkRecord
+from scenarios.spec import Scenario
+from scenarios.spec.netem import netem_of
+from scenarios.spec.writing import to_toml
+from wire.messages import LinkOrder, LinkReport
+
+
+class Book:
+    """Takes what the plant tells of links.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As run, with its one case.
+    links : str
+        What the processes are told of links.
+    folder : Path or None
+        Where links.csv and links.json go; None for nowhere.
+    replay : Path or None
+        File of the scenario that replays the run's links: written in any case, and anew with every order.
+    by_the_way : Path or None
+        The same, but only written once there is an order.
+    """
+
+    def __init__(
+        self, scenario: Scenario, links: str, folder: Path | None, replay: Path | None, by_the_way: Path | None
+    ) -> None:
+        self._scenario, self._setup = scenario, Setup.of_text(links)
+        self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
+        self._record = LinkRecord()
+        self._orders: dict[int, Change] = {}
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What was ordered, in its order."""
+        return tuple(change for _, change in sorted(self._orders.items()))
+
+    def __call__(self, message: LinkReport | LinkOrder) -> None:
+        """Take a report of what links did, or an order to them."""
+        if isinstance(message, LinkReport):
+            if self._folder is not None:
+                self._record(message)
+            return
+        self._orders[message.seq] = Order.of_text(message.text).at(message.t)
+        self._write_replay(message.t)
+
+    def close(self, t: float) -> list[str]:
+        """Write what is to be written, at the end of a run that came to t (s); what a person should know."""
+        self._write_replay(t)
+        told: list[str] = []
+        if self._folder is not None and any(book.sent for book in self._record.counts.values()):
+            from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
+
+            check = LinkCheck(self._record, self._setup.netem, self._setup.microgrids, self.changes)
+            self._record.write(self._folder / "links.csv")
+            write_whole(self._folder / "links.json", check.to_json())
+            told += check.lines()
+        file = self._replay or (self._by_the_way if self._orders else None)
+        if file is not None:
+            told.append(f"the links as they were: gridpeers run {shown(file)}")
+        return told
+
+    def _write_replay(self, t: float) -> None:
+        files = [self._replay, self._by_the_way if self._orders else None]
+        text = to_toml(
+            replay_of(self._scenario, self._setup, self.changes, t),
+            {"driver": "by hand", "python": platform.python_version()},
+        )
+        for file in files:
+            if file is not None:
+                write_whole(file, text)
+
+
+def replay_of(scenario: Scenario, setup: Setup, changes: Sequence[Change], t: float) -> Scenario:
+    """The scenario whose links do by schedule what they were ordered to do.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As run, with its one case.
+    setup : Setup
+        Who stands where.
+    changes : Sequence[Change]
+        What was ordered.
+    t : float
+        How far the run came (s): the scenario ends there, if it does not end later anyway.
+    """
+    ((name, case),) = scenario.cases.items()
+    T_c = scenario.time.T_c_s
+    needed = max([t, *(change.from_s + T_c for change in changes)])
+    end = max(scenario.time.end_s, round(math.ceil(needed / T_c - 1e-6) * T_c, 9))
+    return msgspec.structs.replace(
+        scenario,
+        name="",
+        paper="",
+        time=msgspec.structs.replace(scenario.time, end_s=end),
+        netem=replayed(netem_of(scenario, name), changes, setup.microgrids),
+        cases={name: msgspec.structs.replace(case, netem=Netem())},
+    )
+
+
+def check_new(option: str, file: Path | None) -> None:
+    """Raise UsageError if a file is there already, or cannot be made where it is to be."""
+    if file is None:
+        return
+    if file.exists():
+        raise UsageError(f"{option} {file}: is there already; move it, or give another name")
+    if not file.absolute().parent.is_dir():
+        raise UsageError(f"{option} {file}: there is no folder {file.parent}; make it first")

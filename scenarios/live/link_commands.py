@@ -1,0 +1,216 @@
+"""The commands that hurt and heal links while a run goes on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scenarios.live.options import RUN, Connect, Run, Wait, told, visit_to
+from scenarios.usage import BROKEN, fail
+
+if TYPE_CHECKING:
+    from agents.config import AgentConfig
+    from scenarios.emulation.orders import Order
+
+link = typer.Typer(
+    no_args_is_help=True,
+    help="Hurt and heal links between agents, and between plant and agents, while a run goes on.\n\n"
+    'A link is named by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
+    'and "* -> inv2" are several, plant is a name too. Times in seconds, probabilities from 0 to 1.\n\n'
+    'Example:  gridpeers link set "inv1 -> inv4" --delay 0.1 --jitter 0.02 --loss 0.2',
+)
+
+_Ends = Annotated[
+    list[str],
+    typer.Argument(metavar="LINKS", help='A pattern such as "inv1 -> inv4", or two names: sender and receiver.'),
+]
+_For = Annotated[
+    float | None, typer.Option("--for", metavar="SECONDS", help="Run time after which it ends; healed if left out.")
+]
+
+
+@link.command("set")
+def set_(
+    links: _Ends,
+    delay: Annotated[float | None, typer.Option(metavar="SECONDS", help="Delay of every message.")] = None,
+    jitter: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Delays are uniform, --delay plus or minus this.")
+    ] = None,
+    loss: Annotated[float | None, typer.Option(metavar="P", help="Probability that a message is lost.")] = None,
+    duplicate: Annotated[float | None, typer.Option(metavar="P", help="Probability of a second copy.")] = None,
+    corrupt: Annotated[float | None, typer.Option(metavar="P", help="Probability of a flipped bit.")] = None,
+    rate: Annotated[float | None, typer.Option(metavar="BYTES", help="Bytes per second that the link sends.")] = None,
+    profile: Annotated[str, typer.Option(metavar="NAME", help="A named link, e.g. lte; see docs/netem.md.")] = "",
+    duration: _For = None,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+) -> None:
+    """Give links faults. What is set takes the place of what the link had of the same kind.
+
+    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
+
+    Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
+    """
+    with told():
+        given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
+        fault = {"profile": profile} | {key: value for key, value in given.items() if value is not None}
+        _give(links, "->", fault | _delay(delay, jitter), duration, run, connect, wait)
+
+
+@link.command()
+def cut(
+    links: _Ends,
+    one_way: Annotated[bool, typer.Option("--one-way", help="With two names: only from the first.")] = False,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="Keep messages and let them go when the link is healed.")
+    ] = False,
+    duration: _For = None,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+) -> None:
+    """Cut links, between two names both ways.
+
+    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
+
+    Example:  gridpeers link cut inv4 inv7 --for 5
+    """
+    with told():
+        from netem.models.cut import Cut
+
+        _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, run, connect, wait)
+
+
+@link.command()
+def heal(
+    links: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[LINKS]", help="A pattern, or two names (both ways); all links if none."),
+    ] = None,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+) -> None:
+    """End what holds on links; what the scenario has for later still comes.
+
+    Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
+
+    Example:  gridpeers link heal inv4 inv7
+    """
+    with told():
+        _give(links or [], "<->", None, None, run, connect, wait)
+
+
+@link.command()
+def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+    """Show every impaired link: what it does now, and how its messages have fared.
+
+    Exit code: 0 all have answered, 2 nobody there, 3 somebody has not answered.
+
+    Example:  gridpeers link show
+    """
+    with visit_to(run, connect, wait) as visit:
+        from scenarios.live.ordering import stands
+        from scenarios.live.show.links import links_text
+
+        t, found, silent = stands(visit)
+        typer.echo(links_text(run, t, found), nl=False)
+        if silent:
+            fail([f"has not answered: {', '.join(silent)}; what its links do is not shown"], BROKEN)
+
+
+def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
+    from netem.mistakes import seconds
+    from netem.models.delay import Uniform
+    from scenarios.live.place import UsageError
+
+    if jitter is None:
+        return {} if delay is None else {"delay": delay}
+    if delay is None:
+        raise UsageError("--jitter: is around a delay; give --delay too")
+    wrong = seconds("--delay", delay, "a delay") + seconds("--jitter", jitter, "a jitter", above_zero=True)
+    if wrong:
+        raise UsageError("; ".join(f"{path}: {text}" for path, text in wrong))
+    if jitter > delay:
+        raise UsageError(f"--jitter: {jitter:g} s is more than the delay of {delay:g} s: some would be negative")
+    return {"delay": Uniform(low_s=round(delay - jitter, 9), high_s=round(delay + jitter, 9))}
+
+
+def _pattern(links: list[str], arrow: str) -> str:
+    from scenarios.emulation.orders import EVERYTHING
+    from scenarios.live.place import UsageError
+
+    if not links:
+        return EVERYTHING
+    if len(links) == 2 and not any("->" in word for word in links):
+        return f"{links[0]} {arrow} {links[1]}"
+    if len(links) == 1:
+        return links[0]
+    shown = " ".join(links)
+    raise UsageError(
+        f'LINKS: "{shown}" is neither two names nor one pattern; write inv1 inv4, or "inv1 -> inv4" in quotes'
+    )
+
+
+def _give(
+    links: list[str],
+    arrow: str,
+    fault: dict[str, Any] | None,
+    duration: float | None,
+    run: str,
+    connect: list[str] | None,
+    wait: float,
+) -> None:
+    """Check an order, give it, and say what became of it."""
+    from netem.spec.change import Heal
+    from netem.spec.fault import Fault
+    from netem.spec.pattern import parse
+    from scenarios.emulation.orders import Order
+    from scenarios.live.ordering import check, give, links_of_run
+    from scenarios.live.place import UsageError
+
+    on = _pattern(links, arrow)
+    try:
+        parse(on)
+    except ValueError as error:
+        raise UsageError(f"LINKS: {error}") from None
+    order = Order(
+        fault=None if fault is None else Fault(on=on, **fault),
+        heal=Heal(on=on, from_s=0.0) if fault is None else None,
+        for_s=duration,
+    )
+    check(order, None)
+    with visit_to(run, connect, wait) as visit:
+        setup, agent = links_of_run(visit)
+        check(order, setup)
+        outcome = give(visit, order, setup)
+    typer.echo(f"{order}; from t = {outcome.t:g} s on")
+    if outcome.acknowledged:
+        typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
+    if outcome.absent:
+        typer.echo(f"no agent yet, told when it comes: {', '.join(outcome.absent)}")
+    if too_old := _too_old(order, agent):
+        typer.echo(too_old)
+    wrong = [f"{name}: {why}" for name, why in outcome.deaf.items()]
+    if outcome.silent:
+        wrong.append(f"not acknowledged by {', '.join(outcome.silent)}; is it frozen? It will be told again")
+    if wrong:
+        fail(wrong, BROKEN)
+
+
+def _too_old(order: Order, agent: AgentConfig) -> str:
+    """What a person should know if states will be ignored for their age."""
+    from netem.models.delay import Constant, RandomDelay
+
+    delay = order.fault.models().get("delay") if order.fault is not None else None
+    limit = agent.control.handling.max_age or agent.max_age
+    usual = (
+        delay.delay_s if isinstance(delay, Constant) else delay.quantile(0.5) if isinstance(delay, RandomDelay) else 0.0
+    )
+    if usual < limit:
+        return ""
+    return (
+        f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s; see [handling] max_age_s"
+    )

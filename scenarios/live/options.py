@@ -1,0 +1,54 @@
+"""What the commands for runs by hand have in common: options, the visit to a run, and what went wrong in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scenarios.usage import BAD_INPUT, fail, require
+
+if TYPE_CHECKING:
+    from scenarios.live.visit import Visit
+
+RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
+"""As in `scenarios.live.place`, which a test holds them against."""
+
+Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
+Connect = Annotated[
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help=f"Where the plant listens, {ENDPOINT} if left out; repeatable."),
+]
+Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest wait for the plant.")]
+
+
+@contextmanager
+def visit_to(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[Visit]:
+    """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
+    require({"zenoh": "the connection to a run"})
+    with told():
+        from scenarios.live.place import check_wait, place
+        from scenarios.live.visit import Visit
+
+        check_wait(wait)
+        with Visit(place(run, connect), meet_agents=meet_agents) as visit:
+            visit.find_plant(wait)
+            yield visit
+
+
+@contextmanager
+def told() -> Iterator[None]:
+    """What a person did wrong, or what is not there, in one line and exit code 2."""
+    from scenarios.live.asking import RefusedError
+    from scenarios.live.place import UsageError
+    from scenarios.live.visit import NobodyError
+    from scenarios.results.folder import FolderError
+    from wire.process import ConfigurationError
+    from wire.session import SessionError
+
+    try:
+        yield
+    except (ConfigurationError, FolderError, NobodyError, RefusedError, SessionError, UsageError) as error:
+        fail([str(error)], BAD_INPUT)

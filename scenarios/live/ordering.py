@@ -1,0 +1,137 @@
+"""Orders to the emulated links of a running run: checked, sent, acknowledged; and a look at all links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from time import monotonic
+
+import msgspec
+
+from agents.config import AgentConfig
+from netem.mistakes import Mistake
+from netem.spec.pattern import links_among, parse
+from scenarios.emulation.orders import Order
+from scenarios.emulation.report import LinkStand, decode_stands
+from scenarios.emulation.setup import Setup
+from scenarios.live.asking import ANSWER, RefusedError, Verb, configurations
+from scenarios.live.place import UsageError
+from scenarios.live.visit import NobodyError, Visit
+from wire.codec import RejectedError, decode, encode
+from wire.messages import PLANT, Answer, Command, LinkAnswer
+
+ACKNOWLEDGED = 4.0
+"""Longest wait (s) for everybody's word; it takes one control period, or a second more if a message was lost."""
+
+
+class _Taken(msgspec.Struct, frozen=True):
+    """The plant's answer; see `plant.service`."""
+
+    number: int
+    t: float
+    asked: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of an order."""
+
+    t: float
+    """From when on it holds (s of run time)."""
+    acknowledged: tuple[str, ...]
+    """Receivers that have taken it."""
+    silent: tuple[str, ...]
+    """Receivers that are there and have not answered in time."""
+    absent: tuple[str, ...]
+    """Receivers without an agent: told when it comes."""
+    deaf: Mapping[str, str] = field(default_factory=dict)
+    """Receivers that have refused, and why."""
+
+
+def links_of_run(visit: Visit) -> tuple[Setup, AgentConfig]:
+    """What the processes of a run were told of its links, and of one of its agents.
+
+    Raises
+    ------
+    NobodyError
+        If the run has no links that can be changed.
+    """
+    for config in configurations(visit).values():
+        if config.links:
+            return Setup.of_text(config.links), config
+    raise NobodyError(
+        f"{visit.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
+    )
+
+
+def check(order: Order, setup: Setup | None) -> None:
+    """Raise UsageError if an order cannot be meant, with all that is wrong; without a setup, of its values alone."""
+    _refuse(order.wrong_values() if setup is None else order.mistakes(setup.microgrids))
+
+
+def _refuse(mistakes: Iterable[Mistake]) -> None:
+    options = [(path.partition(".")[0], text) for path, text in mistakes]
+    wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
+    if wrong:
+        raise UsageError("; ".join(wrong))
+
+
+def give(visit: Visit, order: Order, setup: Setup) -> Outcome:
+    """Give an order and wait until every receiver that it concerns has taken it, or for `ACKNOWLEDGED` seconds."""
+    pattern, names = parse(order.on), tuple(setup.microgrids)
+    links = [link for link in links_among(names) if pattern.matches(*link, setup.microgrids)]
+    concerned = list(dict.fromkeys(link.dst for link in links))
+    taken, answers = _ask(visit, "link", order.to_text(), concerned)
+    there = [name for name in concerned if name == PLANT or name in taken.asked]
+    deaf = {name: answers[name].text for name in there if name in answers and not answers[name].ok}
+    return Outcome(
+        t=taken.t,
+        acknowledged=tuple(name for name in there if name == PLANT or (name in answers and name not in deaf)),
+        silent=tuple(name for name in there if name != PLANT and name not in answers),
+        absent=tuple(name for name in concerned if name not in there),
+        deaf=deaf,
+    )
+
+
+def stands(visit: Visit) -> tuple[float, dict[tuple[str, str], LinkStand], tuple[str, ...]]:
+    """How all links stand that do something or once did: run time (s), links, and receivers that did not answer."""
+    taken, answers = _ask(visit, "links", "", None)
+    found: dict[tuple[str, str], LinkStand] = {}
+    for name, answer in answers.items():
+        if answer.ok:
+            of_sender: dict[str, LinkStand] = decode_stands(answer.data)
+            found |= {(src, name): stand for src, stand in of_sender.items()}
+    return taken.t, found, tuple(name for name in taken.asked if name not in answers)
+
+
+def _ask(
+    visit: Visit, verb: Verb, argument: str, concerned: Iterable[str] | None
+) -> tuple[_Taken, dict[str, LinkAnswer]]:
+    """Give the plant a command; what it answers, and what they whom it concerns do, all if that is None."""
+    command = Command(sender="visitor", incarnation=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=visit.id)
+    visit.publish(visit.keys.command, encode(command))
+    taken: _Taken | None = None
+    answers: dict[str, LinkAnswer] = {}
+    end = monotonic() + ANSWER
+    while (left := end - monotonic()) > 0.0:
+        for _, payload in visit.take(left):
+            try:
+                message = decode(payload)
+            except RejectedError:
+                continue
+            if isinstance(message, LinkAnswer):
+                answers[message.sender] = message
+            elif isinstance(message, Answer):
+                if not message.ok:
+                    raise RefusedError(message.text)
+                taken = msgspec.json.decode(message.text, type=_Taken)
+                end = monotonic() + ACKNOWLEDGED
+        if taken is not None:
+            asked = (*taken.asked, PLANT) if concerned is None else [name for name in concerned if name in taken.asked]
+            if answers.keys() >= set(asked):
+                break
+    if taken is None:
+        raise NobodyError(
+            f"the plant of {visit.where} is there but has not answered within {ANSWER:g} s; is it frozen?"
+        )
+    return taken, answers
