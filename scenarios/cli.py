@@ -16,6 +16,7 @@ import typer
 from scenarios.experiments.command import experiment
 from scenarios.live.commands import register
 from scenarios.predict.command import predict
+from scenarios.reproduce.command import reproduce
 from scenarios.sweep.command import sweep
 from scenarios.usage import (
     BAD_INPUT,
@@ -220,6 +221,7 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario",
     typer.echo(page(topic.value), nl=False)
 
 
+app.command()(reproduce)
 app.command()(sweep)
 app.command()(predict)
 app.command()(experiment)

@@ -1,0 +1,65 @@
+"""A table of the paper as rows of text: the paper's number, ours, and the difference with its verdict."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from scenarios.reproduce.found import Result
+from scenarios.results.paper_tables import HEADINGS, Cell, PaperTable
+from scenarios.results.tolerances import Quantity
+
+
+class Entry(NamedTuple):
+    """One number beside the paper's."""
+
+    paper: str
+    ours: str
+    """With a digit more than the paper prints."""
+    off: str
+    """Ours less the paper's."""
+    within: bool | None
+    """None: not judged."""
+
+
+class Line(NamedTuple):
+    """One row: a case (or an island) after one event."""
+
+    label: str
+    entries: tuple[Entry, ...]
+
+
+def lines(table: PaperTable, result: Result) -> tuple[Line, ...]:
+    """Rows of a table, in the paper's order."""
+    rows: dict[str, dict[Quantity, Cell]] = {}
+    titles = titles_of(result)
+    for cell in table.cells:
+        what = f"island of {cell.island}" if cell.island else titles.get(cell.case, cell.case)
+        rows.setdefault(f"{what}, {cell.event}", {})[cell.quantity] = cell
+    return tuple(
+        Line(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
+        for label, cells in rows.items()
+    )
+
+
+def titles_of(result: Result) -> dict[str, str]:
+    """Case names for people."""
+    words = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
+    return {case: f"{case} {words[case]}" if case in words else case for case in result.found.results}
+
+
+def tolerances(table: PaperTable) -> list[str]:
+    """What each column is judged by, and why."""
+    found = []
+    for quantity in table.quantities:
+        cell = next(cell for cell in table.cells if cell.quantity == quantity)
+        value = cell.tolerance.value
+        bound = "not judged by its number" if value is None else f"within {value:g}"
+        found.append(f"{HEADINGS[quantity]}: {bound}; {cell.tolerance.reason}")
+    return found
+
+
+def _entry(cell: Cell, result: Result) -> Entry:
+    ours = result.found.value(cell)
+    digits = cell.digits + 1
+    off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
+    return Entry(f"{cell.paper:.{cell.digits}f}", f"{ours:.{digits}f}", f"{off:+.{digits}f}", cell.within(ours))

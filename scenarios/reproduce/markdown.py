@@ -1,0 +1,71 @@
+"""The report as Markdown, its images as files beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from scenarios.reproduce.found import Reproduction, Result, machine
+from scenarios.reproduce.grid import lines, tolerances
+from scenarios.reproduce.page import PAPER
+from scenarios.results.claims import Verdict
+from scenarios.results.paper_tables import HEADINGS
+from scenarios.run import versions
+
+_MARKS = {True: "yes", False: "**NO**", None: "not judged"}
+
+
+def markdown(whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
+    """Text of report.md."""
+    counts, (near, judged, open_) = whole.counts(), whole.within()
+    head = [
+        "# The paper, reproduced",
+        "",
+        f"{PAPER}.",
+        "",
+        f"{counts['PASS']} of {len(whole.verdicts)} claims hold, {counts['MISS']} missed for a reason that is told, "
+        f"{counts['FAIL']} failed. {near} of {judged} numbers of the tables are within tolerance; {open_} more are shown only.",
+        "",
+        f"Driver {whole.driver}, seed {whole.seed}, {whole.started}; {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of processor "
+        f"time. {machine()}. {'; '.join(f'{name} {version}' for name, version in versions().items())}.",
+        "",
+    ]
+    parts = [line for result in whole.results for line in _part(result)]
+    end = ["## What is ours and not the paper's", "", *_rows(("setting", "value", "why"), settings), ""]
+    hashes = [
+        (f"{result.part.name}, {case}", f"`{sha}`") for result in whole.results for case, sha in result.sha256.items()
+    ]
+    return "\n".join([*head, *parts, *end, "## Hashes", "", *_rows(("case", "SHA-256 of history.csv"), hashes)]) + "\n"
+
+
+def _part(result: Result) -> Iterator[str]:
+    yield from (f"## {result.part.title}", "", result.part.what, "")
+    for table in result.tables:
+        header = [""]
+        for quantity in table.quantities:
+            header += [f"{HEADINGS[quantity]}: paper", "ours", "difference", "within"]
+        rows = [
+            (line.label, *(text for e in line.entries for text in (e.paper, e.ours, e.off, _MARKS[e.within])))
+            for line in lines(table, result)
+        ]
+        yield from (f"### Table {table.number}. {table.title}", "", *_rows(header, rows), "")
+        yield from (*(f"- {text}" for text in tolerances(table)), "")
+    figured = {picture.key for picture in result.figures}
+    yield from _claims([verdict for verdict in result.verdicts if verdict.claim.figure not in figured])
+    for picture, path in result.figures.items():
+        yield from (f"![{picture.title}](figures/{path.name})", "", f"**{picture.title}.** {picture.note}".strip(), "")
+        yield from _claims([verdict for verdict in result.verdicts if verdict.claim.figure == picture.key])
+
+
+def _claims(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    for verdict in verdicts:
+        reason = f" — {verdict.claim.known_miss}" if verdict.status == "MISS" else ""
+        yield f"- **{verdict.status}** {verdict.claim.text} ({verdict.claim.source}): {verdict.found}{reason}"
+    if verdicts:
+        yield ""
+
+
+def _rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    yield "| " + " | ".join(header) + " |"
+    yield "|" + "---|" * len(header)
+    for row in rows:
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
