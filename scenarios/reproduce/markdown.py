@@ -23,10 +23,11 @@ def markdown(whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> s
         f"{PAPER}.",
         "",
         f"{counts['PASS']} of {len(whole.verdicts)} claims hold, {counts['MISS']} missed for a reason that is told, "
-        f"{counts['FAIL']} failed. {near} of {judged} numbers of the tables are within tolerance; {open_} more are shown only.",
+        f"{counts['FAIL']} failed. {near} of {judged} numbers of the tables are within tolerance; {open_} more are "
+        "shown only.",
         "",
-        f"Driver {whole.driver}, seed {whole.seed}, {whole.started}; {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of processor "
-        f"time. {machine()}. {'; '.join(f'{name} {version}' for name, version in versions().items())}.",
+        f"Driver {whole.driver}, seed {whole.seed}, {whole.started}; {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of "
+        f"processor time. {machine()}. {'; '.join(f'{name} {version}' for name, version in versions().items())}.",
         "",
     ]
     parts = [line for result in whole.results for line in _part(result)]

@@ -13,13 +13,13 @@ from typing import Any
 from msgspec.structs import replace
 
 from plant.equipment import Feeder
-from scenarios.reproduce import topology
+from scenarios.reproduce import banks, topology
 from scenarios.reproduce.found import Result
 from scenarios.reproduce.parts import Part
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.findings import Findings
 from scenarios.results.folder import new_folder
-from scenarios.results.paper_tables import tables_of
+from scenarios.results.paper_tables import paper_cell, tables_of
 from scenarios.run import Driver, Request, run
 from scenarios.spec import Scenario, load_scenario
 
@@ -48,7 +48,7 @@ class Work:
         self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
         self._loaded: dict[str, tuple[Scenario, Feeder]] = {}
         for part in parts:
-            scenario, feeder = load_scenario("islanding" if part.name == "topology" else part.name)
+            scenario, feeder = load_scenario("islanding" if part.name in _STUDIES else part.name)
             self._loaded[part.name] = (scenario if seed is None else replace(scenario, seed=seed)), feeder
         self._before = 0.0
 
@@ -76,8 +76,8 @@ class Work:
         """
         for part in self.parts:
             with _timed() as took:
-                result = self._topology(part, tell) if part.name == "topology" else self._scenario(part, tell)
-                found, sha256, metrics, plots = result
+                do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
+                found, sha256, metrics, plots = do(part, tell)
             self._before += self._length(part)
             yield Result(
                 part=part,
@@ -95,9 +95,11 @@ class Work:
         if part.name == "topology":
             return topology.END_S * sum(1 for _ in topology.graphs(9, self.seed))
         scenario = self.scenario(part.name)
+        if part.name == "var-sharing":
+            return scenario.time.end_s * len(banks.BANKS) * len(banks.CASES)
         return scenario.time.end_s * len(scenario.cases)
 
-    def _scenario(self, part: Part, tell: Tell) -> tuple[Findings, dict[str, str], Any, Path]:
+    def _scenario(self, part: Part, tell: Tell) -> _Done:
         scenario, feeder = self._loaded[part.name]
         folder = new_folder(self.folder / part.name, scenario.name, _never)
         order = list(scenario.cases)
@@ -110,7 +112,7 @@ class Work:
         sha256 = {case: values["history_sha256"] for case, values in metrics["cases"].items()}
         return report.found, sha256, metrics, folder / "plots"
 
-    def _topology(self, part: Part, tell: Tell) -> tuple[Findings, dict[str, str], Any, Path]:
+    def _topology(self, part: Part, tell: Tell) -> _Done:
         folder = new_folder(self.folder / part.name, part.name, _never)
 
         def note(done: int, of: int) -> None:
@@ -122,6 +124,35 @@ class Work:
 
         topologies(found.graphs).savefig(folder / part.pictures[0].file, format="png")
         return found, {}, None, folder
+
+    def _banks(self, part: Part, tell: Tell) -> _Done:
+        folder = new_folder(self.folder / part.name, part.name, _never)
+        scenario = self.scenario(part.name)
+
+        def note(done: int, of: int) -> None:
+            tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.time.end_s)
+
+        runs = banks.study(scenario, folder, note, self.jobs)
+        bars: dict[str, dict[tuple[str, str], float]] = {"the paper": {}}
+        for one in runs:
+            for event in banks.EVENTS:
+                cell = paper_cell("islanding", one.case, event, "MQSI")
+                assert cell is not None
+                bars["the paper"][one.case, event] = cell.paper
+                bars.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
+
+        from scenarios.results.plots.banks import var_sharing  # as above
+
+        var_sharing(bars, banks.CASES, banks.EVENTS).savefig(folder / part.pictures[0].file, format="png")
+        told = [{"variant": one.variant, "case": one.case, "MQSI": dict(one.MQSI)} for one in runs]
+        return Findings(results={}), {}, told, folder
+
+
+_Done = tuple[Findings, dict[str, str], Any, Path]
+"""What was found, hashes by case, metrics, and the folder of the figures."""
+
+_STUDIES = ("topology", "var-sharing")
+"""Parts that are many short runs of the islanding, without a folder for each."""
 
 
 @contextmanager
