@@ -27,6 +27,7 @@ Point = tuple[float, float]
 def main() -> None:
     """Run the grid, print it, and name its best point."""
     scenario, _ = load_scenario("reduced-communication")
+    scenario = replace(scenario, events=scenario.events[:1], time=replace(scenario.time, end_s=scenario.events[1].t_s))
     points = [(alpha, beta) for alpha in ALPHA for beta in BETA]
     cases = {"full": scenario.cases["full"]}
     for alpha, beta in points:

@@ -144,7 +144,9 @@ def fleet_of(
     rule = scenario.cases[case]
     present = {row.name for row in feeder.inverters} if roster is None else set(roster)
     rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
-    control = Control(secondary=rule.secondary, graph=rule.graph, links=rule.links, without=rule.without, gains=rule.gains)
+    control = Control(
+        secondary=rule.secondary, graph=rule.graph, links=rule.links, without=rule.without, gains=rule.gains
+    )
     GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
     everybody = np.full(len(rows), rule.secondary == "all")
     fleet = Fleet(

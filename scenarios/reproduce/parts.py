@@ -132,8 +132,10 @@ PARTS: tuple[Part, ...] = (
         experiment="communication",
         title="Reduced communication and link failure",
         what="Islanded at 1 s, with all 36 links; with 12, each microgrid a cluster and the leaders 1, 4, 7 between "
-        "them, before "
-        "and after re-tuning alpha and beta; and with the link 4-7 missing.",
+        "them, "
+        "before and after re-tuning alpha and beta; and with the link 4-7 missing. Then, not in the paper, inverter "
+        "2 "
+        "leaves at 6 s and returns at 7 s.",
         pictures=(
             Picture(
                 key="communication",
