@@ -1,0 +1,31 @@
+"""The paper's scenarios give the same bytes with one process and with many, whatever happens in them."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.spec import Event, load_scenario
+from scenarios.spec.configs import configs
+from tests.toy.runs import FleetRun, Rows, first_difference
+
+
+@pytest.mark.parametrize(("name", "case"), [("intermittency", "200kW"), ("reduced-communication", "link-failure")])
+def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str) -> None:
+    """Available power that changes, and a missing link: the same history to the last bit. Tables III, IV."""
+    scenario, feeder = load_scenario(name)
+    events: tuple[Event, ...] = tuple(replace(event, t_s=0.1 + 0.1 * i) for i, event in enumerate(scenario.events[:2]))
+    if name == "reduced-communication":
+        events = events[:1]
+    short = replace(scenario, events=events, time=replace(scenario.time, end_s=0.6))
+    plant, agents = configs(short, feeder, case)
+    rows: Rows = []
+    alone = run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows))
+    fleet = FleetRun(plant, agents, tmp_path)
+    together = fleet()
+
+    assert not alone.broke
+    assert not together.broke
+    assert [event.kind for event in together.events] == [event.kind for event in alone.events]
+    assert first_difference(rows, fleet.rows) == ""
