@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from scenarios.drivers.fleet import run_processes
 from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.ports import endpoint
 from scenarios.spec import Event, load_scenario
 from scenarios.spec.configs import configs
-from tests.toy.runs import FleetRun, Rows, first_difference
+from tests.toy.runs import Rows, first_difference
 
 
 @pytest.mark.parametrize(("name", "case"), [("intermittency", "200kW"), ("reduced-communication", "link-failure")])
@@ -19,13 +21,12 @@ def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str)
     if name == "reduced-communication":
         events = events[:1]
     short = replace(scenario, events=events, time=replace(scenario.time, end_s=0.6))
-    plant, agents = configs(short, feeder, case)
-    rows: Rows = []
-    alone = run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows))
-    fleet = FleetRun(plant, agents, tmp_path)
-    together = fleet()
+    plant, agents = configs(short, feeder, case, endpoint(0))
+    rows: dict[str, Rows] = {"alone": [], "together": []}
+    alone = run_inprocess(plant, agents, lambda telemetry: rows["alone"].extend(telemetry.rows))
+    together = run_processes(plant, agents, tmp_path, lambda telemetry: rows["together"].extend(telemetry.rows))
 
     assert not alone.broke
     assert not together.broke
     assert [event.kind for event in together.events] == [event.kind for event in alone.events]
-    assert first_difference(rows, fleet.rows) == ""
+    assert first_difference(rows["alone"], rows["together"]) == ""
