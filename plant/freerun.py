@@ -250,7 +250,7 @@ class FreePlant(Side):
             check_name("reply_to", command.reply_to)
         except ValueError as error:
             raise RejectedError("garbled", str(error)) from None
-        answer = self._service.serve(command)
+        answer = self._service.serve(command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
         if answer.ok and command.verb == "link":
             self._send_orders(now)
@@ -268,8 +268,8 @@ class FreePlant(Side):
 
     # ---------------------------------------------------------------- emulated links
 
-    def order(self, text: str, reply_to: str) -> LinkOrder:
-        """Have links do what a person ordered, from the tick after the next measurement on: till then all know of it.
+    def order(self, text: str, reply_to: str, now: float) -> LinkOrder:
+        """Have links do what a person ordered, from one control period after the due tick on: till then all know it.
 
         Raises
         ------
@@ -279,7 +279,8 @@ class FreePlant(Side):
         if self._links is None:
             raise ValueError(NO_LINKS)
         said = self._links.told(text)
-        t = time_of(self.tick + 1, self.config.T_c) if self.phase == "running" else self.t
+        overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
+        t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
         self._links.order(text, t)
         order = self._orders.give(text, t, reply_to)
         text = f"order {order.seq} to links: {said}, from t = {t:g} s on"

@@ -27,22 +27,22 @@ class Service:
     def __init__(self, side: FreePlant) -> None:
         self._side = side
 
-    def serve(self, command: Command) -> Answer:
+    def serve(self, command: Command, now: float) -> Answer:
         """Do what is asked, but for "down", which is the plant's own; the answer says what became of it."""
         side = self._side
         try:
             if side.phase not in ("gathering", "running"):
                 raise ValueError("the run is ending")
-            text = self._do(command)
+            text = self._do(command, now)
             ok = True
         except ValueError as error:
             text, ok = str(error), False
         return Answer(sender=PLANT, incarnation=side.config.incarnation, seq=command.seq, t=side.t, ok=ok, text=text)
 
-    def _do(self, command: Command) -> str:
+    def _do(self, command: Command, now: float) -> str:
         side, verb, argument = self._side, command.verb, command.argument
         if verb in ("link", "links"):
-            return msgspec.json.encode(self._ordered(command)).decode()
+            return msgspec.json.encode(self._ordered(command, now)).decode()
         if verb == "status":
             return msgspec.json.encode(self.status()).decode()
         if verb == "down":
@@ -57,12 +57,12 @@ class Service:
         side.plant.switch(argument, verb)
         return f"switch {argument}: {verb} at t = {side.t:g} s"
 
-    def _ordered(self, command: Command) -> dict[str, Any]:
+    def _ordered(self, command: Command, now: float) -> dict[str, Any]:
         """Number of an order and when it begins to hold (s), and who will answer: the agents that are there."""
         side = self._side
         agents = [name for name in side.plant.inverters if name in side.plates]
         if command.verb == "link":
-            order = side.order(command.argument, command.reply_to)
+            order = side.order(command.argument, command.reply_to, now)
             return {"number": order.seq, "t": order.t, "asked": agents}
         if not side.has_links:
             raise ValueError(NO_LINKS)

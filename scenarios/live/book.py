@@ -11,12 +11,14 @@ import msgspec
 
 from netem.spec.change import Change, replayed
 from netem.spec.netem import Netem
+from plant.equipment import Feeder
 from scenarios.emulation.orders import Order
 from scenarios.emulation.setup import Setup
 from scenarios.live.place import UsageError
 from scenarios.results.folder import shown, write_whole
 from scenarios.results.links import LinkRecord
 from scenarios.spec import Scenario
+from scenarios.spec.moves import inverters_of
 from scenarios.spec.netem import netem_of
 from scenarios.spec.writing import to_toml
 from wire.messages import LinkOrder, LinkReport
@@ -29,6 +31,8 @@ class Book:
     ----------
     scenario : Scenario
         As run, with its one case.
+    feeder : Feeder
+        Its feeder.
     links : str
         What the processes are told of links.
     folder : Path or None
@@ -40,9 +44,15 @@ class Book:
     """
 
     def __init__(
-        self, scenario: Scenario, links: str, folder: Path | None, replay: Path | None, by_the_way: Path | None
+        self,
+        scenario: Scenario,
+        feeder: Feeder,
+        links: str,
+        folder: Path | None,
+        replay: Path | None,
+        by_the_way: Path | None,
     ) -> None:
-        self._scenario, self._setup = scenario, Setup.of_text(links)
+        self._scenario, self._feeder, self._setup = scenario, feeder, Setup.of_text(links)
         self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
         self._record = LinkRecord()
         self._orders: dict[int, Change] = {}
@@ -80,7 +90,7 @@ class Book:
     def _write_replay(self, t: float) -> None:
         files = [self._replay, self._by_the_way if self._orders else None]
         text = to_toml(
-            replay_of(self._scenario, self._setup, self.changes, t),
+            replay_of(self._scenario, self._feeder, self.changes, t),
             {"driver": "by hand", "python": platform.python_version()},
         )
         for file in files:
@@ -88,21 +98,22 @@ class Book:
                 write_whole(file, text)
 
 
-def replay_of(scenario: Scenario, setup: Setup, changes: Sequence[Change], t: float) -> Scenario:
-    """The scenario whose links do by schedule what they were ordered to do.
+def replay_of(scenario: Scenario, feeder: Feeder, changes: Sequence[Change], t: float) -> Scenario:
+    """The scenario whose links do by schedule what they were ordered to do; of agents that it does not know, nothing.
 
     Parameters
     ----------
     scenario : Scenario
         As run, with its one case.
-    setup : Setup
-        Who stands where.
+    feeder : Feeder
+        Its feeder.
     changes : Sequence[Change]
         What was ordered.
     t : float
         How far the run came (s): the scenario ends there, if it does not end later anyway.
     """
     ((name, case),) = scenario.cases.items()
+    microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
     end = max(scenario.time.end_s, round(math.ceil(needed / T_c - 1e-6) * T_c, 9))
@@ -111,7 +122,7 @@ def replay_of(scenario: Scenario, setup: Setup, changes: Sequence[Change], t: fl
         name="",
         paper="",
         time=msgspec.structs.replace(scenario.time, end_s=end),
-        netem=replayed(netem_of(scenario, name), changes, setup.microgrids),
+        netem=replayed(netem_of(scenario, name), changes, microgrids),
         cases={name: msgspec.structs.replace(case, netem=Netem())},
     )
 

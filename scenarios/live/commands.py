@@ -245,7 +245,7 @@ def _start(
         config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
-            book = Book(spec, config.links, kept.record, record, None if out is None else out / "replay.toml")
+            book = Book(spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml")
             if left := real_nodes(spec) if not agents else "":
                 say(left)
             if agents:

@@ -144,6 +144,8 @@ def _pattern(links: list[str], arrow: str) -> str:
 
     if not links:
         return EVERYTHING
+    if "-" in links:
+        raise UsageError('LINKS: the shell took the arrow for a redirection; put the pattern in quotes: "inv1 -> inv4"')
     if len(links) == 2 and not any("->" in word for word in links):
         return f"{links[0]} {arrow} {links[1]}"
     if len(links) == 1:

@@ -79,8 +79,8 @@ def _refuse(mistakes: Iterable[Mistake]) -> None:
 def give(visit: Visit, order: Order, setup: Setup) -> Outcome:
     """Give an order and wait until every receiver that it concerns has taken it, or for `ACKNOWLEDGED` seconds."""
     pattern, names = parse(order.on), tuple(setup.microgrids)
-    links = [link for link in links_among(names) if pattern.matches(*link, setup.microgrids)]
-    concerned = list(dict.fromkeys(link.dst for link in links))
+    receivers = {link.dst for link in links_among(names) if pattern.matches(*link, setup.microgrids)}
+    concerned = [name for name in (*names, PLANT) if name in receivers]
     taken, answers = _ask(visit, "link", order.to_text(), concerned)
     there = [name for name in concerned if name == PLANT or name in taken.asked]
     deaf = {name: answers[name].text for name in there if name in answers and not answers[name].ok}

@@ -5,29 +5,11 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.processes.terminals import Desk, Terminal, free_endpoint
-
-CALM = """
-[time]
-end_s = 10.0
-[case.IV]
-secondary = "all"
-graph = "full"
-"""
-"""No event: what happens, the test does."""
-
-
-@pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Desk]:
-    """Terminals of one run, at a port of its own."""
-    (tmp_path / "calm.toml").write_text(CALM)
-    with Desk(tmp_path, "--run", "lab", "--connect", free_endpoint()) as terminals:
-        yield terminals
 
 
 def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:

@@ -12,11 +12,22 @@ from msgspec.structs import replace
 
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.fleet import _endpoint
+from scenarios.results.links import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
 from wire.codec import decode, encode
 from wire.keys import Keys
-from wire.messages import AgentStatus, Answer, Command, PlantEvent, State, Telemetry
+from wire.messages import (
+    AgentStatus,
+    Answer,
+    Command,
+    LinkAnswer,
+    LinkOrder,
+    LinkReport,
+    PlantEvent,
+    State,
+    Telemetry,
+)
 from wire.session import Session
 
 PATIENCE = 20.0
@@ -38,6 +49,8 @@ class Town:
         Inverters that are off at the start.
     also : tuple[str, ...], optional
         Endpoints that agents connect to beside the plant's.
+    links : str, optional
+        What the processes are told of emulated links.
     changes : Any
         Fields of the plant's configuration.
     """
@@ -50,6 +63,7 @@ class Town:
         run: str = "toy",
         spares: tuple[str, ...] = (),
         also: tuple[str, ...] = (),
+        links: str = "",
         **changes: Any,
     ) -> None:
         plant, agents = toy_configs(n, run=run)
@@ -59,13 +73,15 @@ class Town:
             clock="wall",
             end=None,
             listen=(self.endpoint,),
+            links=links,
             settings=replace(plant.settings, spares=spares),
             agents=tuple(name for name in plant.agents if name not in spares),
         )
         self.plant_config = replace(self.plant_config, **changes)
         connect = (self.endpoint, *also)
         self.agent_configs = {
-            config.name: replace(config, clock="wall", connect=connect, deadline=PATIENCE) for config in agents
+            config.name: replace(config, clock="wall", connect=connect, deadline=PATIENCE, links=links)
+            for config in agents
         }
         self.keys = Keys(run)
         self.folder = folder
@@ -77,6 +93,9 @@ class Town:
         self.rows: list[tuple[float, ...]] = []
         self.telemetry: Telemetry | None = None
         self.answers: list[Answer] = []
+        self.obeyed: list[LinkAnswer] = []
+        self.orders: list[LinkOrder] = []
+        self.link_record = LinkRecord()
         self.tokens: set[str] = set()
         self.session = Session("observer", listen=("tcp/127.0.0.1:0",), connect=connect, clock="wall")
         for name in self.agent_configs:
@@ -101,7 +120,7 @@ class Town:
         for name in names:
             is_plant = name == "plant"
             config = self.plant_config if is_plant else self.agent_configs[name]
-            command = list(TOY) if is_plant else ["-m", "agents"]
+            command = list(TOY) if is_plant else ["-m", "scenarios.emulation.agent" if config.links else "agents"]
             self.add(name, command, config)
         return self
 
@@ -191,6 +210,12 @@ class Town:
                 self.states[message.sender] = message
             elif isinstance(message, Answer):
                 self.answers.append(message)
+            elif isinstance(message, LinkAnswer):
+                self.obeyed.append(message)
+            elif isinstance(message, LinkOrder):
+                self.orders.append(message)
+            elif isinstance(message, LinkReport):
+                self.link_record(message)
             elif isinstance(message, Telemetry):
                 self.telemetry = message
                 self.rows += message.rows

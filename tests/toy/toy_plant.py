@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from plant.config import PlantConfig
 from plant.runtime import run_plant
+from scenarios.emulation.links import links_of
 from wire.messages import PlantEvent
 from wire.process import main
 
@@ -116,4 +117,4 @@ class ToyPlant:
 
 
 if __name__ == "__main__":
-    sys.exit(main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant)))
+    sys.exit(main("toy_plant", "a toy", PlantConfig, lambda config: run_plant(config, ToyPlant, links_of)))
