@@ -32,9 +32,10 @@ def lines(table: PaperTable, result: Result) -> tuple[Line, ...]:
     """Rows of a table, in the paper's order."""
     rows: dict[str, dict[Quantity, Cell]] = {}
     titles = titles_of(result)
+    several = len({cell.event for cell in table.cells}) > 1
     for cell in table.cells:
         what = f"island of {cell.island}" if cell.island else titles.get(cell.case, cell.case)
-        rows.setdefault(f"{what}, {cell.event}", {})[cell.quantity] = cell
+        rows.setdefault(f"{what}, {cell.event}" if several else what, {})[cell.quantity] = cell
     return tuple(
         Line(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
         for label, cells in rows.items()

@@ -76,13 +76,11 @@ PARTS: tuple[Part, ...] = (
                 key="var-sharing",
                 file="var-sharing.png",
                 title="MQSI of the paper, and of our feeder with the same capacitors at other buses",
-                note="Six of our eight numbers are within a factor of 2 of the paper's; case I after event 1 is not "
-                "(0.096 "
-                "for 0.22), and case IV is better. One bank moves or adds as much as what separates ours from the "
-                "paper, "
-                "but none of these feeders meets all eight: that takes the paper's own. The order of the cases, and "
-                "IV near "
-                "0, do not depend on it: that is what is judged.",
+                note="One bank moves or adds as much as what separates ours from the paper, but none of these "
+                "feeders meets "
+                "all eight numbers: that takes the paper's own. The order of the cases, and IV near 0, do not depend "
+                "on it: "
+                "that is what is judged.",
             ),
         ),
     ),
@@ -106,7 +104,7 @@ PARTS: tuple[Part, ...] = (
     ),
     Part(
         name="wind-up",
-        experiment="",
+        experiment="wind-up",
         title="Wind-up and its remedies (ours)",
         what="Not in the paper: for 2.5 s clouds leave 175 kW each to inverters 2, 5 and 8, which is less than the "
         "others can "
@@ -118,12 +116,13 @@ PARTS: tuple[Part, ...] = (
                 key="wind-up",
                 file="available-power.png",
                 title="Three ways with the set-points of saturated inverters",
-                note="Without limits P_set grows to 2.1 pu. That holds the frequency near 59.93 Hz against the GFM's "
-                "overload "
-                "limiter meanwhile, and overshoots by 0.4 Hz when the sun is back; limited, it falls while power is "
-                "short, "
-                "overshoots by 0.09 Hz, and is back in 0.7 s instead of 1.2 s. The conditional way gives the same "
-                "here.",
+                note="Without limits set-points wind up for as long as power is short. That holds the frequency up "
+                "against "
+                "the overload limiter of the grid-forming inverters meanwhile, and overshoots when the sun is back. "
+                "Limited, "
+                "the frequency falls while power is short and comes back sooner. While all are at their limits there "
+                "is "
+                "nothing more that the conditional way could save.",
             ),
         ),
     ),
@@ -141,9 +140,9 @@ PARTS: tuple[Part, ...] = (
                 key="communication",
                 file="overview.png",
                 title="All links, a third of them, and one missing (the paper's figure of reduced communication)",
-                note="alpha 0.5 and beta 8 were found on a grid of 30 points by bench/retune.py: the least MQSI "
-                "among those "
-                "whose V_error prints as the 0.002 of Table IV.",
+                note="alpha and beta were re-tuned on a grid of 30 points by bench/retune.py: the least MQSI among "
+                "those "
+                "whose V_error prints as Table IV has it.",
             ),
         ),
     ),

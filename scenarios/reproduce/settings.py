@@ -34,7 +34,7 @@ def settings(scenarios: dict[str, Scenario]) -> list[tuple[str, str, str]]:
         (
             "control period T_c",
             f"{time.T_c_s:g} s",
-            "with 10 ms and 50 ms the same steady values (docs/reproduction.md)",
+            "f, MPSI and V_error do not depend on it, MQSI and speed do: docs/reproduction.md has 5 to 100 ms",
         ),
         ("k_p", f"{gains.k_p:g} s", 'm_p / k_p = 14 1/s: the speed that "in less than 1 s" asks for'),
         (

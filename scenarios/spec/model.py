@@ -105,7 +105,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Name of the run folder; without it, that of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
-    paper: Literal["", "islanding", "intermittency", "communication", "switching", "plug-n-play"] = ""
+    paper: Literal["", "islanding", "intermittency", "communication", "switching", "plug-n-play", "wind-up"] = ""
     """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""

@@ -66,6 +66,12 @@ def switching() -> Experiment:
     return experiment("microgrid-switching")
 
 
+@pytest.fixture(scope="session")
+def wind_up() -> Experiment:
+    """Our experiment on the paper's Remark 2, by the driver without processes."""
+    return experiment("wind-up")
+
+
 def experiment(name: str) -> Experiment:
     """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)

@@ -7,6 +7,7 @@ from scenarios.results.claims.islanding import ISLANDING
 from scenarios.results.claims.plug_n_play import PLUG_N_PLAY
 from scenarios.results.claims.switching import SWITCHING
 from scenarios.results.claims.topology import TOPOLOGY
+from scenarios.results.claims.wind_up import WIND_UP
 
 CLAIMS: dict[str, tuple[Claim, ...]] = {
     "islanding": ISLANDING,
@@ -15,6 +16,7 @@ CLAIMS: dict[str, tuple[Claim, ...]] = {
     "topology": TOPOLOGY,
     "plug-n-play": PLUG_N_PLAY,
     "switching": SWITCHING,
+    "wind-up": WIND_UP,
 }
 """Claims by experiment, named as in the scenario's key `paper`; the topologies are a sweep and have no scenario."""
 

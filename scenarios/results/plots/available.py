@@ -21,7 +21,7 @@ def available_power(drawing: Drawing) -> Figure:
     at = drawing.plates.names.index(first)
     others = np.array([name not in drawing.limited for name in drawing.plates.names])
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(9.0, 5.4), layout="constrained")
+        figure = Figure(figsize=(7.4, 4.8), layout="constrained")
         grid = figure.subplots(2, 2, sharex=True)
         top, beside, below, last = grid.flat
         for number, (case, history) in enumerate(drawing.histories.items()):
@@ -47,7 +47,7 @@ def available_power(drawing: Drawing) -> Figure:
         for panel in grid[0]:
             panel.set_xlabel("")
         handles, labels = below.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 9.0))
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 7.4))
     return figure
 
 

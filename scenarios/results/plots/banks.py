@@ -20,7 +20,7 @@ Bars = Mapping[str, Mapping[tuple[str, str], float]]
 def var_sharing(bars: Bars, cases: Sequence[str], events: Sequence[str]) -> Figure:
     """One group of bars for each case, one panel for each event; the first variant is the paper."""
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+        figure = Figure(figsize=(7.4, 3.4), layout="constrained")
         panels = figure.subplots(1, len(events), sharey=True)
         x, width = np.arange(len(cases)), 0.8 / len(bars)
         for panel, event in zip(panels, events, strict=True):

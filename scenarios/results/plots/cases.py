@@ -17,7 +17,7 @@ from scenarios.results.plots.style import PAGE, case_style, columns, from_zero, 
 def overview(drawing: Drawing) -> Figure:
     """All four measures of all cases on one page."""
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(9.0, 5.2), layout="constrained")
+        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
         for panel, draw in zip(axes.flat, (frequency, MPSI, voltage, MQSI), strict=True):
             draw(panel, drawing)
@@ -25,7 +25,7 @@ def overview(drawing: Drawing) -> Figure:
         for panel in axes[0]:
             panel.set_xlabel("")
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 9.0))
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 7.4))
     return figure
 
 

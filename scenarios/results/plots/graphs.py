@@ -18,7 +18,7 @@ def topologies(runs: Sequence[GraphRun]) -> Figure:
     connected = tuple(run for run in runs if run.links >= TREE)
     times = medians(connected)
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        figure = Figure(figsize=(7.4, 3.2), layout="constrained")
         left, right = figure.subplots(1, 2)
         shared = [(run.links, run.settled.t_share_s) for run in connected if run.settled.t_share_s is not None]
         left.plot(*zip(*shared, strict=True), "o", color="#56b4e9", ms=4, alpha=0.8, label="a random connected graph")

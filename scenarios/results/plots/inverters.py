@@ -18,7 +18,7 @@ def plug_and_play(drawing: Drawing) -> Figure:
     """P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
     with mpl.rc_context(PAGE):
         count = len(drawing.histories)
-        figure = Figure(figsize=(5.2 * count + 1.2, 6.4), layout="constrained")
+        figure = Figure(figsize=(max(3.7 * count, 5.2), 5.4), layout="constrained")
         grid = figure.subplots(3, count, sharex=True, sharey="row", squeeze=False)
         for (top, middle, bottom), (case, history) in zip(grid.T, drawing.histories.items(), strict=True):
             alone = replace(drawing, histories={case: history})
@@ -53,7 +53,7 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
     count = len(drawing.histories)
     columns = 2 if count > 1 else 1
     rows = -(-count // columns)
-    size = (4.5 * columns + (2.0 if count == 1 else 0.0), 2.3 * rows + 0.6)
+    size = (3.7 * columns + (2.0 if count == 1 else 0.0), 2.0 * rows + 0.6)
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     chosen = np.flatnonzero(drawing.plates.GFM == GFM)

@@ -14,7 +14,7 @@ from scenarios.results.plots.style import OTHER_STYLES, PAGE, mark_events, time_
 def microgrids(drawing: Drawing, case: str) -> Figure:
     """P and Q in total, f and mean V of each part that becomes an island, over time."""
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(9.0, 5.2), layout="constrained")
+        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         grid = figure.subplots(2, 2, sharex=True)
         for number, (name, members) in enumerate(drawing.islands.items()):
             history, plates = part_of(drawing.histories[case], drawing.plates, members)

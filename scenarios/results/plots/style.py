@@ -57,10 +57,10 @@ STAYERS: dict[bool, Style] = {True: ("#0072b2", "-", 1.6), False: ("#56b4e9", "-
 """Styles of the others: grid-forming, or not."""
 
 PAGE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 10,
+    "font.size": 8,
+    "axes.titlesize": 9,
     "axes.titlepad": 14,
-    "axes.labelsize": 9,
+    "axes.labelsize": 8,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -68,9 +68,9 @@ PAGE: Any = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "legend.frameon": False,
-    "legend.fontsize": 8,
-    "figure.dpi": 150,
-    "savefig.dpi": 150,
+    "legend.fontsize": 7.5,
+    "figure.dpi": 180,
+    "savefig.dpi": 180,
 }
 """Layout of every figure."""
 
@@ -95,7 +95,16 @@ def from_zero(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates]
     top, peak = max(float(np.quantile(values, 0.995)) * 1.15, 0.05), float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
-        note_above(axes, f"spikes reach {peak:.2g}", 1.0, "axes fraction", "right")
+        axes.annotate(
+            f"spikes reach {peak:.2g}",
+            (0.995, 0.985),
+            xycoords="axes fraction",
+            ha="right",
+            va="top",
+            fontsize=7,
+            color="#444444",
+            bbox={"facecolor": "#ffffff", "edgecolor": "none", "pad": 1.0},
+        )
 
 
 def time_axis(axes: Axes, drawing: Drawing) -> None:
