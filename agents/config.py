@@ -20,6 +20,11 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Weight of the var-sharing sum in (15). >= 0."""
     beta_GFL: float = 1.0
     """Weight of the var-sharing sum of a GFL, (14). The paper has 1. >= 0."""
+    alpha_min: float = 0.0
+    """Least weight of a small voltage error, for V_full. 0 <= alpha_min < alpha."""
+    V_full: float = 0.0
+    """Voltage error (pu) from which on alpha counts in full; a smaller one counts in proportion, but not below
+    alpha_min. 0: always in full, the paper's way."""
     P_set_min: float = 0.0
     """Lower limit of P_set (pu), anti-windup."""
     P_set_max: float = 1.0

@@ -125,6 +125,33 @@ def P_set_step(
     return min(max(P_set + change / m_p, gains.P_set_min), gains.P_set_max)
 
 
+def alpha_in_force(gains: Gains, v: float) -> float:
+    r"""Weight of the voltage error (1): alpha, or less near nominal voltage where the gains ask for it.
+
+    .. math:: \alpha(v) = \max(\alpha_{min}, \alpha \min(1, |v - 1| / V_{full}))
+
+    In equilibrium a leader's alpha (v - 1) stands against its beta times the difference of vars: so alpha decides both
+    how soon voltage is back and how equal vars become. Large where voltage is far off and small where it is nearly
+    back, it takes less from one for the other. The paper mentions adaptive weights and gives none; this one is ours.
+
+    Parameters
+    ----------
+    gains : Gains
+        alpha, alpha_min and V_full.
+    v : float
+        Own terminal voltage (pu of nominal).
+
+    Examples
+    --------
+    >>> adaptive = Gains(alpha=1.0, alpha_min=0.125, V_full=0.02)
+    >>> [round(alpha_in_force(adaptive, v), 3) for v in (0.9, 0.99, 1.0)], alpha_in_force(Gains(), 1.001)
+    ([1.0, 0.5, 0.125], 1.0)
+    """
+    if gains.V_full <= 0.0:
+        return gains.alpha
+    return max(gains.alpha_min, gains.alpha * min(1.0, abs(v - 1.0) / gains.V_full))
+
+
 def V_set_step(
     V_set: float, z: float, z_bar: float, d: float, v: float, *, leader: bool, gains: Gains, T: float
 ) -> float:
@@ -159,5 +186,5 @@ def V_set_step(
     beta = gains.beta_GFM if leader else gains.beta_GFL
     change = -towards(beta / gains.k_q, d, T) * (z - z_bar)
     if leader:
-        change -= (1.0 - exp(-gains.alpha * T / gains.k_q)) * (v - 1.0)
+        change -= (1.0 - exp(-alpha_in_force(gains, v) * T / gains.k_q)) * (v - 1.0)
     return min(max(V_set + change, gains.V_set_min), gains.V_set_max)

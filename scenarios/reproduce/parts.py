@@ -132,7 +132,8 @@ PARTS: tuple[Part, ...] = (
         title="Reduced communication and link failure",
         what="Islanded at 1 s, with all 36 links; with 12, each microgrid a cluster and the leaders 1, 4, 7 between "
         "them, "
-        "before and after re-tuning alpha and beta; and with the link 4-7 missing. Then, not in the paper, inverter "
+        "before and after re-tuning alpha and beta, and with an alpha that adapts (ours); and with the link 4-7 "
+        "missing. Then, not in the paper, inverter "
         "2 "
         "leaves at 6 s and returns at 7 s.",
         pictures=(

@@ -73,6 +73,8 @@ def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
     for path, limits in ({"gains": scenario.gains} | own).items():
         _ordered(path, "P_set_min_pu", limits.P_set_min, "P_set_max_pu", limits.P_set_max, mistakes)
         _ordered(path, "V_set_min_pu", limits.V_set_min, "V_set_max_pu", limits.V_set_max, mistakes)
+        if limits.V_full > 0.0:
+            _ordered(path, "alpha_min", limits.alpha_min, "alpha", limits.alpha, mistakes)
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
     _ordered("plant.gfm", "P_min_pu", gfm.P_min, "P_max_pu", gfm.P_max, mistakes)
     _ordered("plant.gfm", "Q_min_pu", gfm.Q_min, "Q_max_pu", gfm.Q_max, mistakes)

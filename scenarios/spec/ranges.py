@@ -42,6 +42,8 @@ RANGES: dict[tuple[type, str], Range] = {
     (Gains, "k_p"): Range("gain k_p", "", 1e-7, 1e3, above_zero=True),
     (Gains, "k_q"): Range("gain k_q", "", 1e-5, 1e5, above_zero=True),
     (Gains, "alpha"): Range("gain alpha", "", 0.0, 1e4),
+    (Gains, "alpha_min"): Range("gain alpha_min", "", 0.0, 1e4),
+    (Gains, "V_full"): Range("a voltage error", "pu", 0.0, 0.2),
     (Gains, "beta_GFM"): Range("gain beta_GFM", "", 0.0, 1e4),
     (Gains, "beta_GFL"): Range("gain beta_GFL", "", 0.0, 1e4),
     (Gains, "P_set_min"): Range("a limit of P_set", "pu", -1.2, 1.2),
