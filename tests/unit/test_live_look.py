@@ -136,3 +136,14 @@ def test_a_look_at_nothing_is_one_line() -> None:
     """No agent, no plant: only the run's name."""
     assert plain(Look(run="lab")) == "run lab   has not begun\n"
     assert Line(name="inv1").note == ""
+
+
+def test_impaired_links_are_shown_only_while_there_are_any() -> None:
+    """A column of few characters, and a word in the first line of whom the plant hears badly; else nothing of it."""
+    hurt = Line(name="inv4", impaired=("inv1", "inv7", "plant"))
+    calm = Look(run="lab", t=1.0, lines=(Line(name="inv4"), Line(name="inv5")))
+    bad = Look(run="lab", t=1.0, lines=(hurt, Line(name="inv5")), impaired=("inv2", "inv3", "inv4"))
+
+    assert "impaired" not in plain(calm)
+    assert plain(bad).splitlines()[0].endswith("impaired to the plant: inv2-4")
+    assert [line.split()[-2:] for line in plain(bad).splitlines()[2:3]] == [["inv1,7", "plant"]]
