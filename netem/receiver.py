@@ -103,7 +103,8 @@ class Receiver:
 
     def touched(self, src: str) -> bool:
         """Whether a fault may ever act on the link from somebody: if not, its messages need not come here at all."""
-        return not self._link(src).channel.is_clear
+        inbound = self._links.get(src) or self._link(src)
+        return not inbound.is_clear
 
     def holding(self, src: str, t: float) -> dict[str, Span]:
         """What the link from somebody does to messages sent at t (s of run time), by kind."""
@@ -135,8 +136,10 @@ class Receiver:
 
     def due(self, now: float) -> list[Arrival]:
         """What has arrived by `now` (s of run time), in the order of arrival; at one time, of number and sender."""
-        heap, limit = self._heap, round(now * NANO)
-        arrived = []
+        heap = self._heap
+        if not heap:
+            return []
+        limit, arrived = round(now * NANO), []
         while heap and heap[0][0] <= limit:
             _, _, src, _, payload, delay, special = heappop(heap)
             ledger = self._links[src].ledger

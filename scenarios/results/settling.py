@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenarios.results.history import Floats, History, Plates
+from scenarios.results.history import Flags, Floats, History, Plates
 from scenarios.results.metrics import F_BAND, MPSI, MPSI_BAND, Window, between, for_good
 
 SWING = 2.0
@@ -48,7 +48,8 @@ def settling(history: History, plates: Plates, window: Window, f_nom: float) -> 
     """
     forming = history.present[:, plates.GFM]
     f = history.f[:, plates.GFM]
-    in_band = (np.where(forming, np.abs(f - f_nom), 0.0) < F_BAND).all(axis=1) & forming.any(axis=1)
+    near: Flags = np.where(forming, np.abs(f - f_nom), 0.0) < F_BAND
+    in_band = near.all(axis=1) & forming.any(axis=1)
     inside = between(history.t, window)
     end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
     return Settling(
