@@ -42,7 +42,7 @@ def experiment(
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
-            typer.echo(f"{known:10} {_title(source)}")
+            typer.echo(f"{known:14} {_title(source)}")
         return
     if name not in EXPERIMENTS:
         fail([f'no experiment "{name}"; {suggestion(name, tuple(EXPERIMENTS), "experiments")}'], BAD_INPUT)

@@ -95,14 +95,14 @@ def _table(told: Told, start: float, event: float, end: float) -> Table:
     rows: list[list[Cell]] = []
     for case, rule in told.scenario.cases.items():
         t, after = told.t(case), told.settling(case, end, told.scenario.time.end_s)
-        apart = 1e3 * (told.mean(told.f(case), case, end) - F_NOM)
+        apart = round(1e3 * (told.mean(told.f(case), case, end) - F_NOM), 1) + 0.0  # no -0
         said: tuple[float, float] | tuple[str, str] = ("", "")
         if rule.netem.partitions:
             _, (f, MPSI) = predicted(told, case, end - event)
             said = round(1e3 * (float(f[-1]) - F_NOM), 1), round(float(MPSI[-1]), 3)
         largest = 1e3 * float(np.abs(told.f(case)[t > end] - F_NOM).max())
         shared = told.mean(told.MPSI(case), case, end)
-        rows.append([rule.title, said[0], round(apart, 1), said[1], round(shared, 3), *_back(after), round(largest, 1)])
+        rows.append([rule.title, said[0], apart, said[1], round(shared, 3), *_back(after), round(largest, 1)])
     columns = (
         "case",
         "f - 60 before it ends, predicted (mHz)",

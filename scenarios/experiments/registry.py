@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from scenarios.experiments.communication import communication
 from scenarios.experiments.delay import delay
 from scenarios.experiments.flapping import flapping
 from scenarios.experiments.handling import handling
@@ -43,5 +44,6 @@ EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {
     "flapping": FromScenario("flapping", flapping),
     "partition": FromScenario("partition", partition),
     "handling": FromSweep("handling", handling),
+    "communication": FromSweep("communication-delay", communication),
 }
 """In the order of docs/experiments.md."""
