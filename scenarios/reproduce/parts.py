@@ -68,14 +68,14 @@ PARTS: tuple[Part, ...] = (
         experiment="",
         title="Why MQSI of cases I to III is not the paper's (ours)",
         what="MQSI measures vars that circulate or are shared unequally. Where they come from is decided by where "
-        "capacitors and loads stand between the inverters, which the paper does not print. Here nothing but two "
-        "banks of "
-        "300 kvar is moved.",
+        "capacitors and loads stand between the inverters, which the paper does not print. Here nothing is changed "
+        "but "
+        "two banks of 300 kvar: moved, doubled, taken away.",
         pictures=(
             Picture(
                 key="var-sharing",
                 file="var-sharing.png",
-                title="MQSI of the paper, and of our feeder with the same capacitors at other buses",
+                title="MQSI of the paper, and of our feeder with two banks of capacitors moved, doubled and taken away",
                 note="One bank moves or adds as much as what separates ours from the paper, but none of these "
                 "feeders meets "
                 "all eight numbers: that takes the paper's own. The order of the cases, and IV near 0, do not depend "

@@ -46,15 +46,15 @@ def settling(history: History, plates: Plates, window: Window, f_nom: float) -> 
     f_nom : float
         Nominal frequency (Hz).
     """
-    forming = history.present[:, plates.GFM]
-    f = history.f[:, plates.GFM]
-    near: Flags = np.where(forming, np.abs(f - f_nom), 0.0) < F_BAND
-    in_band = near.all(axis=1) & forming.any(axis=1)
     inside = between(history.t, window)
     end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
+    forming, f = history.present[:, plates.GFM], history.f[:, plates.GFM]
+    f_error = np.where(forming, np.abs(f - f_nom), 0.0)[inside]
+    in_band: Flags = np.all(f_error < F_BAND, axis=1) & np.any(forming[inside], axis=1)
+    shared: Flags = np.less(MPSI(history, plates)[inside], MPSI_BAND)
     return Settling(
-        t_f_s=for_good(history.t[inside], in_band[inside], window.start),
-        t_share_s=for_good(history.t[inside], (MPSI(history, plates) < MPSI_BAND)[inside], window.start),
+        t_f_s=for_good(history.t[inside], in_band, window.start),
+        t_share_s=for_good(history.t[inside], shared, window.start),
         f_swing_Hz=_swing(np.where(forming, f, np.nan)[end]),
         V_swing_pu=_swing(np.where(history.present, history.V / plates.V_nom, np.nan)[end]),
     )

@@ -27,11 +27,11 @@ def topologies(runs: Sequence[GraphRun]) -> Figure:
         left.axvspan(0, TREE - 0.5, color="#d55e00", alpha=0.12, lw=0)
         left.annotate(
             "not connected:\nno consensus",
-            (0.4, 0.97),
+            (0.4, 0.03),
             xycoords=("data", "axes fraction"),
             ha="left",
-            va="top",
-            fontsize=7,
+            va="bottom",
+            fontsize=6,
             color="#444444",
         )
         left.set_xlim(0, 37)

@@ -145,6 +145,6 @@ def words(drawing: Drawing, case: str) -> str:
 def columns(labels: Sequence[str], width: float) -> int:
     """How many columns of a legend fit below a figure of this width (inches), without a lonely last entry."""
     longest = max((len(label) for label in labels), default=1)
-    fit = max(1, int(width / (0.075 * longest + 0.6)))
+    fit = max(1, int(width / (0.058 * longest + 0.42)))
     rows = -(-len(labels) // fit)
     return -(-len(labels) // rows) if labels else 1
