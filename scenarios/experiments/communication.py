@@ -10,6 +10,7 @@ from scenarios.experiments.result import Result
 from scenarios.experiments.swept import Swept
 from scenarios.experiments.table import Cell, Table
 from scenarios.predict.times import predicted_times
+from scenarios.predict.var_response import var_growth
 
 X = "delay of every agent-agent link (s)"
 
@@ -19,7 +20,7 @@ LEFT = (("V_error", "mean of abs(V - 1) (pu)"), ("MQSI", "var sharing index, MQS
 
 def communication(swept: Swept) -> Result:
     """Times and steady values against delay, for every case of the scenario."""
-    cases, delays = list(swept.base.cases), swept.values(DELAY)
+    cases, delays = list(dict.fromkeys(row["case"] for row in swept.rows)), swept.values(DELAY)
     said = {
         (case, d): of_times(predicted_times(swept.fleet(case), link_delay_s=d, load=swept.load))
         for case in cases
@@ -53,8 +54,17 @@ def communication(swept: Swept) -> Result:
         for d in delays:
             at = {"case": case, DELAY: d}
             times = [(said[case, d][i], swept.median(index, at)) for i, (index, _) in enumerate(INDEXES)]
-            left = [round(swept.median(name, at), 4) for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu")]
-            rows.append((case, d, *times[0], *times[1], *left))
+            names = ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu")
+            left = [round(swept.median(name, at), 4) for name in names]
+            growth = round(var_growth(swept.fleet(case), swept.response, link_delay_s=d), 2)
+            rows.append((case, d, *times[0], *times[1], *left, growth))
     columns = ["case", "delay (s)", "f, predicted (s)", "f (s)", "sharing, predicted (s)", "sharing (s)"]
-    columns += ["abs(f - 60) (Hz)", "MPSI", "V_error (pu)", "MQSI", "swing of V (pu)"]
+    columns += [
+        "abs(f - 60) (Hz)",
+        "MPSI",
+        "V_error (pu)",
+        "MQSI",
+        "swing of V (pu)",
+        "growth of vars, predicted (1/s)",
+    ]
     return Result(page=page, table=Table(columns=columns, rows=rows, digits=2))

@@ -1,22 +1,24 @@
 """The same delay between agents, on the way of measurements, and on the way of set-points: what swings, from where on.
 
-The links between plant and agent carry frequency and voltage together. What swings first is the voltage; to see the
-frequency by itself, the sweep has runs that leave V_set alone.
+The links carry frequency and voltage together. What swings first is mostly the voltage; to see the frequency by itself,
+the sweep has runs that leave V_set alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from scenarios.experiments.delay import ALONE, DELAY, K_Q, WHOLE
 from scenarios.experiments.page import Curve, Line, Page, Panel
 from scenarios.experiments.result import Result
 from scenarios.experiments.swept import Swept
 from scenarios.experiments.table import Table
 from scenarios.predict.limits import delay_limit
-from scenarios.predict.vars import var_delay_limit, var_modes
+from scenarios.predict.var_response import var_growth
+from scenarios.predict.vars import var_delay_limit
 from scenarios.results.history import Flags, Floats
 
-DELAY, ON, K_Q = "link[0].delay", "link[0].on", "gains.k_q"
+ON = "link[0].on"
 
 LINKS, MEASUREMENTS, SET_POINTS = "* <-> *", "plant -> *", "* -> plant"
 
@@ -43,7 +45,7 @@ def places(swept: Swept) -> Result:
                 rows.append((title, place, case, limit, calm, wild))
             panels.append(
                 Panel(
-                    title=f"{title}, late {place}",
+                    title=f"{title}: late {place}",
                     x_label=f"delay of {place} (s)",
                     y_label=y_label,
                     curves=curves,
@@ -66,13 +68,13 @@ def places(swept: Swept) -> Result:
     return Result(page=page, table=Table(columns=columns, rows=rows))
 
 
-_PLANT = ((MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
+_PLACES = ((LINKS, "links"), (MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
 
 _ROWS = (
-    ("f_swing_Hz", "f", "swing of f (Hz)", ((LINKS, "links", 0.25), *((on, name, 1e5) for on, name in _PLANT))),
-    ("V_swing_pu", "V", "swing of V (pu)", ((LINKS, "links", 0.25), *((on, name, 0.25) for on, name in _PLANT))),
+    ("f_swing_Hz", "f, V_set left alone", "swing of f (Hz)", tuple((on, name, ALONE) for on, name in _PLACES)),
+    ("V_swing_pu", "V, whole law", "swing of V (pu)", tuple((on, name, WHOLE) for on, name in _PLACES)),
 )
-"""Rows of the figure: frequency beside a voltage that is left alone, as far as the plant's links are late; voltage."""
+"""Rows of the figure: frequency where the voltage is left alone, and voltage where nothing is."""
 
 
 def _limits(swept: Swept) -> dict[tuple[str, bool, str], float]:
@@ -88,11 +90,11 @@ def _limits(swept: Swept) -> dict[tuple[str, bool, str], float]:
 
 
 def _var_link_limit(swept: Swept, case: str) -> float:
-    """Longest delay (s) of the links up to which the law for voltage and vars is stable; infinite: all of the sweep."""
+    """Longest delay (s) of the links up to which the law for voltage and vars decays; infinite: all of the sweep."""
     T_c = swept.base.time.T_c_s
-    for n in range(round(max(swept.values(DELAY)) / T_c)):  # a state takes one period in any case
-        if var_modes(swept.fleet(case), swept.answers, link=n).spectral_radius >= 1.0:
-            return n * T_c
+    for n in range(1, round(max(swept.values(DELAY)) / T_c) + 1):
+        if var_growth(swept.fleet(case), swept.response, link_delay_s=n * T_c) > 0.0:
+            return round((n - 1) * T_c, 9)
     return np.inf
 
 

@@ -18,6 +18,7 @@ from scenarios.predict.fleet import Fleet, fleet_of
 from scenarios.predict.loads import load_steps
 from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.times import LoadStep
+from scenarios.predict.var_response import VarResponse, var_response
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 
@@ -100,6 +101,11 @@ class Swept:
     def answers(self) -> Sensitivity:
         """How voltages and vars answer to V_set."""
         return sensitivity(self.calm, self.feeder)
+
+    @cached_property
+    def response(self) -> VarResponse:
+        """The same with the plant's lags."""
+        return var_response(self.calm, self.feeder)
 
     def fleet(self, case: str) -> Fleet:
         """The inverters under the rule of a case."""
