@@ -27,7 +27,7 @@ def settings(scenarios: dict[str, Scenario]) -> list[tuple[str, str, str]]:
         (
             "load set",
             "; ".join(f'"{load_set}" in {", ".join(names)}' for load_set, names in sets.items()),
-            '"event2" drops 1.38 MW at event 2, which is what 0.14 and 0.07 Hz of Table I together imply; "main" lets '
+            '"event2" drops 1.35 MW at event 2; 0.14 and 0.07 Hz of Table I together imply 1.365 MW; "main" lets '
             "each microgrid stand alone",
         ),
         ("first P_set", f"{first.plant.P_set0_pu:g} pu", "follows from Table I by algebra: 0.65 pu on every unit"),

@@ -27,7 +27,7 @@ BELOW = (4, 5, 6, 7)
 PER_COUNT_BELOW = 2
 """Graphs for each of these."""
 
-END_S = 5.0
+END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
 Told = Callable[[int, int], None]
