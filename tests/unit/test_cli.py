@@ -32,7 +32,7 @@ def invoke(*words: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-@pytest.mark.parametrize("command", ["run", "list", "check", "doc"])
+@pytest.mark.parametrize("command", ["run", "list", "check", "doc", "reproduce"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     """--help tells what a command does and shows one."""
     code, text = invoke(command, "--help")
