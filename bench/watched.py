@@ -39,6 +39,9 @@ BUILD = 600.0
 HOLD = 0.5
 """How long (s of run time) the bands must hold to count as restored; longer than noticing takes."""
 
+_AGENT = "scenarios.emulation.agent"
+"""Agents by hand stand behind emulated links, that somebody may hurt."""
+
 _ELSEWHERE = "import os, sys; os.execvp(sys.argv[1], sys.argv[1:])"
 """What becomes another command, with the process id and the standard input of this one."""
 
@@ -145,12 +148,12 @@ class Watched:
             self.used.pop(name, None)
             log = self._folder / f"{name}-{len(self.children.lives(name))}.log"
             if name == PLANT:
-                child = Child(name, ["-m", "plant"], self.plant_config, log, self._ended, lambda word: None)
+                child = Child(
+                    name, ["-m", "scenarios.emulation.plant"], self.plant_config, log, self._ended, lambda word: None
+                )
             else:
                 _, prefix = self._places[name]
-                command = (
-                    ["-c", _ELSEWHERE, *prefix, sys.executable, "-P", "-m", "agents"] if prefix else ["-m", "agents"]
-                )
+                command = ["-c", _ELSEWHERE, *prefix, sys.executable, "-P", "-m", _AGENT] if prefix else ["-m", _AGENT]
                 child = Child(name, command, self.agents[name], log, self._ended)
             self.children.add(child)
 

@@ -19,7 +19,7 @@ from scenarios.live.setup import Wishes, set_up
 from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
 
-REAL = ("-m", "plant")
+REAL = ("-m", "scenarios.emulation.plant")
 
 TOO_LATE = 0.1
 """Part of the steps that may be late before the numbers mean nothing; the law stands more than a run may be late."""
@@ -43,7 +43,7 @@ class Feeder:
         """Start an agent of a name while the run goes on."""
         assert self.run.children is not None
         log = self.folder / f"{name}-again.log"
-        child = Child(name, ["-m", "agents"], self.agents[name], log, lambda child: None)
+        child = Child(name, ["-m", "scenarios.emulation.agent"], self.agents[name], log, lambda child: None)
         before = [child for child in self.run.children if child.name == name]
         for former in before:
             former.release()
