@@ -25,6 +25,10 @@ DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3
 """Of traces over time, which have no markers."""
 
 
+DPI = 130
+"""Points per inch: readable in print, and small enough for a repository."""
+
+
 def draw(page: Page, path: Path) -> Path:
     """Draw a page into a file, at once or not at all."""
     with mpl.rc_context(PAGE):
@@ -44,7 +48,7 @@ def draw(page: Page, path: Path) -> Path:
         figure.suptitle(page.title, fontsize=10)
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.name}")
-        figure.savefig(partial, format="png")
+        figure.savefig(partial, format="png", dpi=DPI)
         partial.replace(path)
     return path
 

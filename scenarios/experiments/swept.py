@@ -86,9 +86,10 @@ class Swept:
 
     @cached_property
     def calm(self) -> Scenario:
-        """The scenario with links that do nothing, and an end before long."""
-        time = msgspec.structs.replace(self.base.time, end_s=self.base.events[0].t_s + 3.0)
-        return msgspec.structs.replace(self.base, netem=Netem(), time=time)
+        """The scenario with links that do nothing, its first event alone, and an end before long."""
+        events = self.base.events[:1]
+        time = msgspec.structs.replace(self.base.time, end_s=events[0].t_s + 3.0)
+        return msgspec.structs.replace(self.base, netem=Netem(), events=events, time=time)
 
     @cached_property
     def load(self) -> LoadStep:
