@@ -61,9 +61,13 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     import pyarrow.parquet as pq
 
     from scenarios.experiments.swept import Swept
+    from scenarios.spec import ScenarioError
     from scenarios.sweep.file import read_sweep
 
-    plan = read_sweep(source.sweep)
+    try:
+        plan = read_sweep(source.sweep)
+    except ScenarioError as error:
+        fail(error.mistakes, BAD_INPUT)
     summary = finish(source.sweep, plan, folder, jobs, "", again)
     if sum(summary.broke.values()):
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
