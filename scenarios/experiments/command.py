@@ -67,7 +67,7 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     try:
         plan = read_sweep(source.sweep)
     except ScenarioError as error:
-        fail(error.mistakes, BAD_INPUT)
+        fail(list(error.mistakes), BAD_INPUT)
     summary = finish(source.sweep, plan, folder, jobs, "", again)
     if sum(summary.broke.values()):
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
