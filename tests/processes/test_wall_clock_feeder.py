@@ -12,6 +12,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from plant.pacing import TOLERATED
 from scenarios.drivers.children import Child
 from scenarios.drivers.fleet import _endpoint
 from scenarios.drivers.outcome import Outcome
@@ -20,10 +21,6 @@ from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
 
 REAL = ("-m", "scenarios.emulation.plant")
-
-TOO_LATE = 0.1
-"""Part of the steps that may be late before the numbers mean nothing; the law stands more than a run may be late."""
-
 
 class Feeder:
     """Case IV of the islanding experiment in wall-clock time, without its second event."""
@@ -56,7 +53,7 @@ class Feeder:
         assert outcome.broke == ""
         pacing = outcome.pacing
         assert pacing is not None
-        if pacing.late > TOO_LATE * pacing.steps or pacing.slipped:
+        if pacing.late > TOLERATED * pacing.steps or pacing.slipped:
             pytest.skip(f"this machine is too busy for wall-clock time: {msgspec.to_builtins(pacing)}")
         return outcome
 
