@@ -88,7 +88,7 @@ EIGHT = tuple(i for i in NINE if i != 2)
 
 OPEN = pytest.mark.xfail(
     strict=False,
-    reason="open (issue 3): of ten returns on a quiet machine eight take 0.63 to 0.66 s, two 1.35 s; why is not known yet",
+    reason="open (issue 3): of ten returns on a quiet machine eight take 0.65 s, two 1.35 s; why is not known yet",
 )
 
 
