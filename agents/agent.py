@@ -177,13 +177,21 @@ class Agent:
                 V_set = V_next
             self._P_set = P_set * config.P_rated
             self._V_set = V_set * config.V_nom
+        return self._state(measurement, self._P_set, self._V_set)
+
+    def stand_still(self, measurement: Measurement) -> State:
+        """What a paused agent is taken to say at this tick: what the plant holds, from which it begins again."""
+        self.let_go()
+        return self._state(measurement, measurement.P_set, measurement.V_set)
+
+    def _state(self, measurement: Measurement, P_set: float, V_set: float) -> State:
         return State(
-            sender=config.name,
-            incarnation=config.incarnation,
+            sender=self.config.name,
+            incarnation=self.config.incarnation,
             seq=measurement.seq,
             t=measurement.t,
-            P_set=self._P_set,
-            V_set=self._V_set,
+            P_set=P_set,
+            V_set=V_set,
             Q=measurement.Q,
             island=measurement.island,
         )

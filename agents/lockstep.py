@@ -323,20 +323,6 @@ class AgentSide(Side):
             kind = "stale" if seq < self._tick else "unexpected"
             raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
 
-    def _stand_still(self, measurement: Measurement) -> State:
-        """What the lock-step needs of a paused agent; no link lets it through. Awake, it starts from what is held."""
-        self._agent.let_go()
-        return State(
-            sender=self._name,
-            incarnation=self._incarnation,
-            seq=measurement.seq,
-            t=measurement.t,
-            P_set=measurement.P_set,
-            V_set=measurement.V_set,
-            Q=measurement.Q,
-            island=measurement.island,
-        )
-
     def _hear(self, state: State, payload: bytes) -> None:
         if not self._is_offered(state, payload, state.t):
             self._agent.hear(state)
@@ -366,7 +352,8 @@ class AgentSide(Side):
         if sensed is not measurement:
             sensed = replace(sensed, seq=tick, t=measurement.t)
         stalled = self._links is not None and self._links.stalled(measurement.t)
-        state = self._stand_still(measurement) if stalled else self._agent.tick(sensed, neighbours)
+        # A paused agent's state is for the lock-step alone: no link lets it through.
+        state = self._agent.stand_still(measurement) if stalled else self._agent.tick(sensed, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)
         self._tick, self._measurement = tick + 1, None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.build import build_plant
+from plant.config import PlantConfig
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from plant.feeder import Plant
@@ -47,10 +48,8 @@ def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
     rated = {agent.name: agent.P_rated for agent in agents}
     nominal = {agent.name: agent.V_nom for agent in agents}
     names = config.agents
-    end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
     try:
-        plant = build_plant(config)
-        _rest(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
+        plant = plant_in_first_window(scenario, config)
         columns = []
         for name in names:
             here = plant.measure()[name]
@@ -65,6 +64,20 @@ def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
     except PlantError as error:
         raise LoadError(f"on droop alone: {error}") from error
     return Sensitivity(names=names, S=np.array(columns)[:, :, 0].T, H=np.array(columns)[:, :, 1].T)
+
+
+def plant_in_first_window(scenario: Scenario, config: PlantConfig) -> Plant:
+    """The plant on droop alone, gone on to the last tick before the second event, or to the end of the run.
+
+    Raises
+    ------
+    PlantError
+        If it has no solution on the way.
+    """
+    end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
+    plant = build_plant(config)
+    _rest(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
+    return plant
 
 
 def _rest(plant: Plant, ticks: int) -> None:

@@ -18,12 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.law import towards
-from plant.build import build_plant
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.loads import LoadError
-from scenarios.predict.sensitivity import STEP
+from scenarios.predict.sensitivity import STEP, plant_in_first_window
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
@@ -58,12 +57,9 @@ def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
     config, agents = configs(scenario, feeder, next(iter(scenario.cases)))
     names, count = config.agents, round(LENGTH / config.T_c)
     scale = {agent.name: (agent.P_rated, agent.V_nom) for agent in agents}
-    end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
     steps = np.zeros((count + 1, 2, len(names), len(names)))
     try:
-        plant = build_plant(config)
-        while (plant.tick + 1) * config.T_c <= end + 1e-9:
-            plant.advance()
+        plant = plant_in_first_window(scenario, config)
         for column, name in enumerate(names):
             for sign in (1.0, -1.0):
                 moved = copy.deepcopy(plant)
