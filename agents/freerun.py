@@ -23,6 +23,7 @@ from typing import Literal
 
 from msgspec.structs import replace
 
+from agents.cadence import Cadence
 from agents.config import AgentConfig
 from agents.hearing import PATIENCE, Hearing, patience_after
 from agents.orders import Orders
@@ -75,7 +76,8 @@ class FreeAgent(Side):
         """Ticks skipped, as their time was over."""
         self.ticks = self.sent = self.used = self.lost = 0
         self._first_routes = dict(self._routes)
-        self._timer = Timer(config.T_c / config.speed / config.clock_rate, 0.0)
+        # a clock that is to drift must drift
+        self._cadence = Cadence(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
         self._lateness = 0.0
@@ -130,11 +132,11 @@ class FreeAgent(Side):
     @property
     def until(self) -> float:
         """When the next tick is due (s on the driver's clock)."""
-        return self._timer.due
+        return self._cadence.due
 
     def start(self, now: float) -> None:
         """Begin to tick, or begin again after a session that had gone astray; there is nothing to do yet."""
-        self._timer = Timer(self._timer.period, now)
+        self._cadence.start(now)
         self._status = Timer(STATUS_PERIOD, now)
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
@@ -149,13 +151,13 @@ class FreeAgent(Side):
 
     def expire(self, now: float) -> None:
         """Tick, if it is time."""
-        late = now - self._timer.due
+        late = now - self._cadence.due
         if late < 0.0 or self.over:
             return
-        skipped = self._timer.take(now)
+        skipped = self._cadence.take(now)
         if self._leaving:
             self._left += 1
-            if self._left * self._timer.period >= LEAVING or not self._plant_there:
+            if self._left * self._cadence.period >= LEAVING or not self._plant_there:
                 self.stopped = self._leaving
             return
         if self._give_up is not None and not self.plant_seen and now >= self._give_up:
@@ -316,6 +318,7 @@ class FreeAgent(Side):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
         self._check_life(message)
         self._count(message, now)
+        self._cadence.measured(now)
         self._run_time = message.t
         if not self._is_offered(message, payload, now * self._config.speed):
             self._measurement, self._measured_at = message, now

@@ -65,7 +65,7 @@ class Peer:
                 return
             until = monotonic() + HELLO_PERIOD
             while (left := until - monotonic()) > 0:
-                for _, key, payload in self.session.inbox.take(1, left):
+                for _, key, payload, _ in self.session.inbox.take(1, left):
                     who = key.rpartition("/")[2]
                     if "/hello/" not in key:
                         self.seen[key] += 1
@@ -77,7 +77,7 @@ class Peer:
     def wait(self, wanted: dict[str, int]) -> None:
         """Return when so many messages have come on each key; sleep until as many are there as are missing."""
         while missing := sum(max(0, count - self.seen[key]) for key, count in wanted.items()):
-            for _, key, _ in self.session.inbox.take(missing, 30.0):
+            for _, key, _, _ in self.session.inbox.take(missing, 30.0):
                 self.seen[key] += 1
 
 

@@ -89,7 +89,7 @@ def receive(session: Session, key: str, count: int) -> list[float]:
         events = session.inbox.take(1, LONGEST)
         if not events:
             raise TimeoutError(f"nothing came for {LONGEST:g} s")
-        took += [stamp_of(payload) - stamp_of(payload, STAMP) for _, _, payload in events]
+        took += [stamp_of(payload) - stamp_of(payload, STAMP) for _, _, payload, _ in events]
     return took[WARM_UP : WARM_UP + count]
 
 
@@ -109,7 +109,7 @@ def ping(session: Session, key: str, size: int, count: int) -> list[float]:
     took: list[float] = []
     while len(took) < count + WARM_UP:
         session.publish(key, pack("<q", monotonic_ns()) + bytes(size - STAMP))
-        took += [stamp_of(p) - stamp_of(p, STAMP) for _, _, p in session.inbox.take(1, 0.5)]
+        took += [stamp_of(p) - stamp_of(p, STAMP) for _, _, p, _ in session.inbox.take(1, 0.5)]
     return took[WARM_UP : WARM_UP + count]
 
 
@@ -117,7 +117,7 @@ def echo(session: Session, key: str) -> None:
     """Send back what comes, until the process is ended or nothing comes any more."""
     session.subscribe(key)
     while events := session.inbox.take(1, LONGEST):
-        for _, _, payload in events:
+        for _, _, payload, _ in events:
             session.publish(f"{key}/back", payload[STAMP:])
 
 

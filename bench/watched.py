@@ -170,7 +170,7 @@ class Watched:
             if left <= 0.0:
                 ends = [child.report("") for name in self.names if (child := self.children[name]).status is not None]
                 raise NotInTimeError("\n".join((f"not within {patience:g} s: {what}; sums {self.used}", *ends)))
-            for kind, key, payload in self.session.inbox.take(1, left):
+            for kind, key, payload, _ in self.session.inbox.take(1, left):
                 self._take(kind, key, payload)
             if self.children[PLANT].status is not None:
                 raise NotInTimeError(self.children[PLANT].report("while it was needed"))

@@ -64,7 +64,7 @@ class Core(Protocol):
         ...
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message."""
+        """Take a message, which came at `now`; it may have waited for its owner since."""
         ...
 
     def work(self, now: float) -> bool:
@@ -139,9 +139,9 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
         until = core.until
         events = take(core.wanted, None if until is None else max(0.0, until - now))
         now = monotonic()
-        for kind, key, payload in events:
+        for kind, key, payload, at in events:
             if kind == "message":
-                core.received(key, payload, now)
+                core.received(key, payload, at)
             elif kind == "appeared":
                 core.appeared(key, now)
             elif kind == "vanished":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from _thread import allocate_lock
 from collections import deque
 from contextlib import suppress
+from time import monotonic
 from typing import Literal
 
 Kind = Literal["message", "appeared", "vanished", "word"]
@@ -12,6 +13,9 @@ Kind = Literal["message", "appeared", "vanished", "word"]
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
+
+Stamped = tuple[Kind, str, bytes, float]
+"""The same, and when it came (s, monotonic): it may have waited here for its owner."""
 
 
 class Inbox:
@@ -24,14 +28,14 @@ class Inbox:
     --------
     >>> inbox = Inbox()
     >>> inbox.put(("message", "a", b"1"))
-    >>> inbox.take(1, timeout=0.0)
+    >>> [event[:3] for event in inbox.take(1, timeout=0.0)]
     [('message', 'a', b'1')]
     >>> inbox.take(1, timeout=0.0)
     []
     """
 
     def __init__(self) -> None:
-        self._events: deque[Event] = deque()
+        self._events: deque[Stamped] = deque()
         self._wanted = 1
         self._urgent = False
         self._wake = allocate_lock()
@@ -39,14 +43,14 @@ class Inbox:
 
     def put(self, event: Event) -> None:
         """Put an event in; from any thread, never blocking."""
-        self._events.append(event)
+        self._events.append((*event, monotonic()))
         if event[0] != "message":
             self._urgent = True  # before the wake: one that comes while the owner computes is forgotten by `take`
         if self._urgent or len(self._events) >= self._wanted:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
 
-    def take(self, wanted: int, timeout: float | None) -> list[Event]:
+    def take(self, wanted: int, timeout: float | None) -> list[Stamped]:
         """Take all events out.
 
         Parameters
@@ -58,7 +62,7 @@ class Inbox:
 
         Returns
         -------
-        list[Event]
+        list[Stamped]
             What is there, in order; perhaps fewer than wanted, or, now and then, nothing before the time is out.
         """
         events = self._events

@@ -39,3 +39,7 @@ class Timer:
         past = max(0, int((now - self.due) / self.period))
         self._n += past + 1
         return past
+
+    def shift(self, by: float) -> None:
+        """Put all due times to come later by so much (s), or earlier."""
+        self._start += by

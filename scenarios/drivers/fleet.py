@@ -211,7 +211,7 @@ class _Watch:
             elif monotonic() - since >= patience:
                 report = children[PLANT].report(self._when)
                 self._break(f"nothing was heard of the plant for {patience:g} s, so the run was ended: {report}")
-            for kind, key, payload in events:
+            for kind, key, payload, _ in events:
                 if kind == "message":
                     self._take(key, payload)
                 elif key.startswith(_EXIT):

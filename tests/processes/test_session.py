@@ -60,5 +60,5 @@ def take_one(session: Session) -> tuple[str, str, bytes]:
     while not events:
         assert monotonic() < until, "nothing came"
         events = session.inbox.take(1, until - monotonic())
-    (event,) = events
-    return event
+    ((kind, key, payload, _),) = events
+    return kind, key, payload

@@ -167,7 +167,7 @@ class Town:
         while not condition():
             left = end - monotonic()
             assert left > 0.0, f"not within {patience:g} s: {what}; {self}"
-            for kind, key, payload in self.session.inbox.take(1, left):
+            for kind, key, payload, _ in self.session.inbox.take(1, left):
                 self._take(kind, key, payload)
         return self
 

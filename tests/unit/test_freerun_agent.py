@@ -143,10 +143,10 @@ def test_without_any_plant_it_gives_up_after_the_deadline() -> None:
 
 
 def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
-    """Due times are start + n T_c / speed; a late wake does one tick, not many."""
+    """Due times are n T_c / speed from the middle between two measurements; a late wake does one tick, not many."""
     lab = running(speed=2.0)
-    start = 100.0
-    lab.go(0.010)
+    start = 100.005
+    lab.go(0.015)
     assert lab.side.until == pytest.approx(start + 0.020)
     lab.go(0.037)
 
