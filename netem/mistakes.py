@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -83,18 +82,3 @@ def amount(path: str, value: float, what: str, unit: str, low: float, high: floa
         return []
     end = f" {unit}" if unit else ""
     return [Mistake(path, f"{value:g}{end} is not plausible for {what} ({low:g} to {high:g}{end}){hint}")]
-
-
-def nearest(wrong: str, known: Iterable[str], what: str) -> str:
-    """End of a sentence about an unknown name: the nearest one, and all there are.
-
-    Examples
-    --------
-    >>> nearest("inv22", ["inv1", "inv2"], "agents")
-    'did you mean "inv2"? The agents are inv1, inv2'
-    """
-    names = list(known)
-    lower = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(wrong.lower(), lower, n=1)
-    listed = f"he {what} are {', '.join(names)}" if names else f"here are no {what}"
-    return f'did you mean "{lower[near[0]]}"? T{listed}' if near else f"t{listed}"

@@ -31,7 +31,7 @@ def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     """The scenario with the cases and the seed of the command line."""
     import msgspec
 
-    from scenarios.spec import suggestion
+    from wire.nearest import suggestion
 
     if case is not None:
         names = list(dict.fromkeys(name.strip() for name in case.split(",") if name.strip()))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from netem.mistakes import Mistake, below, nearest, seconds
+from netem.mistakes import Mistake, below, seconds
 from netem.models.corrupt import Corrupt
 from netem.models.cut import Cut
 from netem.models.delay import AnyDelay, Constant
@@ -19,6 +19,7 @@ from netem.models.rate import Rate
 from netem.models.slots import Slots
 from netem.spec.pattern import parse
 from netem.spec.profiles import PROFILES
+from wire.nearest import suggestion
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""
@@ -115,7 +116,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         """Values that cannot be meant; `on` is judged where the names are known."""
         found = wrong_times(self.from_s, self.to_s)
         if self.profile and self.profile not in PROFILES:
-            text = f'there is no profile "{self.profile}"; {nearest(self.profile, PROFILES, "profiles")}'
+            text = f'there is no profile "{self.profile}"; {suggestion(self.profile, PROFILES, "profiles")}'
             found.append(Mistake("profile", text))
         models = self.models()
         if not models and not found:

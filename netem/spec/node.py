@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import msgspec
 
-from netem.mistakes import Mistake, amount, below, nearest, seconds
+from netem.mistakes import Mistake, amount, below, seconds
 from netem.spec.fault import wrong_times
+from wire.nearest import suggestion
 
 
 class Skew(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,7 +48,7 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         """Values that cannot be meant."""
         found = wrong_times(self.from_s, self.to_s) + seconds("slow_s", self.slow_s, "a computing delay")
         if self.name not in names:
-            found.append(Mistake("name", f'no agent "{self.name}"; {nearest(self.name, names, "agents")}'))
+            found.append(Mistake("name", f'no agent "{self.name}"; {suggestion(self.name, names, "agents")}'))
         if not (self.kill or self.pause or self.slow_s or self.skew):
             found.append(Mistake("", "does nothing; give it kill, pause, slow_s or skew"))
         if self.kill and (self.pause or self.to_s is not None):

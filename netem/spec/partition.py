@@ -9,10 +9,11 @@ from typing import Literal
 
 import msgspec
 
-from netem.mistakes import Mistake, nearest
+from netem.mistakes import Mistake
 from netem.models.cut import Cut
 from netem.spec.fault import Span, wrong_times
 from wire.messages import PLANT
+from wire.nearest import suggestion
 
 _REST = "the rest"
 
@@ -114,12 +115,12 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         known = [*names, *dict.fromkeys(microgrids.values())]
         lower = {name.lower() for name in microgrids.values()} | {*names, PLANT}
         if self.alone and self.alone not in names:
-            found.append(Mistake("alone", f'no agent "{self.alone}"; {nearest(self.alone, names, "agents")}'))
+            found.append(Mistake("alone", f'no agent "{self.alone}"; {suggestion(self.alone, names, "agents")}'))
         seen: dict[str, int] = {}
         for i, group in enumerate(self.groups):
             for name in group:
                 if name not in lower and name.lower() not in lower:
-                    text = f'nobody is called "{name}"; {nearest(name, known, "names")}'
+                    text = f'nobody is called "{name}"; {suggestion(name, known, "names")}'
                     found.append(Mistake(f"groups[{i}]", text))
                 elif name in seen:
                     text = f'"{name}" is in groups[{seen[name]}] already; nobody is on both sides'

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
-from netem.mistakes import nearest
 from wire.messages import PLANT
+from wire.nearest import suggestion
 
 ANY = "*"
 """All agents; the plant only where it is named."""
@@ -129,7 +129,7 @@ def objections(text: str, names: Iterable[str], microgrids: Mapping[str, str]) -
     ]
     if unknown:
         return [
-            f'"{text}" matches nothing: nobody is called "{name}"; {nearest(name, known, "names")}'
+            f'"{text}" matches nothing: nobody is called "{name}"; {suggestion(name, known, "names")}'
             for name in dict.fromkeys(unknown)
         ]
     if not any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):

@@ -9,13 +9,14 @@ from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 
-from netem.mistakes import Mistake, nearest
+from netem.mistakes import Mistake
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
+from wire.nearest import suggestion
 
 ENTRIES: dict[str, type[msgspec.Struct]] = {"link": Fault, "partition": Partition, "node": NodeFault}
 """The keys of a scenario file that are netem's, and what each entry of them is."""
@@ -96,7 +97,7 @@ def _unknown(key: str, known: list[str]) -> str:
     for right in (f"{key}_s", f"{bare}_s", key.rpartition("_")[0], bare):
         if right in known and right != key:
             return f"unknown key; write {right}{', in seconds' if right.endswith('_s') else ''}"
-    return f"unknown key; {nearest(key, known, 'keys')}"
+    return f"unknown key; {suggestion(key, known, 'keys')}"
 
 
 def _wrong(path: str, raw: Any, kind: Any, error: str) -> Mistake:
@@ -116,7 +117,7 @@ def _wrong(path: str, raw: Any, kind: Any, error: str) -> Mistake:
         choice = f"; write one of {', '.join(filter(None, models))}" if key == "model" else ""
         return Mistake(f"{path}.{key}", f"is missing{choice}")
     if inside.endswith(".model"):
-        return Mistake(path, f"there is no {_shown(value)}; {nearest(str(value), filter(None, models), 'models')}")
+        return Mistake(path, f"there is no {_shown(value)}; {suggestion(str(value), filter(None, models), 'models')}")
     if not inside:
         return Mistake(path, f"must be {_expected(kind)}, got {_shown(raw)}{_meant(raw)}")
     expected = re.match(r"Expected `(\w+)", error)

@@ -9,9 +9,10 @@ from typing import TextIO
 
 import msgspec
 
-from netem.mistakes import LONGEST_DELAY, Mistake, nearest, seconds
+from netem.mistakes import LONGEST_DELAY, Mistake, seconds
 from netem.models.delay import Trace
 from netem.spec.netem import Netem
+from wire.nearest import suggestion
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""
@@ -37,7 +38,7 @@ def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
     reader = csv.reader(stream, strict=True)
     header = [name.strip() for name in next(reader, [])]
     if COLUMN not in header:
-        return (), [f'{file}: no column "{COLUMN}" in its first line; {nearest(COLUMN, header, "columns")}']
+        return (), [f'{file}: no column "{COLUMN}" in its first line; {suggestion(COLUMN, header, "columns")}']
     column = header.index(COLUMN)
     delays, wrong = [], []
     for cells in reader:

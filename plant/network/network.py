@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import difflib
 from collections.abc import Iterable
 from math import pi, sqrt
 
@@ -16,6 +15,7 @@ from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
 from plant.loads import LoadBranches
 from plant.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
+from wire.nearest import suggestion
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""
@@ -111,8 +111,7 @@ class Network:
             if switch.alias:
                 known[switch.alias] = name
         if text not in known:
-            near = difflib.get_close_matches(text, known, n=1)
-            hint = f'did you mean "{near[0]}"?' if near else f"there are {', '.join(self.switches) or 'none'}"
+            hint = suggestion(text, self.switches, "switches", also=known)
             raise ValueError(f'switch "{text}": no such switch in feeder "{self.feeder.name}"; {hint}')
         return known[text]
 

@@ -7,7 +7,8 @@ from typing import Literal, cast
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
 from plant.tables.buses import BusTable
-from plant.tables.table import Row, Table, did_you_mean
+from plant.tables.table import Row, Table
+from wire.nearest import suggestion
 
 
 def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig] | None:
@@ -62,7 +63,9 @@ def read_lines(
         if configs is None or not config:
             pass
         elif config not in configs:
-            row.mistake(f'config "{config}": no such line configuration; {did_you_mean(config, configs)}')
+            row.mistake(
+                f'config "{config}": no such line configuration; {suggestion(config, configs, "line configurations")}'
+            )
         elif not set(phases) <= set(configs[config].phases):
             row.mistake(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
         if name in lines:

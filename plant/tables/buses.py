@@ -7,7 +7,8 @@ from math import sqrt
 from pathlib import Path
 
 from plant.equipment import PHASES, Bus, Feeder, Line, Regulator, Switch
-from plant.tables.table import Row, Table, did_you_mean
+from plant.tables.table import Row, Table
+from wire.nearest import suggestion
 
 
 class BusTable:
@@ -47,7 +48,7 @@ class BusTable:
         name = row.text(column)
         bus = self._by_name.get(name)
         if name and bus is None and self._readable:
-            row.mistake(f'{column} "{name}": no such bus; {did_you_mean(name, self._by_name)}')
+            row.mistake(f'{column} "{name}": no such bus; {suggestion(name, self._by_name, "buses")}')
         return bus
 
     def find_ends(self, row: Row, phases: str) -> tuple[Bus, Bus] | None:

@@ -8,7 +8,7 @@ from plant.equipment import Feeder
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.shunts import LOAD_COLUMNS, read_capacitors, read_inverters, read_loads, read_source
-from plant.tables.table import did_you_mean
+from wire.nearest import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""
@@ -144,4 +144,4 @@ def _folder(feeder: str) -> Path:
 def _report_strange_files(folder: Path, mistakes: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
         if path.name not in FILES and not path.name.startswith("loads_"):
-            mistakes.append(f"{path.name}: not a table of a feeder; {did_you_mean(path.name, FILES)}")
+            mistakes.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, FILES, 'tables')}")

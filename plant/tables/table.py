@@ -3,31 +3,12 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from plant.equipment import PHASES
-
-
-def did_you_mean(text: str, known: Collection[str]) -> str:
-    """Give the end of a message about an unknown name: the nearest known one, or the whole choice.
-
-    Examples
-    --------
-    >>> did_you_mean("47x", ["46", "47", "48"])
-    'did you mean "47"?'
-    >>> did_you_mean("zebra", ["main", "event2"])
-    'there are main, event2'
-    """
-    near = difflib.get_close_matches(text, known, n=1)
-    if near:
-        return f'did you mean "{near[0]}"?'
-    choice = list(known)
-    if not choice:
-        return "there are none"
-    return f"there are {', '.join(choice[:12])}{', ...' if len(choice) > 12 else ''}"
+from wire.nearest import suggestion
 
 
 class Row:
@@ -150,7 +131,7 @@ class Table:
                 reader.fieldnames = found
                 for column in columns:
                     if column not in found:
-                        mistakes.append(f'{file}: no column "{column}"; {did_you_mean(column, found)}')
+                        mistakes.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
                 if set(columns) <= set(found):
                     self._read(reader)
         except (UnicodeDecodeError, csv.Error) as error:

@@ -38,7 +38,7 @@ def experiment(
     require(needed)
     from scenarios.experiments.registry import EXPERIMENTS, FromSweep
     from scenarios.results.folder import RUNS, shown
-    from scenarios.spec import suggestion
+    from wire.nearest import suggestion
 
     if name == "list":
         for known, source in EXPERIMENTS.items():

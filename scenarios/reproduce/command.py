@@ -42,7 +42,7 @@ def reproduce(
 
     Example:  gridpeers reproduce --driver inprocess
     """
-    from scenarios.spec import suggestion
+    from wire.nearest import suggestion
 
     if driver not in ("processes", "inprocess"):
         fail(

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 
 from plant.config import PowerLimit
 from plant.equipment import Feeder
-from scenarios.spec.mistakes import Mistakes, suggestion
+from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import inverters_of
+from wire.nearest import suggestion
 
 
 def limits_of(scenario: Scenario, case: str) -> tuple[PowerLimit, ...]:

@@ -14,11 +14,12 @@ from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, read_feeder
 from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
 from scenarios.spec.limits import check_limits
-from scenarios.spec.mistakes import Mistakes, ScenarioError, suggestion
+from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.netem import check_netem, with_delays
 from scenarios.spec.reading import read_tables
+from wire.nearest import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 
@@ -103,22 +102,6 @@ def lines_of_keys(text: str) -> dict[str, int]:
             key = _plain(match[1])
             found.setdefault(f"{table}.{key}" if table else key, number)
     return found
-
-
-def suggestion(wrong: str, known: Iterable[str], what: str) -> str:
-    """Sentence that names what was probably meant and what there is.
-
-    Examples
-    --------
-    >>> suggestion("Inv1", ["inv1", "inv2"], "inverters")
-    'did you mean "inv1"? The inverters are inv1, inv2'
-    """
-    names = list(known)
-    by_lower = {name.lower(): name for name in names}
-    near = [name for name in by_lower if len(wrong) > 2 and name.startswith(wrong.lower())]
-    near = near or difflib.get_close_matches(wrong.lower(), by_lower, n=1)
-    listed = f"he {what} are {', '.join(names)}" if names else f"here are no {what}"
-    return f'did you mean "{by_lower[near[0]]}"? T{listed}' if near else f"t{listed}"
 
 
 def _plain(name: str) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from plant.config import Move
 from plant.equipment import Feeder, InverterRow
-from scenarios.spec.mistakes import Mistakes, suggestion
+from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
+from wire.nearest import suggestion
 
 
 def inverters_of(scenario: Scenario, feeder: Feeder) -> tuple[InverterRow, ...]:

@@ -13,9 +13,10 @@ import msgspec
 
 from netem.spec.netem import Netem
 from netem.spec.reading import ENTRIES, read_netem
-from scenarios.spec.mistakes import Mistakes, suggestion
+from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Case, Scenario, key_of
 from scenarios.spec.ranges import number_in, objection, range_of
+from wire.nearest import suggestion
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is read over, so that the copy can be run again."""

@@ -211,14 +211,20 @@ def test_missing_column_is_told_alone(folder: Path) -> None:
     lines = (folder / "lines.csv").read_text().replace("length_m", "length", 1)
     (folder / "lines.csv").write_text(lines)
 
-    assert 'lines.csv: no column "length_m"; did you mean "length"?' in mistakes(folder)
+    assert (
+        'lines.csv: no column "length_m"; did you mean "length"? '
+        "The columns are line, from_bus, to_bus, phases, config, length, origin, note"
+    ) in mistakes(folder)
 
 
 def test_misnamed_file_is_told(folder: Path) -> None:
     """A file that is no table of a feeder is a mistake, for optional tables would else be missed silently."""
     (folder / "inverters.csv").rename(folder / "inverter.csv")
 
-    assert mistakes(folder) == ('inverter.csv: not a table of a feeder; did you mean "inverters.csv"?',)
+    assert mistakes(folder) == (
+        'inverter.csv: not a table of a feeder; did you mean "inverters.csv"? The tables are buses.csv, lines.csv, '
+        "line_configs.csv, switches.csv, regulators.csv, transformers.csv, capacitors.csv, inverters.csv, source.csv",
+    )
 
 
 def test_surplus_cells_are_told(folder: Path) -> None:

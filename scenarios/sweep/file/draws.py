@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.spec import suggestion
 from scenarios.spec.mistakes import Mistakes
 from scenarios.sweep.file.axes import Axis, is_number, of_values
 from scenarios.sweep.file.model import RandomAxis
 from scenarios.sweep.file.paths import flatten
+from wire.nearest import suggestion
 
 LAWS = ("uniform", "loguniform", "choice")
 

@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from plant.equipment import Feeder
-from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario, suggestion
+from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario
 from scenarios.spec.loading import CATALOGUE, read_toml
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of
@@ -19,6 +19,7 @@ from scenarios.sweep.file.model import Sweep
 from scenarios.sweep.file.paths import PathError, flatten, steps
 from scenarios.sweep.file.plan import SECONDS_PER_SECOND, Plan, duration, fingerprint
 from scenarios.sweep.file.samples import Samples
+from wire.nearest import suggestion
 
 SWEEPS = CATALOGUE / "sweeps"
 """Folder of the sweeps that come with gridpeers."""
