@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from typer.testing import CliRunner
 
-from scenarios import cli
 from scenarios.experiments.page import Curve, Line, Page, Panel
 from scenarios.experiments.registry import EXPERIMENTS
 from scenarios.experiments.result import Result
 from scenarios.experiments.table import Table
+from tests import command_line
 
 DOCS = Path(__file__).parents[2] / "docs"
 
-
-def invoke(*words: str) -> tuple[int, str]:
-    """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, ["experiment", *words], catch_exceptions=False)
-    return result.exit_code, result.output
+invoke = partial(command_line.invoke, "experiment")
 
 
 def test_without_a_name_all_experiments_are_listed() -> None:

@@ -6,10 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from scenarios import cli
 from scenarios.spec.loading import CATALOGUE
+from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 APART = """
@@ -21,17 +20,7 @@ links = [["inv1", "inv2"], ["inv2", "inv3"], ["inv4", "inv5"], ["inv5", "inv6"],
 """
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def invoke(*words: str) -> tuple[int, str]:
-    """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
-    return result.exit_code, result.output
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def test_every_case_is_told_within_a_hundred_columns_and_without_nan(elsewhere: Path) -> None:
@@ -76,10 +65,10 @@ def test_bad_input_is_told_as_by_the_other_commands(elsewhere: Path, words: list
     """Exit code 2 and a line that says what would be right."""
     (elsewhere / "bad.toml").write_text(ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20"))
 
-    result = CliRunner().invoke(cli.app, words)
+    code, text = invoke(*words)
 
-    assert result.exit_code == 2
-    assert said in result.output
+    assert code == 2
+    assert said in text
 
 
 def test_help_shows_an_example() -> None:

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import importlib.util
+from functools import partial
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from scenarios import cli
 from scenarios.sweep import workers
+from tests import command_line
 from tests.sweep.conftest import Write
 
 GRID = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An own working directory."""
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
-
-def invoke(*words: str) -> tuple[int, str]:
-    """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, ["sweep", *words], catch_exceptions=False)
-    return result.exit_code, result.output
+invoke = partial(command_line.invoke, "sweep")
 
 
 def test_help_shows_an_example_and_every_exit_code() -> None:

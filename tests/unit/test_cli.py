@@ -7,10 +7,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from scenarios import cli
 from scenarios.spec.loading import CATALOGUE
+from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 SHORT = ISLANDING.replace("end_s = 7.0", "end_s = 1.2").partition('[[event]]\nlabel = "event2"')[0] + (
@@ -19,17 +18,7 @@ SHORT = ISLANDING.replace("end_s = 7.0", "end_s = 1.2").partition('[[event]]\nla
 """Case I, the first 1.2 s."""
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def invoke(*words: str) -> tuple[int, str]:
-    """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
-    return result.exit_code, result.output
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.mark.parametrize("command", ["run", "list", "check", "doc", "reproduce"])

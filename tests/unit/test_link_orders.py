@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
-from typer.testing import CliRunner
 
 from agents.freerun import FreeAgent
 from agents.orders import Orders as AgentOrders
@@ -21,7 +20,6 @@ from netem.spec.node import NodeFault
 from netem.spec.pattern import Link, links_among
 from plant.freerun import FreePlant
 from plant.orders import Orders as PlantOrders
-from scenarios import cli
 from scenarios.drivers import misfortunes
 from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.emulation.links import EmulatedLinks
@@ -31,6 +29,7 @@ from scenarios.live.book import replay_of
 from scenarios.spec import load_scenario
 from scenarios.spec.netem import netem_of, setup_of
 from scenarios.spec.writing import to_toml
+from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit import test_freerun_agent as agent_side
@@ -207,10 +206,10 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
 )  # fmt: skip
 def test_what_cannot_be_meant_is_told_before_a_run_is_sought(words: list[str], said: str) -> None:
     """Exit code 2, under the option that was typed, with what would be right."""
-    result = CliRunner().invoke(cli.app, ["link", *words], catch_exceptions=False)
+    code, text = invoke("link", *words)
 
-    assert result.exit_code == 2
-    assert said in result.output
+    assert code == 2
+    assert said in text
 
 
 def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path: Path) -> None:

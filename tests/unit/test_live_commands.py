@@ -7,28 +7,17 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from typer.testing import CliRunner
 
 from agents.config import AgentConfig
-from scenarios import cli
 from scenarios.live import commands, place
 from scenarios.live.setup import Wishes, set_up
 from scenarios.spec import load_scenario
+from tests.command_line import invoke
 
 COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "stop", "event")
 
 
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def invoke(*words: str) -> tuple[int, str]:
-    """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
-    return result.exit_code, result.output
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -1,0 +1,13 @@
+"""The command `gridpeers` in this process."""
+
+from __future__ import annotations
+
+from typer.testing import CliRunner
+
+from scenarios import cli
+
+
+def invoke(*words: str) -> tuple[int, str]:
+    """Exit code of a command, and all that it printed."""
+    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
+    return result.exit_code, result.output
