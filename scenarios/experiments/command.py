@@ -106,8 +106,9 @@ def _told(source: FromScenario, folder: Path) -> Result:
 def _title(source: FromSweep | FromScenario) -> str:
     """The title of the file that is run."""
     from scenarios.experiments.registry import FromScenario
-    from scenarios.spec.loading import CATALOGUE, read_toml
+    from scenarios.spec.catalogue import CATALOGUE, SWEEPS
+    from scenarios.spec.loading import read_toml
 
     if isinstance(source, FromScenario):
         return str(read_toml(CATALOGUE / f"{source.scenario}.toml")[1]["title"])
-    return str(read_toml(CATALOGUE / "sweeps" / f"{source.sweep}.toml")[1]["title"])
+    return str(read_toml(SWEEPS / f"{source.sweep}.toml")[1]["title"])

@@ -12,6 +12,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, read_feeder
+from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
 from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
@@ -19,18 +20,14 @@ from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.netem import check_netem, with_delays
 from scenarios.spec.reading import read_tables
-from wire.nearest import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""
 
-CATALOGUE = Path(__file__).parents[1] / "catalogue"
-"""Folder of the scenarios that come with gridpeers."""
-
 
 def catalogue() -> tuple[str, ...]:
     """Names of the scenarios that come with gridpeers."""
-    return tuple(sorted(path.stem for path in CATALOGUE.glob("*.toml")))
+    return names_in(CATALOGUE)
 
 
 def find_scenario(name: str) -> Path:
@@ -41,16 +38,7 @@ def find_scenario(name: str) -> Path:
     ScenarioError
         If there is neither.
     """
-    if name in catalogue():
-        return CATALOGUE / f"{name}.toml"
-    path = Path(name)
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise ScenarioError([f"{name}: this is a folder; give a scenario file (.toml) or a name: {_names()}"])
-    if path.suffix == ".toml" or len(path.parts) > 1:
-        raise ScenarioError([f"{name}: there is no such file; give the path of a scenario file, or a name: {_names()}"])
-    raise ScenarioError([f'no scenario "{name}"; {suggestion(name, catalogue(), "scenarios of the catalogue")}'])
+    return find_file(name, CATALOGUE, "scenario")
 
 
 def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
@@ -188,7 +176,3 @@ def _any_load_set(feeder: str) -> Feeder | None:
         return read_feeder(feeder)
     except FeederError:
         return None
-
-
-def _names() -> str:
-    return ", ".join(catalogue())

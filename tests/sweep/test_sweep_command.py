@@ -50,7 +50,8 @@ def test_a_bad_file_starts_and_writes_nothing(sweep_file: Write, tmp_path: Path)
     assert code == 2
     assert text.startswith("gridpeers: 2 mistakes:\n")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
-    assert 'no such sweep file; did you mean "topology"?' in invoke("topologi")[1]
+    assert 'no sweep "topologi"; did you mean "topology"?' in invoke("topologi")[1]
+    assert "no/such.toml: there is no such file; give the path of a sweep file" in invoke("no/such.toml")[1]
 
 
 def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from plant.equipment import Feeder
 from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario
-from scenarios.spec.loading import CATALOGUE, read_toml
+from scenarios.spec.catalogue import SWEEPS, find_file, names_in
+from scenarios.spec.loading import read_toml
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.reading import read_struct
@@ -21,31 +22,10 @@ from scenarios.sweep.file.plan import SECONDS_PER_SECOND, Plan, duration, finger
 from scenarios.sweep.file.samples import Samples
 from wire.nearest import suggestion
 
-SWEEPS = CATALOGUE / "sweeps"
-"""Folder of the sweeps that come with gridpeers."""
-
 
 def sweeps() -> tuple[str, ...]:
     """Names of the sweeps that come with gridpeers."""
-    return tuple(sorted(path.stem for path in SWEEPS.glob("*.toml")))
-
-
-def find_sweep(name: str) -> Path:
-    """Path of a sweep named as in the catalogue or given as a path.
-
-    Raises
-    ------
-    ScenarioError
-        If there is neither.
-    """
-    if name in sweeps():
-        return SWEEPS / f"{name}.toml"
-    path = Path(name)
-    if path.is_file():
-        return path
-    raise ScenarioError(
-        [f"{name}: there is no such sweep file; {suggestion(name, sweeps(), 'sweeps of the catalogue')}"]
-    )
+    return names_in(SWEEPS)
 
 
 def read_sweep(name: str | Path) -> Plan:
@@ -62,7 +42,7 @@ def read_sweep(name: str | Path) -> Plan:
     >>> plan.base.name, plan.parameters
     ('islanding', ('gains.k_p', 'gains.k_q'))
     """
-    path = find_sweep(str(name))
+    path = find_file(str(name), SWEEPS, "sweep")
     text, data = read_toml(path)
     mistakes = Mistakes(path.name, text)
     sweep = read_struct(Sweep, data, mistakes)

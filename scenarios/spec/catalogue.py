@@ -1,0 +1,65 @@
+"""The files that come with gridpeers, and how one of them, or one of the user's own, is found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scenarios.spec.mistakes import ScenarioError
+from wire.nearest import suggestion
+
+CATALOGUE = Path(__file__).parents[1] / "catalogue"
+"""Folder of the scenarios that come with gridpeers."""
+
+SWEEPS = CATALOGUE / "sweeps"
+"""Folder of the sweeps that come with gridpeers."""
+
+
+def names_in(folder: Path) -> tuple[str, ...]:
+    """Names of the files of a catalogue.
+
+    Examples
+    --------
+    >>> names_in(SWEEPS)[:2]
+    ('communication-delay', 'delay')
+    """
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
+
+
+def find_file(name: str, folder: Path, what: str) -> Path:
+    """Path of a file named as in a catalogue or given as a path.
+
+    Parameters
+    ----------
+    name : str
+        Name or path, as the user gave it.
+    folder : Path
+        Folder of the catalogue.
+    what : str
+        What its files are, for the message.
+
+    Raises
+    ------
+    ScenarioError
+        If there is neither.
+
+    Examples
+    --------
+    >>> find_file("islanding", CATALOGUE, "scenario").name
+    'islanding.toml'
+    >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    scenarios.spec.mistakes.ScenarioError: no sweep "gain"; did you mean "gains"? The sweeps of the catalogue are ...
+    """
+    names = names_in(folder)
+    if name in names:
+        return folder / f"{name}.toml"
+    path = Path(name)
+    if path.is_file():
+        return path
+    listed = ", ".join(names)
+    if path.is_dir():
+        raise ScenarioError([f"{name}: this is a folder; give a {what} file (.toml) or a name: {listed}"])
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise ScenarioError([f"{name}: there is no such file; give the path of a {what} file, or a name: {listed}"])
+    raise ScenarioError([f'no {what} "{name}"; {suggestion(name, names, f"{what}s of the catalogue")}'])
