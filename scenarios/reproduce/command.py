@@ -62,8 +62,8 @@ def _reproduce(
 
     from rich.console import Console
 
+    from scenarios.remaining import remaining
     from scenarios.reproduce.found import Reproduction
-    from scenarios.reproduce.progress import progress
     from scenarios.reproduce.work import Work
     from scenarios.reproduce.writing import write
     from scenarios.results.folder import FolderError, new_folder, set_status, shown
@@ -83,7 +83,7 @@ def _reproduce(
     work = Work(chosen(only), driver, folder / "runs", seed, jobs or len(os.sched_getaffinity(0)))
     results = []
     try:
-        with progress(console, work.total_s) as tell:
+        with remaining(console, work.total_s) as tell:
             for result in work.do(tell, figures=only != "tables"):
                 results.append(result)
         whole = Reproduction(

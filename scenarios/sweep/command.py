@@ -83,10 +83,10 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
     from rich.console import Console
 
+    from scenarios.remaining import remaining
     from scenarios.results.folder import FolderError, shown
     from scenarios.run import TerminatedError
     from scenarios.sweep.folder import SweepFolder
-    from scenarios.sweep.progress import progress
     from scenarios.sweep.study import study
     from scenarios.sweep.workers import WorkersError, cores
 
@@ -99,8 +99,12 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         with SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
             try:
-                with progress(console, len(plan.runs)) as tell:
-                    return study(plan, folder, tell, jobs=jobs or cores(), dask=dask)
+                with remaining(console, size := len(plan.runs)) as tell:
+
+                    def note(done: int) -> None:
+                        tell(f"{plan.name}, {done} of {size} runs", done)
+
+                    return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
             except (KeyboardInterrupt, WorkersError) as error:
                 kept = f"{len(folder.done)} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
                 if isinstance(error, WorkersError):

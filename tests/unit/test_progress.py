@@ -1,4 +1,4 @@
-"""What is told while a run is on its way."""
+"""What is told while a run, or many, are on their way."""
 
 import io
 import socket
@@ -7,7 +7,7 @@ import threading
 import pytest
 from rich.console import Console
 
-from scenarios import progress
+from scenarios import progress, remaining
 from scenarios.drivers.ports import PortError, check_port
 
 
@@ -34,6 +34,38 @@ def test_on_a_terminal_bars_come_and_go() -> None:
         tell("I", 1.0, 1.0)
 
     assert "case I" in out.getvalue()
+    assert "\x1b[2K" in out.getvalue()
+
+
+def test_many_runs_are_a_line_for_every_part_and_every_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time left is reckoned from what was done since the start, not from what a resumed sweep finds done."""
+    clock = iter([100.0, 100.0, 110.0, 240.0, 300.0])
+    monkeypatch.setattr(remaining, "monotonic", lambda: next(clock))
+    out = io.StringIO()
+
+    with remaining.remaining(Console(file=out), 40) as tell:
+        for part, done in (("a", 20), ("a", 22), ("a", 25), ("b", 25), ("b", 27), ("b", 39), ("b", 40)):
+            tell(f"{part}, {done} of 40", done)
+
+    assert out.getvalue().splitlines() == [
+        "a, 20 of 40: 50 % done",
+        "a, 25 of 40: 62 % done, about 0 s left",
+        "b, 25 of 40: 62 % done, about 30 s left",
+        "b, 39 of 40: 98 % done, about 7 s left",
+        "b, 40 of 40: 100 % done",
+    ]
+
+
+def test_the_bar_of_many_runs_comes_and_goes() -> None:
+    """It shows what is being done, how much of all is done, and leaves nothing behind."""
+    out = io.StringIO()
+
+    with remaining.remaining(Console(file=out, force_terminal=True, width=120), 4) as tell:
+        tell("topology, 1 of 4 runs", 1)
+        tell("topology, 2 of 4 runs", 2)
+
+    assert "topology, 2 of 4 runs" in out.getvalue()
+    assert "50%" in out.getvalue()
     assert "\x1b[2K" in out.getvalue()
 
 

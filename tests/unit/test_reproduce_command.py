@@ -14,7 +14,7 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
     code, text = invoke("reproduce", "--driver", "inprocess", "--only", "microgrid-switching", "--out", str(out))
 
     assert code == 0
-    assert "microgrid-switching: 0 % done" in text
+    assert "microgrid-switching, case IV: 0 % done\n" in text
     assert "12 of 12 numbers of the tables within tolerance; 6 of 6 claims hold" in text
     assert {path.name for path in out.iterdir()} == {
         "report.html",

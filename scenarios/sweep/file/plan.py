@@ -61,17 +61,3 @@ def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
     for text in sorted(map(repr, feeders)):
         whole.update(text.encode())
     return whole.hexdigest()
-
-
-def duration(seconds: float) -> str:
-    """A length of time in words.
-
-    Examples
-    --------
-    >>> duration(45), duration(600), duration(20_000), duration(400_000)
-    ('45 s', '10 min', '5.6 h', '4.6 days')
-    """
-    for bound, unit, name in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h")):
-        if seconds < bound:
-            return f"{seconds / unit:.2g} {name}"
-    return f"{seconds / 86_400:.2g} days"

@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from plant.equipment import Feeder
+from scenarios.duration import duration
 from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario
 from scenarios.spec.catalogue import SWEEPS, find_file, names_in
 from scenarios.spec.loading import read_toml
@@ -18,7 +19,7 @@ from scenarios.sweep.file.axes import Axis, check_graph, check_zip, of_graphs, o
 from scenarios.sweep.file.draws import Law, check_random, laws_of, of_laws
 from scenarios.sweep.file.model import Sweep
 from scenarios.sweep.file.paths import PathError, flatten, steps
-from scenarios.sweep.file.plan import SECONDS_PER_SECOND, Plan, duration, fingerprint
+from scenarios.sweep.file.plan import SECONDS_PER_SECOND, Plan, fingerprint
 from scenarios.sweep.file.samples import Samples
 from wire.nearest import suggestion
 

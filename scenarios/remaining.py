@@ -1,0 +1,77 @@
+"""How far many runs together have come, and how long they still take: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from scenarios.duration import duration
+
+Tell = Callable[[str, float], None]
+"""Told what is being done, what is within it behind a comma, and how much of all is done."""
+
+MEMORY = 300.0
+"""Window of a bar's estimate of the time left (s); runs differ in how long they take."""
+
+
+@contextmanager
+def remaining(console: Console, total: float) -> Iterator[Tell]:
+    """Give the function to tell how far all is; its first call says how much was done before.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    total : float
+        How much there is to do, in whatever unit: runs, seconds simulated.
+    """
+    if not console.is_terminal:
+        yield _lines(console, total)
+        return
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("after"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=MEMORY) as bars:
+        task = bars.add_task("starting", total=total)
+        begun = False
+
+        def tell(what: str, done: float) -> None:
+            nonlocal begun
+            if begun:
+                bars.update(task, description=what, completed=done)
+            else:
+                begun = True
+                bars.reset(task, description=what, completed=round(done))
+
+        yield tell
+
+
+def _lines(console: Console, total: float) -> Tell:
+    """A line for everything that begins, and for every tenth of all."""
+    began = before = 0.0
+    told: tuple[str, int] | None = None
+
+    def tell(what: str, done: float) -> None:
+        nonlocal began, before, told
+        now = what.partition(",")[0], int(10.0 * done / total)
+        if now == told:
+            return
+        if told is None:
+            began, before = monotonic(), done
+        told = now
+        left = (monotonic() - began) / (done - before) * (total - done) if before < done < total else None
+        words = f", about {duration(round(left))} left" if left is not None else ""
+        text = f"{what}: {100.0 * done / total:.0f} % done{words}"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    return tell
