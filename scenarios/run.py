@@ -39,6 +39,7 @@ from scenarios.spec.moves import inverters_of
 from scenarios.spec.netem import netem_of, setup_of
 from scenarios.spec.writing import to_toml
 from wire.messages import Pacing, Telemetry
+from wire.output import ReaderGoneError
 
 Driver = Literal["processes", "inprocess"]
 """How a case is run: as one process per agent over Zenoh, or all in this process."""
@@ -95,7 +96,7 @@ def run(request: Request, progress: Progress) -> Report:
             by = "by SIGTERM" if isinstance(error, TerminatedError) else "from the keyboard"
             set_status(request.folder, f"broken: interrupted {by}")
             raise
-        except BrokenRunError as error:
+        except (BrokenRunError, ReaderGoneError) as error:
             print(f"broken: {error}", file=log)
             set_status(request.folder, f"broken: {error}")
             raise

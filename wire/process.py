@@ -19,6 +19,7 @@ import msgspec
 
 from wire.drive import StoppedError
 from wire.links import Links
+from wire.output import watch_readers
 from wire.session import SessionError
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
@@ -77,6 +78,7 @@ def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) 
     int
         Exit status.
     """
+    watch_readers(quits=False)
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
         sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH))

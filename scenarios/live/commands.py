@@ -10,6 +10,7 @@ import typer
 from scenarios.live.link_commands import link
 from scenarios.live.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
 from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
+from wire.output import watch_readers
 
 if TYPE_CHECKING:
     from scenarios.live.hand import Ended
@@ -118,6 +119,7 @@ def agent(
         where = place(run, connect)
         check_inverter(inverter)
         check_wait(wait)
+        watch_readers(quits=False)
         listening = tuple(claim("--listen", text) for text in listen) if listen else return_path(where.connect)
         _finish(agent_here(where, inverter, listening, wait))
 
@@ -243,6 +245,7 @@ def _start(
         endpoint = claim("--listen", listen)
         check_alone(run, beyond)
         config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
+        watch_readers(quits=False)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             book = Book(spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml")

@@ -46,9 +46,8 @@ LEAVING = 5.0
 
 
 def say(line: str, file: TextIO | None = None) -> None:
-    """Print a line at once, on standard output unless said otherwise; who reads it may be gone already."""
-    with contextlib.suppress(BrokenPipeError):
-        print(line, file=file, flush=True)
+    """Print a line at once, on standard output unless said otherwise."""
+    print(line, file=file, flush=True)
 
 
 @dataclass(frozen=True, kw_only=True)

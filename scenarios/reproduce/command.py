@@ -68,6 +68,7 @@ def _reproduce(
     from scenarios.reproduce.writing import write
     from scenarios.results.folder import FolderError, new_folder, set_status, shown
     from scenarios.run import BrokenRunError, TerminatedError
+    from wire.output import ReaderGoneError
 
     now = datetime.now().astimezone()
     try:
@@ -97,6 +98,9 @@ def _reproduce(
     except (BrokenRunError, RuntimeError) as error:
         set_status(folder, f"broken: {error}")
         fail([f"a run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
+    except ReaderGoneError as error:
+        set_status(folder, f"broken: {error}")
+        raise
     except KeyboardInterrupt as error:
         set_status(folder, "broken: interrupted")
         code = TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
