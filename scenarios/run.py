@@ -5,47 +5,40 @@ The drivers (`scenarios.drivers`) are given configurations here, and their telem
 
 from __future__ import annotations
 
-import json
-import math
 import platform
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal, TextIO
 
 import msgspec
 
 from agents.config import AgentConfig
 from plant.config import PlantConfig
-from plant.equipment import Feeder
 from plant.pacing import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
+from scenarios.emulation.setup import Setup
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.drawing import Drawing, drawing_of
-from scenarios.results.findings import Findings, find
+from scenarios.results.findings import find
 from scenarios.results.folder import set_status, shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
 from scenarios.results.moves import as_they_came, late_moves
+from scenarios.results.numbers import Clock, Ran, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import Report, plain
-from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
-from scenarios.spec.netem import netem_of, setup_of
 from scenarios.spec.writing import to_toml
 from wire.messages import Pacing, Telemetry
 from wire.output import ReaderGoneError
 
 Driver = Literal["processes", "inprocess"]
 """How a case is run: as one process per agent over Zenoh, or all in this process."""
-
-Clock = Literal["simulated", "wall"]
-"""Lock-step of plant and agents, or real time."""
 
 Progress = Callable[[str, float, float], None]
 """Told the case, the time it has reached (s) and its end (s)."""
@@ -62,20 +55,10 @@ class BrokenRunError(RuntimeError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
-    """What is to be run."""
+class Request(Ran):
+    """What is to be run; its folder is empty. Wall-clock time needs the driver "processes"."""
 
-    scenario: Scenario
-    """Checked; with the seed and the cases asked for."""
-    feeder: Feeder
-    """Its feeder."""
     driver: Driver
-    folder: Path
-    """An empty folder."""
-    clock: Clock = "simulated"
-    """Wall-clock time needs the driver "processes"."""
-    speed: float = 1.0
-    """Wall-clock: run time per wall time (s/s)."""
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
 
@@ -115,8 +98,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         links = LinkRecord()
-        recorded[case], outcome = _run_case(request, case, progress, links)
-        notes += [f"case {case}: {note}" for note in (*outcome.notes, *_checked_links(request, case, links))]
+        plant, agents = _configs(request, case)
+        recorded[case], outcome = _run_case(request, case, plant, agents, progress, links)
+        checked = _checked_links(plant.links, links, folder / case)
+        notes += [f"case {case}: {note}" for note in (*outcome.notes, *checked)]
         links_sha256 |= {case: links.sha256} if links.counts else {}
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
@@ -152,56 +137,29 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     return report
 
 
-def metrics_json(
-    request: Request,
-    found: Findings,
-    sha256: Mapping[str, str],
-    pacing: Mapping[str, Pacing],
-    links_sha256: Mapping[str, str] = MappingProxyType({}),
-) -> str:
-    """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time."""
-    cases: dict[str, dict[str, Any]] = {}
-    for case, steady in found.results.items():
-        cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
-        for label, islands in found.islands.get(case, {}).items():
-            cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
-        cases[case]["history_sha256"] = sha256[case]
-        if case in links_sha256:
-            cases[case]["links_sha256"] = links_sha256[case]
-        if case in pacing:
-            cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
-    scenario = request.scenario
-    clock = {"clock": request.clock, "speed": request.speed} if request.clock == "wall" else {}
-    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": request.driver, **clock, "cases": cases}
-    return json.dumps(whole, indent=2, allow_nan=False) + "\n"
-
-
-def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
-    measures = {name: value for name, value in steady.items() if name != "p"}
-    return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
-
-
-def _checked_links(request: Request, case: str, record: LinkRecord) -> list[str]:
-    """Write what emulated links did beside the history; what a reader must know of it."""
+def _checked_links(links: str, record: LinkRecord, folder: Path) -> list[str]:
+    """Hold what emulated links did against what they were told; write it, and say what a reader must know of it."""
     if not record.counts:
         return []
     from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
 
-    netem = netem_of(request.scenario, case)
-    setup = setup_of(netem, request.scenario, request.feeder, real_nodes=request.clock == "wall")
+    setup = Setup.of_text(links)
     check = LinkCheck(record, setup.netem, setup.microgrids)
-    record.write(request.folder / case / "links.csv")
-    write_whole(request.folder / case / "links.json", check.to_json())
+    record.write(folder / "links.csv")
+    write_whole(folder / "links.json", check.to_json())
     return list(check.lines())
 
 
-def _run_case(request: Request, case: str, progress: Progress, links: LinkRecord) -> tuple[Recorded, Outcome]:
+def _run_case(
+    request: Request,
+    case: str,
+    plant: PlantConfig,
+    agents: tuple[AgentConfig, ...],
+    progress: Progress,
+    links: LinkRecord,
+) -> tuple[Recorded, Outcome]:
     """Run one case by the driver asked for, and record it."""
     time = request.scenario.time
-    listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
-    plant, agents = _timed(
-        request, *configs(request.scenario, request.feeder, case, listen, real_nodes=request.clock == "wall")
-    )
     with Recorder(request.folder / case) as recorder:
 
         def note(telemetry: Telemetry) -> None:
@@ -225,10 +183,11 @@ def _run_case(request: Request, case: str, progress: Progress, links: LinkRecord
             raise BrokenRunError(f"case {case}: {error}") from error
 
 
-def _timed(
-    request: Request, plant: PlantConfig, agents: tuple[AgentConfig, ...]
-) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Give the configurations the kind of time asked for."""
+def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Configurations of a case in the kind of time asked for."""
+    listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
+    real = request.clock == "wall"
+    plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
     if request.clock == "simulated":
         return plant, agents
     if request.driver != "processes":

@@ -19,10 +19,10 @@ import numpy as np
 
 from plant.build import build_plant
 from plant.config import PlantConfig
-from plant.equipment import Feeder
 from plant.feeder import Plant
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
+from scenarios.emulation.setup import Setup
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
@@ -32,7 +32,6 @@ from scenarios.results.settling import settling
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM, configs
 from scenarios.spec.moves import inverters_of
-from scenarios.spec.netem import netem_of, setup_of
 from scenarios.sweep.blas import one_thread
 
 KEPT_PLANTS = 4
@@ -95,7 +94,7 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
         status="ran",
         sha256=recorded.sha256,
         links_sha256=links.sha256 if links.counts else "",
-        link_warnings=_warnings(scenario, feeder, case, links),
+        link_warnings=_warnings(plant.links, links),
         measures=measures | _accounts(links),
     )
 
@@ -112,14 +111,14 @@ def _accounts(links: LinkRecord) -> dict[str, float | None]:
     }
 
 
-def _warnings(scenario: Scenario, feeder: Feeder, case: str, links: LinkRecord) -> str:
-    """Hold the links against what they were told, as every run does."""
-    if not links.counts:
+def _warnings(links: str, record: LinkRecord) -> str:
+    """Hold what emulated links did against what they were told, as every run does."""
+    if not record.counts:
         return ""
     from scenarios.results.link_check import LinkCheck  # scipy.stats takes longer to import than a run
 
-    setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=False)
-    return "; ".join(LinkCheck(links, setup.netem, setup.microgrids).warnings)
+    setup = Setup.of_text(links)
+    return "; ".join(LinkCheck(record, setup.netem, setup.microgrids).warnings)
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
