@@ -74,6 +74,17 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
     closed: bool
     """Its state before anything is operated."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that it is called: its buses in either order, and its alias.
+
+        Examples
+        --------
+        >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).names
+        ('13-152', '152-13', 'sw1')
+        """
+        return (self.name, f"{self.to_bus}-{self.from_bus}", *((self.alias,) if self.alias else ()))
+
 
 class Load(msgspec.Struct, frozen=True, kw_only=True):
     """A spot load of one kind: constant impedance (Z), current (I) or power (P)."""

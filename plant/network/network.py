@@ -105,11 +105,7 @@ class Network:
         ValueError
             If no switch is called so.
         """
-        known: dict[str, str] = {}
-        for name, switch in self.switches.items():
-            known |= {name: name, f"{switch.to_bus}-{switch.from_bus}": name}
-            if switch.alias:
-                known[switch.alias] = name
+        known = {name: switch.name for switch in self.switches.values() for name in switch.names}
         if text not in known:
             hint = suggestion(text, self.switches, "switches", also=known)
             raise ValueError(f'switch "{text}": no such switch in feeder "{self.feeder.name}"; {hint}')

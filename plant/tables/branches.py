@@ -95,14 +95,13 @@ def read_switches(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[S
         if not ends:
             continue
         buses.require_equal_voltage(row, ends, "switch")
-        name, reverse = f"{ends[0].name}-{ends[1].name}", f"{ends[1].name}-{ends[0].name}"
-        alias = row.text("alias", default="")
+        one, other = ends[0].name, ends[1].name
+        name, alias = f"{one}-{other}", row.text("alias", default="")
         for taken in [text for text in (name, alias) if text in names]:
             row.mistake(f'switch "{taken}": there is one of this name already; names must differ')
-        names |= {name, reverse} | ({alias} if alias else set())
-        switches.append(
-            Switch(name=name, alias=alias, from_bus=ends[0].name, to_bus=ends[1].name, phases=phases, closed=closed)
-        )
+        switch = Switch(name=name, alias=alias, from_bus=one, to_bus=other, phases=phases, closed=closed)
+        names.update(switch.names)
+        switches.append(switch)
     return tuple(switches)
 
 

@@ -104,8 +104,7 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistak
 def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
     """Switches exist and are in the other position when an event operates them."""
     position = {switch.name: switch.closed for switch in feeder.switches}
-    canonical = {name: switch.name for switch in feeder.switches for name in (switch.name, switch.alias) if name}
-    canonical |= {f"{switch.to_bus}-{switch.from_bus}": switch.name for switch in feeder.switches}
+    canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
     buses = {bus.name for bus in feeder.buses}
     for i, event in enumerate(scenario.events):
         keys = ("open", "close", "leave", "join", "P_max_kW")
