@@ -25,7 +25,7 @@ from msgspec.structs import replace
 
 from agents.cadence import Cadence
 from agents.config import AgentConfig
-from agents.hearing import PATIENCE, Hearing, patience_after
+from agents.hearing import Hearing
 from agents.orders import Orders
 from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
@@ -82,7 +82,7 @@ class FreeAgent(Side):
         self._give_up: float | None = None
         self._lateness = 0.0
         self._ran = False
-        self._patience, self._began = PATIENCE / 2.0, 0.0
+        self._hearing = Hearing()
         self._leaving = ""
         """Why it leaves, once the plant has been told."""
         self._left = 0
@@ -140,10 +140,9 @@ class FreeAgent(Side):
         self._status = Timer(STATUS_PERIOD, now)
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
-        self._patience = patience_after(self._patience, now - self._began)
-        self._began, self._hearing = now, Hearing(self._patience)
         if self.astray:
             self.astray = False
+            self._hearing = self._hearing.next()
             for name in self._met:
                 self._agent.forget(name)
             self._agent.let_go()
@@ -181,7 +180,9 @@ class FreeAgent(Side):
 
     def _note_astray(self, now: float) -> None:
         """Ask for a new session if this one has not brought what it should, or not taken it, for too long."""
-        lost = self._hearing.lost(self._unheard(now), now)
+        silent = self._unheard(now)
+        self._hearing.whole |= self.phase == "running" and not silent
+        lost = self._hearing.lost(silent, now)
         if not lost:
             return
         what = {

@@ -12,7 +12,8 @@ from collections.abc import Iterable
 
 PATIENCE = 3.5
 """Time (s, wall) that somebody has not been heard who should be, after which the session is opened anew. Longer than
-Zenoh's lease, after which the others have forgotten the old one. Doubled with every new session, to `LONGEST`."""
+Zenoh's lease, after which the others have forgotten the old one. Doubled, to `LONGEST`, for a session that comes after
+one in which nothing was ever as it should be."""
 
 LONGEST = 60.0
 """Longest patience (s, wall): a path that stays cut must not keep an agent busy with sessions."""
@@ -21,23 +22,12 @@ CROSSED = 10
 """Messages under another's key after which the same is done, without waiting, whether or not the plant is seen."""
 
 
-def patience_after(patience: float, lasted: float) -> float:
-    """Patience (s) of the next session, after one that lasted so long (s); both are wall time.
-
-    Examples
-    --------
-    >>> patience_after(3.5, 4.0), patience_after(56.0, 60.0), patience_after(7.0, 3600.0)
-    (7.0, 60.0, 3.5)
-    """
-    return PATIENCE if lasted > 2.0 * LONGEST else min(2.0 * patience, LONGEST)
-
-
 class Hearing:
     """Whether the session brings what it should.
 
     Parameters
     ----------
-    patience : float
+    patience : float, optional
         Longest silence (s, wall).
 
     Examples
@@ -47,10 +37,23 @@ class Hearing:
     ['', '', 'inv3']
     """
 
-    def __init__(self, patience: float) -> None:
+    def __init__(self, patience: float = PATIENCE) -> None:
+        self.whole = False
+        """Whether everybody was heard who should be, and oneself, at some time of this session."""
         self._patience = patience
         self._since: dict[str, float] = {}
         self._crossed = 0
+
+    def next(self) -> Hearing:
+        """That of the next session: more patient, if this one never was whole.
+
+        Examples
+        --------
+        >>> hearing = Hearing(3.5).next()
+        >>> hearing.lost(("inv3",), 0.0), hearing.lost(("inv3",), 6.9), hearing.lost(("inv3",), 7.0)
+        ('', '', 'inv3')
+        """
+        return Hearing(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
 
     def lost(self, silent: Iterable[str], now: float) -> str:
         """Note who is silent now and should not be; the first of whom this has lasted too long, else nothing."""

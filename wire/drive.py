@@ -98,15 +98,16 @@ def perform(actions: Sequence[Action | Say], session: Session, log: logging.Logg
 
 
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
-    """Declare what a core needs and serve it until it is over; the rest as of `serve`.
+    """Begin, declare what a core needs and serve it until it is over; the rest as of `serve`.
 
-    The token comes last of all that is declared: who sees it may count on the rest.
+    It begins first: one that begins again needs less than it did at the end of its last session. The token comes last
+    of all that is declared: who sees it may count on the rest.
     """
+    core.start(monotonic())
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
     session.hold_token(core.token)
-    core.start(monotonic())
     serve(core, session, log)
 
 

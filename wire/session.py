@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from wire.foreign import keep_thread_state
 from wire.inbox import Inbox, Kind
 from wire.keys import LATEST_ONLY
+from wire.lingering import do_not_linger
 
 if TYPE_CHECKING:
     import zenoh
@@ -121,6 +122,9 @@ class Session:
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
             self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
             self._changeable = False
+        if clock == "wall":
+            handler = self._direct(lambda event: do_not_linger())
+            self._declared.append(self._session.info.declare_link_events_listener(handler, history=True))
         self.id = str(self._session.zid())
         """Unique id of this session: the instance of who holds it."""
 
@@ -169,15 +173,19 @@ class Session:
         self._declared.append(self._session.declare_queryable(key, handler, complete=True))
 
     def fetch(self, key: str) -> None:
-        """Query a key; an answer comes into the inbox like a message."""
+        """Query a key; an answer comes into the inbox like a message.
+
+        All are asked who answer on it, as one of them may be the stale end of a link that is gone.
+        """
         enqueue = self.inbox.put
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 enqueue(("message", key, reply.ok.payload.to_bytes()))
 
-        consolidation = self._zenoh.ConsolidationMode.NONE
-        self._session.get(key, self._direct(on_reply), consolidation=consolidation, timeout=_QUERY_TIMEOUT)
+        consolidation, target = self._zenoh.ConsolidationMode.NONE, self._zenoh.QueryTarget.ALL
+        handler = self._direct(on_reply)
+        self._session.get(key, handler, target=target, consolidation=consolidation, timeout=_QUERY_TIMEOUT)
 
     def watch(self, key: str) -> None:
         """Have tokens that appear and vanish put into the inbox, those already there included."""

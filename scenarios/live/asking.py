@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 
 from agents.config import AgentConfig
-from agents.hearing import LONGEST, PATIENCE, Hearing
+from agents.hearing import Hearing
 from scenarios.live.show.look import Look, in_order
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
@@ -137,8 +137,7 @@ class Watching:
         """When who last told anything."""
         self._used: dict[str, tuple[str, ...]] = {}
         """Whom each agent has in its sums."""
-        self._patience = PATIENCE
-        self._hearing = Hearing(PATIENCE)
+        self._hearing = Hearing()
         visit.listen(visit.keys.telemetry)
         visit.fetch(visit.keys.config("*"))
 
@@ -177,9 +176,10 @@ class Watching:
         telling = {name for name, at in self._told.items() if now - at <= SILENT}
         there = {*([PLANT] if self._visit.plant else []), *present(self._visit)}
         there.update(*(self._used.get(name, ()) for name in telling))
-        if self._hearing.lost(sorted(there - telling), now):
-            self._patience = min(2.0 * self._patience, LONGEST)
-            self._hearing = Hearing(self._patience)
+        silent = sorted(there - telling)
+        self._hearing.whole |= PLANT in telling and not silent
+        if self._hearing.lost(silent, now):
+            self._hearing = self._hearing.next()
             self._visit.renew()
 
 

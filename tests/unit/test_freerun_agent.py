@@ -436,6 +436,27 @@ def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_the
     assert lab.said[-1] == "inv1: nothing comes from the plant; opens a new session"
 
 
+def test_a_session_that_once_was_whole_is_no_reason_for_more_patience() -> None:
+    """Every cut that heals badly is mended as soon as the first; nothing is remembered of those that were mended."""
+    lab = running("inv2")
+    k, lasted = 0, []
+    for _ in range(4):
+        lab.token("plant")
+        lab.meet("inv2")
+        for _ in range(10):
+            k += 1
+            lab.measure(k, roster=("inv1", "inv2"))
+            lab.state("inv2", k, k * T_C)
+            lab.go(T_C)
+        began = lab.now
+        while not lab.side.over:
+            lab.go(T_C)
+        lasted.append(lab.now - began)
+        lab.side.start(lab.now)
+
+    assert lasted == pytest.approx([4.5] * 4, abs=0.1)
+
+
 def test_an_agent_that_has_never_had_a_plant_keeps_its_session() -> None:
     """Nothing says that one is there."""
     lab = Lab()
