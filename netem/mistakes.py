@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Iterable
 from typing import NamedTuple
+
+from netem.plausible import Range, objection
 
 LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by mistake: control over such a link is not what netem is for."""
@@ -57,28 +59,21 @@ def seconds(
     >>> seconds("delay", -0.1, "a delay")[0].text
     'a delay must not be negative, got -0.1 s; 0 to 10 s makes sense'
     """
-    span = f"0 to {high:g} s"
-    if not math.isfinite(value):
-        return [Mistake(path, f"{what} must be a finite number of seconds, got {value}; {span} makes sense")]
-    if above_zero and value <= 0.0:
-        return [Mistake(path, f"{what} must be above 0, got {value:g} s; {span} makes sense")]
-    if value < 0.0:
-        return [Mistake(path, f"{what} must not be negative, got {value:g} s; {span} makes sense")]
-    if value <= high:
-        return []
-    meant = f"; did you mean {value / 1000.0:g} ({value:g} ms)?" if value / 1000.0 <= high else ""
-    return [Mistake(path, f"{value:g} s is not plausible for {what} ({span}){meant}")]
+    return amount(path, value, Range(what, "s", 0.0, high, above_zero))
 
 
-def amount(path: str, value: float, what: str, unit: str, low: float, high: float, hint: str = "") -> list[Mistake]:
-    """A number lies within what makes sense.
+def amount(path: str, value: float, allowed: Range, hint: str = "") -> list[Mistake]:
+    """A number lies within what makes sense; the hint is what is said beyond that.
 
     Examples
     --------
-    >>> amount("shape", 0.0, "a Pareto shape", "", 0.5, 50.0)[0].text
+    >>> amount("shape", 0.0, Range("a Pareto shape", "", 0.5, 50.0))[0].text
     '0 is not plausible for a Pareto shape (0.5 to 50)'
     """
-    if low <= value <= high:
-        return []
-    end = f" {unit}" if unit else ""
-    return [Mistake(path, f"{value:g}{end} is not plausible for {what} ({low:g} to {high:g}{end}){hint}")]
+    wrong = objection(value, allowed)
+    return [Mistake(path, wrong + hint)] if wrong else []
+
+
+def shown(raw: object) -> str:
+    """Write a value as TOML writes it, or nearly."""
+    return json.dumps(raw, ensure_ascii=False, default=str)

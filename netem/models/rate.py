@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from netem.mistakes import Mistake, amount
+from netem.plausible import Range
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,5 +40,5 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def mistakes(self) -> list[Mistake]:
         """Values that cannot be meant."""
         hint = "; it is in bytes, not bits, per second"
-        found = amount("bytes_per_s", self.bytes_per_s, "a rate", "bytes/s", 1.0, 1e11, hint)
-        return found + amount("queue_bytes", self.queue_bytes, "a queue", "bytes", 1, 1e9)
+        found = amount("bytes_per_s", self.bytes_per_s, Range("a rate", "bytes/s", 1.0, 1e11), hint)
+        return found + amount("queue_bytes", self.queue_bytes, Range("a queue", "bytes", 1, 1e9))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import msgspec
 
 from netem.mistakes import Mistake, amount, below, seconds
+from netem.plausible import Range
 from netem.spec.fault import wrong_times
 from wire.nearest import suggestion
 
@@ -22,8 +23,8 @@ class Skew(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def mistakes(self) -> list[Mistake]:
         """Values that cannot be meant."""
         ppm = f"; did you mean {1.0 + self.factor * 1e-6:.9g} ({self.factor:g} ppm)?" if self.factor > 2.0 else ""
-        found = amount("factor", self.factor, "the rate of a clock", "", 0.5, 2.0, ppm)
-        return found + amount("offset_s", self.offset_s, "the offset of a clock", "s", -3600.0, 3600.0)
+        found = amount("factor", self.factor, Range("the rate of a clock", "", 0.5, 2.0), ppm)
+        return found + amount("offset_s", self.offset_s, Range("the offset of a clock", "s", -3600.0, 3600.0))
 
 
 class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 
-from netem.mistakes import Mistake
+from netem.mistakes import Mistake, shown
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
+from netem.plausible import number_in
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
@@ -24,7 +24,6 @@ ENTRIES: dict[str, type[msgspec.Struct]] = {"link": Fault, "partition": Partitio
 _FIELDS = {"link": "links", "partition": "partitions", "node": "nodes"}
 _NEEDED = {Fault: "on", NodeFault: "name"}
 _WHERE = re.compile(r" - at `\$(?:\.\.\.)?(.*)`$")
-_UNIT = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*(us|ms|s|%)\s*")
 _WORDS = {
     "float": "a number",
     "int": "a whole number",
@@ -32,7 +31,6 @@ _WORDS = {
     "bool": "true or false",
     "array": "a list",
 }
-_FACTOR = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "%": 1e-2}
 
 
 def read_netem(tables: Mapping[str, Any], seed: int) -> tuple[Netem, list[Mistake]]:
@@ -63,7 +61,7 @@ def read_netem(tables: Mapping[str, Any], seed: int) -> tuple[Netem, list[Mistak
     for key, kind in ENTRIES.items():
         raw = tables.get(key, [])
         if not isinstance(raw, list):
-            found.append(Mistake(key, f"must be written as [[{key}]], got {_shown(raw)}"))
+            found.append(Mistake(key, f"must be written as [[{key}]], got {shown(raw)}"))
             continue
         entries = [_entry(kind, item, f"{key}[{i}]", found) for i, item in enumerate(raw)]
         fields[_FIELDS[key]] = tuple(entry for entry in entries if entry is not None)
@@ -73,7 +71,7 @@ def read_netem(tables: Mapping[str, Any], seed: int) -> tuple[Netem, list[Mistak
 def _entry(kind: type[msgspec.Struct], raw: Any, path: str, found: list[Mistake]) -> msgspec.Struct | None:
     known = {field.encode_name: field for field in msgspec.structs.fields(kind)}
     if not isinstance(raw, Mapping):
-        found.append(Mistake(path, f"must be a table with the keys {', '.join(known)}, got {_shown(raw)}"))
+        found.append(Mistake(path, f"must be a table with the keys {', '.join(known)}, got {shown(raw)}"))
         return None
     values: dict[str, Any] = {}
     for key in raw:
@@ -117,12 +115,13 @@ def _wrong(path: str, raw: Any, kind: Any, error: str) -> Mistake:
         choice = f"; write one of {', '.join(filter(None, models))}" if key == "model" else ""
         return Mistake(f"{path}.{key}", f"is missing{choice}")
     if inside.endswith(".model"):
-        return Mistake(path, f"there is no {_shown(value)}; {suggestion(str(value), filter(None, models), 'models')}")
-    if not inside:
-        return Mistake(path, f"must be {_expected(kind)}, got {_shown(raw)}{_meant(raw)}")
+        return Mistake(path, f"there is no {shown(value)}; {suggestion(str(value), filter(None, models), 'models')}")
     expected = re.match(r"Expected `(\w+)", error)
     what = _WORDS.get(expected[1], expected[1]) if expected else "something else"
-    return Mistake(path, f"must be {what}, got {_shown(value)}{_meant(value)}")
+    if not inside:
+        what = _expected(kind)
+    hint = number_in(value) if isinstance(value, str) and "number" in what else ""
+    return Mistake(path, f"must be {what}, got {shown(value)}{hint}")
 
 
 def _models(kind: Any) -> dict[str, type[msgspec.Struct]]:
@@ -135,7 +134,7 @@ def _models(kind: Any) -> dict[str, type[msgspec.Struct]]:
 def _expected(kind: Any) -> str:
     """What a key takes, for people."""
     if get_origin(kind) is Literal:
-        return "one of " + ", ".join(_shown(choice) for choice in get_args(kind) if choice)
+        return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
     kinds, models = set(get_args(kind) or (kind,)), _models(kind)
     table = ""
     if models:
@@ -157,12 +156,3 @@ def _inside(raw: Any, path: str) -> Any:
         except (KeyError, IndexError, TypeError):
             return raw
     return raw
-
-
-def _meant(raw: Any) -> str:
-    found = _UNIT.fullmatch(raw) if isinstance(raw, str) else None
-    return f"; write {float(found[1]) * _FACTOR[found[2]]:g}" if found else ""
-
-
-def _shown(raw: Any) -> str:
-    return json.dumps(raw, ensure_ascii=False, default=str)

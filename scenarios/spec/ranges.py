@@ -1,33 +1,11 @@
-"""Which numbers a key may have, and what was probably meant by one that is out of range.
-
-A range is wide: it holds every value that somebody might want to try, and none that only a lost unit explains.
-"""
+"""Which numbers a key of a scenario may have."""
 
 from __future__ import annotations
 
-import math
-import re
-from typing import NamedTuple
-
 from agents.config import Gains, Handling
+from netem.plausible import Range
 from plant.config import GflParameters, GfmParameters
 from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Time
-
-
-class Range(NamedTuple):
-    """Numbers that make sense, bounds included."""
-
-    what: str
-    """What the number is, for the sentence."""
-    unit: str
-    """"s", "pu", "Hz", "1/s" or ""."""
-    low: float
-    """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
-    high: float
-    """Highest value."""
-    above_zero: bool = False
-    """Whether zero makes no sense at all."""
-
 
 RANGES: dict[tuple[type, str], Range] = {
     (Time, "end_s"): Range("the duration of a run", "s", 0.001, 3600.0, above_zero=True),
@@ -84,50 +62,3 @@ def range_of(cls: type, name: str) -> Range | None:
     if UNIT_OF_KEY[cls].get(name) == "s":
         return Range("a time constant", "s", 1e-5, 10.0, above_zero=True)
     return Range(f"gain {name}", "", 0.0, 1e6)
-
-
-def objection(value: float, allowed: Range) -> str | None:
-    """Why a number cannot be right, and what would be; None when it can.
-
-    Examples
-    --------
-    >>> objection(20.0, RANGES[Time, "T_c_s"])
-    '20 s is not plausible for a control period (0.0005 to 2 s); did you mean 0.02 (20 ms)?'
-    >>> objection(-0.02, RANGES[Time, "T_c_s"])
-    'a control period must be above 0, got -0.02 s; 0.0005 to 2 s makes sense'
-    >>> objection(64.7, RANGES[PlantTable, "P_set0_pu"])
-    '64.7 pu is not plausible for a power set-point (0 to 1.2 pu); did you mean 0.647 (64.7 %)?'
-    """
-    unit = f" {allowed.unit}" if allowed.unit else ""
-    span = f"{allowed.low:g} to {allowed.high:g}{unit}"
-    if not math.isfinite(value):
-        return f"{allowed.what} must be a finite number, got {value}; {span} makes sense"
-    if allowed.above_zero and value <= 0:
-        return f"{allowed.what} must be above 0, got {value:g}{unit}; {span} makes sense"
-    if allowed.low <= value <= allowed.high:
-        return None
-    return f"{value:g}{unit} is not plausible for {allowed.what} ({span}){_meant(value, allowed)}"
-
-
-def number_in(text: str) -> str:
-    """What to write instead of a text with a unit, or "" when it is not one.
-
-    Examples
-    --------
-    >>> number_in("20 ms"), number_in("64.7%"), number_in("soon")
-    ('; write 0.02', '; write 0.647', '')
-    """
-    match = re.fullmatch(r"\s*([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(us|ms|s|%|pu|Hz|mHz)?\s*", text)
-    if match is None:
-        return ""
-    factor = {"us": 1e-6, "ms": 1e-3, "%": 1e-2, "mHz": 1e-3}.get(match[2] or "", 1.0)
-    return f"; write {float(match[1]) * factor:g}"
-
-
-def _meant(value: float, allowed: Range) -> str:
-    factor, name = {"s": (1000.0, "ms"), "pu": (100.0, "%"), "Hz": (1000.0, "mHz")}.get(allowed.unit, (1.0, ""))
-    if name and allowed.low <= value / factor <= allowed.high and (not allowed.above_zero or value > 0):
-        return f"; did you mean {value / factor:g} ({value:g} {name})?"
-    if allowed.unit == "pu" and abs(value) > 100:
-        return "; it is per unit of the inverter's own rating, neither kW nor V"
-    return ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import types
 import typing
@@ -11,11 +10,13 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from netem.mistakes import shown
+from netem.plausible import number_in, objection
 from netem.spec.netem import Netem
 from netem.spec.reading import ENTRIES, read_netem
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Case, Scenario, key_of
-from scenarios.spec.ranges import number_in, objection, range_of
+from scenarios.spec.ranges import range_of
 from wire.nearest import suggestion
 
 AS_RUN = "as_run"
@@ -50,7 +51,7 @@ def _struct(cls: type, data: Any, path: str, mistakes: Mistakes, bases: Mapping[
     """One table; `bases` holds, by key, what a table below starts from instead of the defaults of its type."""
     fields = {key_of(cls, field): field for field in msgspec.structs.fields(cls) if field.type is not Netem}
     if not isinstance(data, Mapping):
-        mistakes.add(path, f"must be a table with the keys {', '.join(fields)}, got {_shown(data)}")
+        mistakes.add(path, f"must be a table with the keys {', '.join(fields)}, got {shown(data)}")
         data = {}
     base = bases.get(path.rpartition(".")[2])
     base = base if isinstance(base, cls) else None  # not for a case that is named like the table
@@ -94,12 +95,12 @@ def _value(
     if typing.get_origin(kind) is tuple and isinstance(inner[0], type) and issubclass(inner[0], msgspec.Struct):
         if isinstance(raw, list):
             return tuple(_struct(inner[0], item, f"{path}[{i}]", mistakes, bases) for i, item in enumerate(raw))
-        mistakes.add(path, f"must be written as [[{path}]], got {_shown(raw)}")
+        mistakes.add(path, f"must be written as [[{path}]], got {shown(raw)}")
         return ()
     if typing.get_origin(kind) is dict and isinstance(inner[1], type) and issubclass(inner[1], msgspec.Struct):
         if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
             return {name: _struct(inner[1], item, f"{path}.{name}", mistakes, bases) for name, item in raw.items()}
-        mistakes.add(path, f"must be written as tables [{path}.NAME], got {_shown(raw)}")
+        mistakes.add(path, f"must be written as tables [{path}.NAME], got {shown(raw)}")
         return {}
     try:
         value = msgspec.convert(raw, kind)
@@ -152,10 +153,10 @@ def _wrong_type(kind: Any, raw: Any) -> str:
     if typing.get_origin(kind) is typing.Literal:
         options = [option or '""' for option in typing.get_args(kind)]
         if isinstance(raw, str):
-            return f"there is no {_shown(raw)}; {suggestion(raw, options, 'choices')}"
-        return f"must be {_named(kind)}, got {_shown(raw)}"
+            return f"there is no {shown(raw)}; {suggestion(raw, options, 'choices')}"
+        return f"must be {_named(kind)}, got {shown(raw)}"
     hint = number_in(raw) if isinstance(raw, str) and kind in (float, int) else ""
-    return f"must be {_named(kind)}, got {_shown(raw)}{hint}"
+    return f"must be {_named(kind)}, got {shown(raw)}{hint}"
 
 
 def _expected(field: msgspec.structs.FieldInfo) -> str:
@@ -175,7 +176,7 @@ def _named(kind: Any) -> str:
     if kind is str:
         return "a text in quotes"
     if typing.get_origin(kind) is typing.Literal:
-        return "one of " + ", ".join(_shown(option) for option in typing.get_args(kind))
+        return "one of " + ", ".join(shown(option) for option in typing.get_args(kind))
     if typing.get_origin(kind) is dict:
         return "a table"
     if typing.get_origin(kind) is tuple:
@@ -196,11 +197,6 @@ def _placeholder(kind: Any) -> Any:
     origin = typing.get_origin(kind) or kind
     assert not isinstance(origin, types.UnionType)
     return origin()
-
-
-def _shown(raw: Any) -> str:
-    """Write a value as TOML writes it, or nearly."""
-    return json.dumps(raw, ensure_ascii=False, default=str)
 
 
 def _join(path: str, key: str) -> str:

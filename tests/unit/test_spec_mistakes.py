@@ -49,7 +49,7 @@ def mistakes(folder: Path, text: str) -> tuple[str, ...]:
         ("P_set0_pu = 0.647", "P_set0_kW = 388", r"plant.P_set0_kW: unknown key; write P_set0_pu, per unit"),
         ("k_p = 0.0007", "k_p = 0", r"gains.k_p: gain k_p must be above 0, got 0"),
         ("k_q = 0.25", "k_q = -1.0", r"gains.k_q: gain k_q must be above 0, got -1"),
-        ("alpha = 1.0", "alpha = -1.0", r"gains.alpha: -1 is not plausible for gain alpha"),
+        ("alpha = 1.0", "alpha = -1.0", r"gains.alpha: gain alpha must not be negative, got -1"),
         (
             "[gains]",
             "[handling]\nmax_age_s = 250\n[gains]",

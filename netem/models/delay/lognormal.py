@@ -6,6 +6,7 @@ import math
 
 from netem.mistakes import Mistake, amount, seconds
 from netem.models.delay.base import STANDARD, RandomDelay
+from netem.plausible import Range
 
 
 class Lognormal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="lognormal"):
@@ -35,4 +36,4 @@ class Lognormal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         found = seconds("median_s", self.median_s, "a median delay", above_zero=True)
         found += seconds("offset_s", self.offset_s, "a delay")
         hint = "; it is the spread of the logarithm, without a unit"
-        return found + amount("sigma", self.sigma, "sigma", "", 0.001, 3.0, hint) + self._wrong_correlation()
+        return found + amount("sigma", self.sigma, Range("sigma", "", 0.001, 3.0), hint) + self._wrong_correlation()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from netem.mistakes import Mistake, amount, seconds
 from netem.models.delay.base import RandomDelay
+from netem.plausible import Range
 
 
 class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="pareto"):
@@ -31,4 +32,5 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True,
         """Values that cannot be meant."""
         found = seconds("minimum_s", self.minimum_s, "the shortest delay", above_zero=True)
         hint = "; at 1 and below the mean delay is infinite"
-        return found + amount("shape", self.shape, "a Pareto shape", "", 1.01, 100.0, hint) + self._wrong_correlation()
+        found += amount("shape", self.shape, Range("a Pareto shape", "", 1.01, 100.0), hint)
+        return found + self._wrong_correlation()
