@@ -11,7 +11,7 @@ from tests.processes.hosts import Hosts, NoHostsError
 from tests.processes.terminals import Desk
 
 AT_ONCE = 8.0
-"""Time (s) within which the other hosts go on although links to the dead one are being closed, which used to take ten."""
+"""Time (s) within which the others go on although links to a dead host are being closed, which used to take ten."""
 
 CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'
 
