@@ -1,0 +1,81 @@
+"""metrics.json: the measures of a run, whoever ran it, as a file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+import msgspec
+
+from plant.equipment import Feeder
+from scenarios.results.findings import Findings
+from scenarios.spec import Scenario
+from wire.messages import Pacing
+
+Clock = Literal["simulated", "wall"]
+"""Lock-step of plant and agents, or real time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ran:
+    """What was run, and how."""
+
+    scenario: Scenario
+    """Checked; with the seed and the cases asked for."""
+    feeder: Feeder
+    """Its feeder."""
+    driver: str
+    """What moved bytes and time: "processes", "inprocess", or "by hand"."""
+    folder: Path
+    """Its run folder."""
+    clock: Clock = "simulated"
+    speed: float = 1.0
+    """Wall-clock: run time per wall time (s/s)."""
+
+
+def metrics_json(
+    ran: Ran,
+    found: Findings,
+    sha256: Mapping[str, str],
+    pacing: Mapping[str, Pacing],
+    links_sha256: Mapping[str, str] = MappingProxyType({}),
+    by_hand: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time.
+
+    Parameters
+    ----------
+    ran : Ran
+        What was run.
+    found : Findings
+        What was measured.
+    sha256, pacing, links_sha256 : Mapping
+        By case: hash of its history, how it kept real time, hash of all fates of messages; where there are any.
+    by_hand : Mapping[str, Any], optional
+        What a reader must know of a run that people had their hands in.
+    """
+    cases: dict[str, dict[str, Any]] = {}
+    for case, steady in found.results.items():
+        cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
+        for label, islands in found.islands.get(case, {}).items():
+            cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
+        cases[case]["history_sha256"] = sha256[case]
+        if case in links_sha256:
+            cases[case]["links_sha256"] = links_sha256[case]
+        if case in pacing:
+            cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
+    scenario = ran.scenario
+    clock = {"clock": ran.clock, "speed": ran.speed} if ran.clock == "wall" else {}
+    hand = {"by_hand": dict(by_hand)} if by_hand else {}
+    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **hand, "cases": cases}
+    return json.dumps(whole, indent=2, allow_nan=False) + "\n"
+
+
+def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
+    measures = {name: value for name, value in steady.items() if name != "p"}
+    return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
