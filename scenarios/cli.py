@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -24,7 +24,6 @@ from scenarios.usage import (
     CLAIM_FAILED,
     INTERRUPTED,
     PASSED,
-    TERMINATED,
     chosen,
     fail,
     load,
@@ -118,7 +117,6 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
-    import signal
     from datetime import datetime
 
     spec, feeder = load(scenario)
@@ -130,10 +128,11 @@ def run(
     from rich.console import Console
 
     from scenarios.drivers.ports import PortError, check_port
+    from scenarios.interruption import exit_code, interruptible
     from scenarios.progress import progress
     from scenarios.results.folder import FolderError, new_folder, shown
     from scenarios.results.report import show
-    from scenarios.run import BrokenRunError, Request, TerminatedError
+    from scenarios.run import BrokenRunError, Request
     from scenarios.run import run as run_scenario
 
     try:
@@ -143,12 +142,6 @@ def run(
     except (FolderError, PortError) as error:
         fail([str(error)], BAD_INPUT)
 
-    def terminate(*_: object) -> NoReturn:
-        raise TerminatedError
-
-    before = signal.signal(signal.SIGTERM, terminate)
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
-        signal.signal(signal.SIGHUP, terminate)
     console = Console()
     request = Request(
         scenario=spec,
@@ -160,15 +153,12 @@ def run(
         strict=strict,
     )
     try:
-        with progress(console, tuple(spec.cases)) as tell:
+        with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)
     except BrokenRunError as error:
         fail([f"the run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
     except KeyboardInterrupt as error:
-        code = TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
-        fail([f"interrupted; what came until then is in {shown(folder)}/"], code)
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     show(report, console)
     raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, fail, load, require
+from scenarios.usage import BAD_INPUT, BROKEN, fail, load, require
 
 if TYPE_CHECKING:
     from scenarios.experiments.registry import FromScenario, FromSweep
@@ -82,6 +82,7 @@ def _told(source: FromScenario, folder: Path) -> Result:
     from rich.console import Console
 
     from scenarios.experiments.told import Told
+    from scenarios.interruption import exit_code, interruptible
     from scenarios.progress import progress
     from scenarios.results.folder import FolderError, new_folder, shown
     from scenarios.results.history import read_history
@@ -91,14 +92,14 @@ def _told(source: FromScenario, folder: Path) -> Result:
     scenario, feeder = load(source.scenario)
     try:
         new_folder(folder, scenario.name, datetime.now().astimezone())
-        with progress(Console(), tuple(scenario.cases)) as tell:
+        with interruptible(), progress(Console(), tuple(scenario.cases)) as tell:
             run_scenario(Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=folder), tell)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except BrokenRunError as error:
         fail([f"the run broke: {error}"], BROKEN)
-    except KeyboardInterrupt:
-        fail([f"interrupted; what came until then is in {shown(folder)}/"], INTERRUPTED)
+    except KeyboardInterrupt as error:
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     histories = {case: read_history(folder / case / "history.csv") for case in scenario.cases}
     return source.make(Told(scenario=scenario, feeder=feeder, histories=histories))
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Literal
 
 import typer
 
 from scenarios.reproduce.parts import CHOICES, chosen
-from scenarios.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, INTERRUPTED, PASSED, TERMINATED, fail, require
+from scenarios.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, require
 
 _NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
 
@@ -57,17 +57,17 @@ def reproduce(
 def _reproduce(
     driver: Literal["processes", "inprocess"], only: str | None, seed: int | None, jobs: int | None, out: Path | None
 ) -> None:
-    import signal
     from datetime import datetime
 
     from rich.console import Console
 
+    from scenarios.interruption import exit_code, interruptible
     from scenarios.remaining import remaining
     from scenarios.reproduce.found import Reproduction
     from scenarios.reproduce.work import Work
     from scenarios.reproduce.writing import write
     from scenarios.results.folder import FolderError, new_folder, set_status, shown
-    from scenarios.run import BrokenRunError, TerminatedError
+    from scenarios.run import BrokenRunError
     from wire.output import ReaderGoneError
 
     now = datetime.now().astimezone()
@@ -76,25 +76,22 @@ def _reproduce(
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
 
-    def terminate(*_: object) -> NoReturn:
-        raise TerminatedError
-
-    before = signal.signal(signal.SIGTERM, terminate)
     console = Console()
     work = Work(chosen(only), driver, folder / "runs", seed, jobs or len(os.sched_getaffinity(0)))
     results = []
     try:
-        with remaining(console, work.total_s) as tell:
-            for result in work.do(tell, figures=only != "tables"):
-                results.append(result)
-        whole = Reproduction(
-            results=tuple(results),
-            driver=driver,
-            seed=work.seed,
-            started=now.isoformat(sep=" ", timespec="minutes"),
-            only=only or "",
-        )
-        write(whole, work, folder)
+        with interruptible():
+            with remaining(console, work.total_s) as tell:
+                for result in work.do(tell, figures=only != "tables"):
+                    results.append(result)
+            whole = Reproduction(
+                results=tuple(results),
+                driver=driver,
+                seed=work.seed,
+                started=now.isoformat(sep=" ", timespec="minutes"),
+                only=only or "",
+            )
+            write(whole, work, folder)
     except (BrokenRunError, RuntimeError) as error:
         set_status(folder, f"broken: {error}")
         fail([f"a run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
@@ -103,10 +100,7 @@ def _reproduce(
         raise
     except KeyboardInterrupt as error:
         set_status(folder, "broken: interrupted")
-        code = TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
-        fail([f"interrupted; what came until then is in {shown(folder)}/"], code)
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     for line in _told(whole):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Report: {shown(folder / 'report.html')}", markup=False, highlight=False, soft_wrap=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, fail
+from scenarios.usage import BAD_INPUT, BROKEN, fail
 
 if TYPE_CHECKING:
     from scenarios.sweep.file import Plan
@@ -79,24 +79,18 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     again : str
         The command that goes on with what was interrupted.
     """
-    import signal
-
     from rich.console import Console
 
+    from scenarios.interruption import exit_code, interruptible
     from scenarios.remaining import remaining
     from scenarios.results.folder import FolderError, shown
-    from scenarios.run import TerminatedError
     from scenarios.sweep.folder import SweepFolder
     from scenarios.sweep.study import study
     from scenarios.sweep.workers import WorkersError, cores
 
-    def terminate(*_: object) -> NoReturn:
-        raise TerminatedError
-
-    before = signal.signal(signal.SIGTERM, terminate)
     console = Console()
     try:
-        with SweepFolder(path, plan) as folder:
+        with interruptible(), SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
             try:
                 with remaining(console, size := len(plan.runs)) as tell:
@@ -109,11 +103,9 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
                 kept = f"{len(folder.done)} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
                 if isinstance(error, WorkersError):
                     fail([str(error), kept], BROKEN)
-                fail([f"interrupted; {kept}"], TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED)
+                fail([f"interrupted; {kept}"], exit_code(error))
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _told(summary: Summary) -> list[str]:

@@ -1,0 +1,33 @@
+"""A command that is ended from outside closes as after Ctrl-C, and its exit code says by what."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from scenarios.run import TerminatedError
+from scenarios.usage import INTERRUPTED, TERMINATED
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Have SIGTERM, and a terminal that goes away, end what is inside as Ctrl-C does: by `KeyboardInterrupt`."""
+
+    def terminate(*_: object) -> None:
+        raise TerminatedError
+
+    numbers = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, terminate) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def exit_code(error: KeyboardInterrupt) -> int:
+    """Exit code of a command that was ended so."""
+    return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED

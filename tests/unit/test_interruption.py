@@ -1,0 +1,40 @@
+"""How commands that run for long are ended from outside."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from scenarios.interruption import exit_code, interruptible
+
+
+@pytest.fixture(autouse=True)
+def restored() -> Iterator[None]:
+    """The handlers of this process, put back whatever a test does to them."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 143)])
+def test_a_signal_ends_a_command_as_ctrl_c_does(sent: signal.Signals, code: int) -> None:
+    """It comes as KeyboardInterrupt, the exit code says by what, and afterwards signals do what they did."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+    with pytest.raises(KeyboardInterrupt) as ended, interruptible():
+        signal.raise_signal(sent)
+
+    assert exit_code(ended.value) == code
+    assert [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)] == [signal.SIG_IGN, signal.SIG_DFL]
+
+
+def test_under_nohup_a_command_outlives_its_terminal() -> None:
+    """Who has asked that the signal of a lost terminal is ignored is heeded."""
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    with interruptible():
+        signal.raise_signal(signal.SIGHUP)
