@@ -24,7 +24,9 @@ from typing import Literal
 from msgspec.structs import replace
 
 from agents.cadence import Cadence
+from agents.claims import Claims
 from agents.config import AgentConfig
+from agents.heard import Heard
 from agents.hearing import Hearing
 from agents.orders import Orders
 from agents.side import REPORT_TICKS, Side
@@ -74,7 +76,7 @@ class FreeAgent(Side):
         """Whether it closes only to begin again with a new session."""
         self.missed = 0
         """Ticks skipped, as their time was over."""
-        self.ticks = self.sent = self.used = self.lost = 0
+        self.ticks = self.sent = self.used = 0
         self._first_routes = dict(self._routes)
         # a clock that is to drift must drift
         self._cadence = Cadence(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
@@ -82,6 +84,7 @@ class FreeAgent(Side):
         self._give_up: float | None = None
         self._lateness = 0.0
         self._ran = False
+        self._heard = Heard(config.speed)
         self._hearing = Hearing()
         self._leaving = ""
         """Why it leaves, once the plant has been told."""
@@ -99,15 +102,11 @@ class FreeAgent(Side):
         """When the last measurement arrived, over the links."""
         self._run_time = 0.0
         """That of the last measurement that came off the wire (s)."""
-        self._claims: dict[str, list[str]] = {}
-        """Tokens that are there: name -> its instances, the one that counts first."""
+        self._claims = Claims()
         self._met: set[str] = set()
         """Names whose nameplate is known."""
         self._neighbours: tuple[str, ...] = ()
-        self._came: dict[str, tuple[int, float]] = {}
-        """Number of the last message of each that came off the wire, and when."""
-        self._heard: dict[str, tuple[State, float]] = {}
-        """Last state of each agent that the links let through, and when."""
+        self._heard.forget_all()
         self._in_sums: tuple[str, ...] = ()
         """Neighbours in the sums of the last tick."""
 
@@ -193,7 +192,7 @@ class FreeAgent(Side):
 
     def _unheard(self, now: float) -> tuple[str, ...]:
         """Who should be heard and is not: the plant, a neighbour that the plant hears, or oneself, by the plant."""
-        if self._ran and (PLANT not in self._came or now - self._came[PLANT][1] > SILENT):
+        if self._ran and self._heard.silence(PLANT, now) > SILENT:
             return (PLANT,)
         if self.phase != "running" or self._measurement is None:
             return ()
@@ -205,7 +204,7 @@ class FreeAgent(Side):
     def _is_silent(self, name: str, now: float) -> bool:
         if name not in self._met:
             return True
-        return name in self._neighbours and (name not in self._came or now - self._came[name][1] > SILENT)
+        return name in self._neighbours and self._heard.silence(name, now) > SILENT
 
     def _go_astray(self, why: str) -> None:
         self.astray = True
@@ -240,11 +239,8 @@ class FreeAgent(Side):
                     self.phase = "waiting"
                     self._say("the plant is there; waits for its measurement")
             case ("alive", "agent", name, instance) if name != self._name:
-                instances = self._claims.setdefault(name, [])
-                if instance not in instances:
-                    instances.append(instance)
-                if instances[0] == instance:
-                    self._fetch_nameplate(name, instance)
+                if self._claims.appeared(name, instance):
+                    self._fetch_nameplate(name)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
@@ -253,33 +249,26 @@ class FreeAgent(Side):
                 self._plant_there = False
                 self._hold("the plant is gone; holds, and seeks it again")
                 self.phase = "seeking"
-            case ("alive", "agent", name, instance) if instance in self._claims.get(name, ()):
-                instances = self._claims[name]
-                counted = instances[0] == instance
-                instances.remove(instance)
+            case ("alive", "agent", name, instance) if self._claims.vanished(name, instance):
                 self._routes.pop(self.keys.nameplate(name, instance), None)
-                if counted:
-                    self._forget(name)
-                if counted and instances:
-                    self._fetch_nameplate(name, instances[0])
-                elif not instances:
-                    del self._claims[name]
+                self._forget(name)
+                if name in self._claims:
+                    self._fetch_nameplate(name)
 
-    def _fetch_nameplate(self, name: str, instance: str) -> None:
-        key = self.keys.nameplate(name, instance)
+    def _fetch_nameplate(self, name: str) -> None:
+        key = self.keys.nameplate(name, self._claims.instance(name))
         self._routes[key] = (name, lambda message, payload, now: self._on_nameplate(name, message))
         self._actions.append(Fetch(key))
 
     def _ask_again(self) -> None:
         """Ask once more for the nameplates that have not come: a question dies with its link."""
-        for name, instances in self._claims.items():
+        for name in self._claims:
             if name not in self._met:
-                self._fetch_nameplate(name, instances[0])
+                self._fetch_nameplate(name)
 
     def _forget(self, name: str) -> None:
         self._met.discard(name)
-        self._came.pop(name, None)
-        self._heard.pop(name, None)
+        self._heard.forget(name)
         self._agent.forget(name)
         self._meet_neighbours()
 
@@ -289,7 +278,7 @@ class FreeAgent(Side):
             self.phase = "waiting"
             self._say(why)
         self._measurement, self._in_sums = None, ()
-        self._heard.clear()
+        self._heard.drop()
         self._agent.let_go()
 
     # ---------------------------------------------------------------- messages
@@ -318,7 +307,7 @@ class FreeAgent(Side):
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
         self._check_life(message)
-        self._count(message, now)
+        self._heard.came(message, now)
         self._cadence.measured(now)
         self._run_time = message.t
         if not self._is_offered(message, payload, now * self._config.speed):
@@ -334,7 +323,7 @@ class FreeAgent(Side):
                 self._hold("the plant has a new life; starts from what it measures")
                 self._orders.restart()
             self._plant_incarnation = message.incarnation
-            self._came.pop(PLANT, None)
+            self._heard.forget(PLANT)
 
     def _on_order(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, LinkOrder):
@@ -344,16 +333,6 @@ class FreeAgent(Side):
         if answer is not None:
             self._publish(self.keys.obeyed(self._name), encode(answer))
 
-    def _count(self, message: AnyMessage, now: float) -> None:
-        """Note what came off the wire, and how many did not."""
-        name, seq = message.sender, message.seq
-        if name in self._came:
-            last = self._came[name][0]
-            if seq <= last:
-                raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
-            self.lost += seq - last - 1
-        self._came[name] = seq, now
-
     def _take_arrived(self, now: float) -> None:
         """Use what the emulated links have let through by now; what was overtaken is of no use."""
         for message in self._arrived(now * self._config.speed):
@@ -361,7 +340,7 @@ class FreeAgent(Side):
                 if self._measurement is None or message.seq > self._measurement.seq:
                     self._measurement, self._measured_at = message, now
             elif isinstance(message, State) and message.sender in self._met and not self._agent.hear(message):
-                self._heard[message.sender] = message, now
+                self._heard.keep(message, now)
 
     def _on_nameplate(self, name: str, message: AnyMessage) -> None:
         if not isinstance(message, Nameplate):
@@ -377,12 +356,12 @@ class FreeAgent(Side):
         reason = self._agent.judge(message)
         if reason:
             raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
-        self._count(message, now)
-        if self._links is not None and PLANT not in self._came:
+        self._heard.came(message, now)
+        if self._links is not None and not self._heard.has(PLANT):
             return  # the plant tells what was ordered before it sends a measurement: till then no link is known
         if not self._is_offered(message, payload, now * self._config.speed):
             self._agent.hear(message)
-            self._heard[message.sender] = message, now
+            self._heard.keep(message, now)
 
     def _meet_neighbours(self) -> None:
         """Apply the rule to who is present, and listen to whom it names."""
@@ -401,10 +380,7 @@ class FreeAgent(Side):
 
     def _age(self, name: str, now: float) -> float:
         """Age of a neighbour's last state (s of run time); infinite if none was heard."""
-        if name not in self._heard:
-            return float("inf")
-        state, at = self._heard[name]
-        return max((now - at) * self._config.speed, self._t - state.t)
+        return self._heard.age(name, now, self._t)
 
     def _young(self, now: float) -> tuple[str, ...]:
         limit = self._config.control.handling.max_age or self._config.max_age
@@ -451,7 +427,7 @@ class FreeAgent(Side):
             received=self.used,
             sent=self.sent,
             rejected=sum(self.rejects.counts.values()),
-            lost=self.lost,
+            lost=self._heard.lost,
             ticks=self.ticks,
             missed=self.missed,
             lateness=self._lateness,

@@ -339,7 +339,7 @@ def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
         lab.state("inv2", seq)
     lab.measure(3)
 
-    assert lab.side.lost == 2 + 2
+    assert lab.side._heard.lost == 2 + 2
 
 
 def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:

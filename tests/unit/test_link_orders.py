@@ -148,13 +148,13 @@ def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
     lab.measure(1)
     lab.state("inv2", 1, 0.02, P_set=90e3)
     lab.go(0.0)
-    held = lab.side._heard["inv2"][0].P_set
+    before = lab.side._heard.age("inv2", lab.now, t=0.02)
     order(lab, 2, 0.04, Order(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
     lab.measure(2)
     lab.state("inv2", 2, 0.04, P_set=70e3)
     lab.go(0.02)
 
-    assert (held, lab.side._heard["inv2"][0].P_set) == (60e3, 70e3)
+    assert (before, lab.side._heard.age("inv2", lab.now, t=0.04)) == (0.02, 0.0)
     assert answers(lab) == [(1, True, "inv2 -> inv1"), (2, True, "inv2, inv3 -> inv1")]
 
 
@@ -167,7 +167,7 @@ def test_before_the_plant_has_spoken_nothing_of_a_neighbour_is_used() -> None:
     lab.state("inv2", 1, 3.0, P_set=90e3)
     lab.go(0.0)
 
-    assert lab.side._heard == {}
+    assert lab.side._heard.age("inv2", lab.now, t=3.0) == float("inf")
     assert lab.status().impaired == ("inv2",)
 
 

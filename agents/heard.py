@@ -1,0 +1,88 @@
+"""What was heard of whom, and how old it is. Pure; times are on the own clock (s, wall), ages in s of run time."""
+
+from __future__ import annotations
+
+from wire.codec import RejectedError
+from wire.messages import AnyMessage, State
+
+
+class Heard:
+    """What came from the plant and the neighbours.
+
+    Parameters
+    ----------
+    speed : float
+        Run time per wall time (s/s).
+
+    Examples
+    --------
+    The age of a state counts from its arrival; but one that was long on its way is as old as its time says:
+
+    >>> heard = Heard(speed=1.0)
+    >>> state = State(sender="inv2", incarnation=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0, island="")
+    >>> heard.came(state, now=10.0)
+    >>> heard.keep(state, now=10.0)
+    >>> heard.age("inv2", now=10.25, t=0.5), heard.age("inv2", now=10.25, t=2.0), heard.age("inv3", now=10.25, t=0.5)
+    (0.25, 1.5, inf)
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self.lost = 0
+        """Messages that did not come, as the numbers of those that did show."""
+        self._came: dict[str, tuple[int, float]] = {}
+        """Number of the last message of each that came off the wire, and when."""
+        self._kept: dict[str, tuple[State, float]] = {}
+        """Last state of each agent that the links let through, and when."""
+
+    def came(self, message: AnyMessage, now: float) -> None:
+        """Note what came off the wire, and how many did not.
+
+        Raises
+        ------
+        RejectedError
+            If a later one of the same sender has come before.
+        """
+        name, seq = message.sender, message.seq
+        if name in self._came:
+            last = self._came[name][0]
+            if seq <= last:
+                raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
+            self.lost += seq - last - 1
+        self._came[name] = seq, now
+
+    def has(self, name: str) -> bool:
+        """Whether anything has come from somebody."""
+        return name in self._came
+
+    def silence(self, name: str, now: float) -> float:
+        """Time (s, wall) since something came from somebody; infinite if nothing has."""
+        return now - self._came[name][1] if name in self._came else float("inf")
+
+    def keep(self, state: State, now: float) -> None:
+        """Note a state that may be used."""
+        self._kept[state.sender] = state, now
+
+    def age(self, name: str, now: float, t: float) -> float:
+        """Age of somebody's last state (s of run time); infinite if there is none.
+
+        That since it came, or that by its own time beside `t`, the time of the own measurement (s), if that is more.
+        """
+        if name not in self._kept:
+            return float("inf")
+        state, at = self._kept[name]
+        return max((now - at) * self._speed, t - state.t)
+
+    def forget(self, name: str) -> None:
+        """Forget all of somebody, as its process is gone."""
+        self._came.pop(name, None)
+        self._kept.pop(name, None)
+
+    def forget_all(self) -> None:
+        """Forget everybody, but not how many messages were lost."""
+        self._came.clear()
+        self._kept.clear()
+
+    def drop(self) -> None:
+        """Use no state that has come so far: it is of no use any more."""
+        self._kept.clear()
