@@ -22,6 +22,7 @@ from scenarios.usage import (
     BAD_INPUT,
     BROKEN,
     CLAIM_FAILED,
+    INSTALL,
     INTERRUPTED,
     PASSED,
     chosen,
@@ -75,7 +76,7 @@ def main() -> None:
     except KeyboardInterrupt:
         fail(["interrupted; everything that was started has ended"], INTERRUPTED)
     except ModuleNotFoundError as error:
-        fail([f"{error.name} is not installed; install gridpeers with its dependencies: pip install -e ."], BAD_INPUT)
+        fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
     finally:
         flush()  # what a closed pipe does at the interpreter's own end would be a complaint
 

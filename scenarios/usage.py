@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
-    from scenarios.spec import Scenario
+    from scenarios.spec import Scenario, ScenarioError
 
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 
@@ -22,9 +22,14 @@ def load(name: str) -> tuple[Scenario, Feeder]:
     try:
         return load_scenario(name)
     except ScenarioError as error:
-        count = len(error.mistakes)
-        head = [] if count == 1 else [f"{count} mistakes:"]
-        fail([*head, *error.mistakes], BAD_INPUT)
+        refuse(error)
+
+
+def refuse(error: ScenarioError) -> NoReturn:
+    """End with every mistake in a file."""
+    count = len(error.mistakes)
+    head = [] if count == 1 else [f"{count} mistakes:"]
+    fail([*head, *error.mistakes], BAD_INPUT)
 
 
 def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
@@ -43,15 +48,19 @@ def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
 
 
-def require(modules: dict[str, str]) -> None:
-    """End with a clear line when a package that the run needs is not installed."""
+INSTALL = "install gridpeers with its dependencies: pip install -e ."
+"""What to do when a package is not there that everybody needs."""
+
+
+def require(modules: dict[str, str], install: str = INSTALL) -> None:
+    """End with a clear line when a package is not installed that something needs, and with what to do."""
     from importlib.util import find_spec
 
     packages = {"zenoh": "eclipse-zenoh"}
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         lines = [f"{packages.get(name, name)} is not installed; {modules[name]} cannot do without" for name in missing]
-        fail([*lines, "install gridpeers with its dependencies: pip install -e ."], BAD_INPUT)
+        fail([*lines, install], BAD_INPUT)
 
 
 def fail(lines: list[str], code: int) -> NoReturn:

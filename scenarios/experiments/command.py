@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, fail, load, require
+from scenarios.usage import BAD_INPUT, BROKEN, fail, load, refuse, require
 
 if TYPE_CHECKING:
     from scenarios.experiments.registry import FromScenario, FromSweep
@@ -67,7 +67,7 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     try:
         plan = read_sweep(source.sweep)
     except ScenarioError as error:
-        fail(list(error.mistakes), BAD_INPUT)
+        refuse(error)
     summary = finish(source.sweep, plan, folder, jobs, "", again)
     if sum(summary.broke.values()):
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)

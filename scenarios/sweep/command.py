@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, fail
+from scenarios.usage import BAD_INPUT, BROKEN, fail, refuse, require
 
 if TYPE_CHECKING:
     from scenarios.sweep.file import Plan
@@ -45,8 +45,7 @@ def sweep(
     try:
         plan = read_sweep(file)
     except ScenarioError as error:
-        head = [] if len(error.mistakes) == 1 else [f"{len(error.mistakes)} mistakes:"]
-        fail([*head, *error.mistakes], BAD_INPUT)
+        refuse(error)
     if dry_run:
         typer.echo(_size(file, plan))
         return
@@ -132,11 +131,5 @@ def _size(file: str, plan: Plan, done: int = 0) -> str:
 
 def check_packages(*, dask: bool = False) -> None:
     """End with what to install when a package of the extra `sweep` is missing."""
-    from importlib.util import find_spec
-
     modules = _PACKAGES | ({"distributed": "--dask"} if dask else {})
-    missing = [
-        f"{name} is not installed; {what} cannot do without" for name, what in modules.items() if not find_spec(name)
-    ]
-    if missing:
-        fail([*missing, "install what sweeps need: pip install 'gridpeers[sweep]'"], BAD_INPUT)
+    require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")
