@@ -68,6 +68,7 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
         ('[[link]]\non = "* -> *"\ndelay = -0.1', "link[0].delay", ["must not be negative, got -0.1 s"]),
         ('[[link]]\non = "* -> *"\ndelay = 250', "link[0].delay", ["250 s", "0.25 (250 ms)"]),
         ('[[link]]\non = "* -> *"\ndelay = "20 ms"', "link[0].delay", ["must be a number", "write 0.02"]),
+        ('[[link]]\non = "* -> *"\ndelay = "1.2.3 ms"', "link[0].delay", ["must be a number", 'got "1.2.3 ms"']),
         ('[[link]]\non = "* -> *"\ndelay_ms = 20', "link[0].delay_ms", ["unknown key", "write delay"]),
         ('[[link]]\non = "* -> *"\nloss = 30', "link[0].loss", ["0 to 1, got 30", "0.3 (30 %)"]),
         ('[[link]]\non = "* -> *"\nloss = nan', "link[0].loss", ["got nan"]),

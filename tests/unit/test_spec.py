@@ -14,6 +14,7 @@ from scenarios.spec import catalogue, load_scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.writing import to_toml
+from tests.scenario_files import written
 
 SHORT = """
 [time]
@@ -28,13 +29,6 @@ open = ["13-152"]
 secondary = "all"
 graph = "full"
 """
-
-
-def written(folder: Path, text: str, name: str = "mine.toml") -> Path:
-    """A scenario file with this text."""
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 @pytest.mark.parametrize("name", catalogue())

@@ -10,17 +10,9 @@ import pytest
 from plant.tables.read import DATA
 from scenarios.spec import ScenarioError, load_scenario
 from scenarios.spec.loading import CATALOGUE
+from tests.scenario_files import mistakes
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
-
-
-def mistakes(folder: Path, text: str) -> tuple[str, ...]:
-    """What is wrong with a scenario file of this text."""
-    path = folder / "mine.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(path)
-    return caught.value.mistakes
 
 
 @pytest.mark.parametrize(

@@ -8,28 +8,15 @@ import pytest
 from plant.config import Move
 from scenarios.live.setup import Wishes, set_up
 from scenarios.results.moves import as_they_came, late_moves
-from scenarios.spec import ScenarioError, load_scenario
+from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.writing import to_toml
+from tests.scenario_files import mistakes, written
 from wire.messages import PlantEvent
 
 PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
-
-
-def written(folder: Path, text: str) -> Path:
-    """A scenario file with this text."""
-    path = folder / "mine.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def mistakes(folder: Path, text: str) -> tuple[str, ...]:
-    """What is wrong with a scenario file of this text."""
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(written(folder, text))
-    return caught.value.mistakes
 
 
 def test_plug_n_play_is_the_papers_experiment() -> None:

@@ -1,0 +1,23 @@
+"""Scenario files of tests, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.spec import ScenarioError, load_scenario
+
+
+def written(folder: Path, text: str) -> Path:
+    """A scenario file with this text."""
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def mistakes(folder: Path, text: str) -> tuple[str, ...]:
+    """What is wrong with a scenario file of this text."""
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(written(folder, text))
+    return caught.value.mistakes
