@@ -139,6 +139,14 @@ def mean_frequency(history: History, plates: Plates) -> Floats:
     return mean_over(history.f[:, plates.GFM], history.present[:, plates.GFM])
 
 
+def f_in_band(history: History, plates: Plates, f_nom: float) -> Flags:
+    """Whether there is a GFM in a row, and each that is there is within `F_BAND` of f_nom (Hz)."""
+    forming = history.present[:, plates.GFM]
+    near = np.abs(history.f[:, plates.GFM] - f_nom) < F_BAND
+    within: Flags = np.all(near | ~forming, axis=1) & np.any(forming, axis=1)
+    return within
+
+
 def MPSI(history: History, plates: Plates) -> Floats:
     """Mean power sharing index of each row, (16)."""
     return sharing_index(history.P, plates.s, plates.m_p, history.present)
@@ -169,13 +177,11 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
         Nominal frequency (Hz).
     """
     assert plates.names == history.inverters
-    forming = history.present[:, plates.GFM]
-    f_errors = np.where(forming, np.abs(history.f[:, plates.GFM] - f_nom), 0.0)
-    f_error = mean_over(f_errors, forming)
+    f_error = mean_over(np.abs(history.f[:, plates.GFM] - f_nom), history.present[:, plates.GFM])
     sharing = MPSI(history, plates)
     inside = between(history.t, window)
     steady = inside & (history.t >= window.end - STEADY - 1e-9)
-    restored = (f_errors < F_BAND).all(axis=1) & forming.any(axis=1) & (sharing < MPSI_BAND)
+    restored = f_in_band(history, plates, f_nom) & (sharing < MPSI_BAND)
     total = history.P.sum(axis=1)
     carried = np.abs(total - total[steady].mean()) <= LOAD_BAND * abs(total[steady].mean())
     return Steady(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.results.history import Flags, Floats, History, Plates
-from scenarios.results.metrics import F_BAND, MPSI, MPSI_BAND, Window, between, for_good
+from scenarios.results.metrics import MPSI, MPSI_BAND, Window, between, f_in_band, for_good
 
 SWING = 2.0
 """Length of the end of a window over which a swing is measured (s), or half of the window if that is shorter. The
@@ -49,11 +49,9 @@ def settling(history: History, plates: Plates, window: Window, f_nom: float) -> 
     inside = between(history.t, window)
     end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
     forming, f = history.present[:, plates.GFM], history.f[:, plates.GFM]
-    f_error = np.where(forming, np.abs(f - f_nom), 0.0)[inside]
-    in_band: Flags = np.all(f_error < F_BAND, axis=1) & np.any(forming[inside], axis=1)
     shared: Flags = np.less(MPSI(history, plates)[inside], MPSI_BAND)
     return Settling(
-        t_f_s=for_good(history.t[inside], in_band, window.start),
+        t_f_s=for_good(history.t[inside], f_in_band(history, plates, f_nom)[inside], window.start),
         t_share_s=for_good(history.t[inside], shared, window.start),
         f_swing_Hz=_swing(np.where(forming, f, np.nan)[end]),
         V_swing_pu=_swing(np.where(history.present, history.V / plates.V_nom, np.nan)[end]),
