@@ -8,6 +8,7 @@ from itertools import pairwise
 from plant.equipment import Feeder
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
+from scenarios.spec.multiples import divides, multiple
 from wire.nearest import suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
@@ -20,13 +21,13 @@ _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "s
 def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
     """Every time of the scenario falls on the grid it belongs to."""
     time = scenario.time
-    _divides("time.h_s", time.h_s, "time.T_c_s", time.T_c_s, mistakes)
-    _multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "it must be a multiple of h_s", mistakes)
-    _divides("time.record_s", time.record_s, "time.T_c_s", time.T_c_s, mistakes)
-    _multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "it must be a multiple of T_c_s", mistakes)
+    divides("time.h_s", time.h_s, "time.T_c_s", time.T_c_s, mistakes)
+    multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "it must be a multiple of h_s", mistakes)
+    divides("time.record_s", time.record_s, "time.T_c_s", time.T_c_s, mistakes)
+    multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "it must be a multiple of T_c_s", mistakes)
     for i, event in enumerate(scenario.events):
         path = f"event[{i}].t_s"
-        _multiple(path, event.t_s, "time.h_s", time.h_s, "an event must fall on a multiple of h_s", mistakes)
+        multiple(path, event.t_s, "time.h_s", time.h_s, "an event must fall on a multiple of h_s", mistakes)
         if not mistakes.touch(path, "time.end_s") and event.t_s >= time.end_s:
             mistakes.add(
                 path,
@@ -131,32 +132,6 @@ def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> No
                     )
                 named.add(switch)
                 position[switch] = closed
-
-
-def _multiple(path: str, value: float, of: str, step: float, rule: str, mistakes: Mistakes) -> None:
-    """Note a value that is no whole multiple of a step; the tolerance is that of decimal fractions in binary."""
-    if mistakes.touch(path, of) or value <= 0 or step <= 0:
-        return
-    ratio = value / step
-    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6:
-        return
-    near = f"{max(round(ratio), 1) * step:.9g}"
-    key = of.rpartition(".")[2]
-    mistakes.add(path, f"{value:g} s is not a multiple of {key} = {step:g} s: {rule}; the nearest is {near}")
-
-
-def _divides(path: str, step: float, of: str, value: float, mistakes: Mistakes) -> None:
-    """Note a step that does not divide a value; the fault is the step's."""
-    if mistakes.touch(path, of) or value <= 0 or step <= 0:
-        return
-    ratio = value / step
-    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6:
-        return
-    key = of.rpartition(".")[2]
-    # a step that can be written down in microseconds, for 0.02 / 7 cannot be typed
-    whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(value / n, 6) * n - value) < 1e-12]
-    near = value / min(whole, key=lambda n: abs(n - ratio), default=1)
-    mistakes.add(path, f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:g}")
 
 
 def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mistakes: Mistakes) -> None:

@@ -6,6 +6,7 @@ from plant.config import Move
 from plant.equipment import Feeder, InverterRow
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
+from scenarios.spec.multiples import multiple
 from wire.nearest import suggestion
 
 
@@ -30,7 +31,8 @@ def check_moves(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
     known = (*(row.name for row in feeder.inverters), *(row.name for row in feeder.spares))
     for i, event in enumerate(scenario.events):
         if event.leave or event.join:
-            _check_tick(f"event[{i}].t_s", event.t_s, scenario.time.T_c_s, mistakes)
+            rule = "agents leave and join at ticks"
+            multiple(f"event[{i}].t_s", event.t_s, "time.T_c_s", scenario.time.T_c_s, rule, mistakes)
         named: set[str] = set()
         for key, names in (("leave", event.leave), ("join", event.join)):
             path = f"event[{i}].{key}"
@@ -47,15 +49,3 @@ def check_moves(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
                     )
                 named.add(name)
         present = (present - set(event.leave)) | set(event.join)
-
-
-def _check_tick(path: str, t: float, T_c: float, mistakes: Mistakes) -> None:
-    if mistakes.touch(path, "time.T_c_s") or t <= 0.0 or T_c <= 0.0:
-        return
-    ratio = t / T_c
-    if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6:
-        near = f"{max(round(ratio), 1) * T_c:.9g}"
-        mistakes.add(
-            path,
-            f"{t:g} s is not a multiple of T_c_s = {T_c:g} s: agents leave and join at ticks; the nearest is {near}",
-        )
