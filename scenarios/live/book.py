@@ -62,6 +62,11 @@ class Book:
         """What was ordered, in its order."""
         return tuple(change for _, change in sorted(self._orders.items()))
 
+    @property
+    def links_sha256(self) -> str:
+        """Hash of the fates of all messages on emulated links; "" if none was sent."""
+        return self._record.sha256 if any(book.sent for book in self._record.counts.values()) else ""
+
     def __call__(self, message: LinkReport | LinkOrder) -> None:
         """Take a report of what links did, or an order to them."""
         if isinstance(message, LinkReport):
@@ -75,7 +80,7 @@ class Book:
         """Write what is to be written, at the end of a run that came to t (s); what a person should know."""
         self._write_replay(t)
         told: list[str] = []
-        if self._folder is not None and any(book.sent for book in self._record.counts.values()):
+        if self._folder is not None and self.links_sha256:
             from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
 
             check = LinkCheck(self._record, self._setup.netem, self._setup.microgrids, self.changes)

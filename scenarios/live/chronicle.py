@@ -9,7 +9,7 @@ from time import monotonic
 
 from scenarios.live.book import Book
 from scenarios.live.show.events import line_of
-from scenarios.results.record import Recorder, RecordError
+from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.codec import RejectedError, decode
 from wire.keys import Keys
 from wire.messages import LinkOrder, LinkReport, Pacing, Telemetry
@@ -37,6 +37,8 @@ class Chronicle:
         Kinds of events that are told by others.
     book : Book, optional
         Takes what the plant tells of emulated links.
+    on_whole : Callable[[Recorded, Pacing | None], None], optional
+        Called at the end with the record, if it is whole, and how well the plant kept pace.
     """
 
     NAME = "chronicle"
@@ -51,9 +53,10 @@ class Chronicle:
         *,
         untold: Collection[str] = (),
         book: Book | None = None,
+        on_whole: Callable[[Recorded, Pacing | None], None] | None = None,
     ) -> None:
         keys = Keys(run)
-        self._tell, self._untold, self._book = tell, untold, book
+        self._tell, self._untold, self._book, self._on_whole = tell, untold, book, on_whole
         self._recorder = None if folder is None else Recorder(folder)
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far."""
@@ -83,20 +86,26 @@ class Chronicle:
         self._session.close()
         for line in () if self._book is None else self._book.close(self.t):
             self._tell(line)
-        if self._recorder is None:
-            return
-        rows = self._recorder.rows
-        if self.ended and len(rows) > 1:
-            try:
-                self._recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
-            except RecordError as error:
-                self._trouble = str(error)
-        self._recorder.close()
+        if self._recorder is not None:
+            self._finish(self._recorder)
+        if self._trouble:
+            self._tell(self._trouble)
 
-    @property
-    def trouble(self) -> str:
-        """What went wrong with the record; empty if nothing did."""
-        return self._trouble
+    def _finish(self, recorder: Recorder) -> None:
+        """Give the files their names, and hand on the record; if it is not whole, they keep the partial ones."""
+        rows = recorder.rows
+        try:
+            if len(rows) < 2:
+                self._trouble = self._trouble or "nothing was recorded, so there are no numbers"
+            elif not self.ended:
+                self._trouble = self._trouble or f"the record ends at {rows[-1][0]:g} s: then no word came of the plant"
+            else:
+                recorded = recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
+                if self._on_whole is not None:
+                    self._on_whole(recorded, self.pacing)
+        except RecordError as error:
+            self._trouble = str(error)
+        recorder.close()
 
     def _follow(self) -> None:
         while not self.ended:

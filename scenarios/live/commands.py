@@ -34,7 +34,7 @@ _WaitForAgents = Annotated[
 _For = Annotated[float | None, typer.Option("--for", metavar="SECONDS", help="Run time to end at; no end if left out.")]
 _Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 3 when pace cannot be kept.")]
 _Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Record history.csv and events.csv in a new folder.")
+    Path | None, typer.Option("--out", metavar="DIR", help="Record the run in a new folder, and measure it at its end.")
 ]
 _Record = Annotated[
     Path | None,
@@ -228,14 +228,17 @@ def _start(
     agents: bool,
 ) -> None:
     spec, feeder = load(scenario)
-    require({"numba": "the plant", "zenoh": "the processes"})
+    require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with told():
         from scenarios.live.book import Book, check_new
-        from scenarios.live.folders import folders
+        from scenarios.live.folders import BY_HAND, folders
         from scenarios.live.hand import all_here, plant_here, say
+        from scenarios.live.numbers.account import Account
+        from scenarios.live.numbers.ending import conclude
         from scenarios.live.place import check_endpoint, check_run, claim
         from scenarios.live.setup import Wishes, chosen_case, real_nodes, set_up
         from scenarios.live.visit import check_alone
+        from scenarios.results.numbers import Ran
 
         check_run(run)
         check_new("--record", record)
@@ -249,16 +252,19 @@ def _start(
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             book = Book(spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml")
+            account = None
+            if kept.whole is not None:
+                ran = Ran(scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed)
+                account = Account(ran, book)
             if left := real_nodes(spec) if not agents else "":
                 say(left)
             if agents:
                 say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
-                ended = all_here(config, everyone, kept.logs, kept.record, book)
+                ended = all_here(config, everyone, kept.logs, kept.record, book, account)
             else:
-                ended = plant_here(config, kept.record, book)
-            kept.note(
-                "broken: interrupted" if ended.interrupted else f"broken: {ended.broke}" if ended.broke else "complete"
-            )
+                ended = plant_here(config, kept.record, book, account)
+            if account is not None:
+                ended = conclude(ended, account, kept)
         _finish(ended)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,8 +9,12 @@ from datetime import datetime
 from pathlib import Path
 
 from scenarios.results.folder import new_folder, set_status, write_whole
+from scenarios.run import versions
 from scenarios.spec import Scenario
 from scenarios.spec.writing import to_toml
+
+BY_HAND = "by hand"
+"""The driver of such a run, as files name it."""
 
 
 class Folders:
@@ -22,18 +25,18 @@ class Folders:
     logs : Path
         For the logs of processes.
     record : Path or None
-        For history.csv and events.csv; None if nothing is recorded.
+        For history.csv and events.csv, a folder in the run folder; None if nothing is recorded.
     whole : Path or None
         The run folder; None if there is none.
     """
 
     def __init__(self, logs: Path, record: Path | None = None, whole: Path | None = None) -> None:
-        self.logs, self.record, self._whole = logs, record, whole
+        self.logs, self.record, self.whole = logs, record, whole
 
     def note(self, status: str) -> None:
         """Write the one line of status.txt."""
-        if self._whole is not None:
-            set_status(self._whole, status)
+        if self.whole is not None:
+            set_status(self.whole, status)
 
 
 @contextmanager
@@ -57,7 +60,7 @@ def folders(out: Path | None, scenario: Scenario) -> Iterator[Folders]:
             yield Folders(Path(logs))
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
-    write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": "by hand", "python": platform.python_version()}))
+    write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": BY_HAND} | versions()))
     (whole / "log").mkdir()
     (case,) = scenario.cases
     yield Folders(whole / "log", whole / case, whole)

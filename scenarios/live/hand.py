@@ -29,8 +29,9 @@ from scenarios.live.chronicle import Chronicle
 from scenarios.live.place import Place, near
 from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
+from scenarios.results.record import Recorded
 from wire.drive import StoppedError
-from wire.messages import PLANT
+from wire.messages import PLANT, Pacing
 
 LOGGED = ("roster", "warning")
 """Kinds of events that the plant writes to its log too."""
@@ -89,7 +90,11 @@ def meaning(word: str, config: PlantConfig) -> str:
     return ""
 
 
-def plant_here(config: PlantConfig, folder: Path | None, book: Book) -> Ended:
+OnWhole = Callable[[Recorded, Pacing | None], None]
+"""Takes the record of a run at its end, and how well the plant kept pace."""
+
+
+def plant_here(config: PlantConfig, folder: Path | None, book: Book, on_whole: OnWhole | None = None) -> Ended:
     """Run the plant in this process until it is told to end.
 
     Parameters
@@ -100,6 +105,8 @@ def plant_here(config: PlantConfig, folder: Path | None, book: Book) -> Ended:
         Where to record the run.
     book : Book
         Takes what is told of emulated links.
+    on_whole : OnWhole, optional
+        Takes the record, if it is whole.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -108,15 +115,15 @@ def plant_here(config: PlantConfig, folder: Path | None, book: Book) -> Ended:
     def tell(line: str) -> None:
         say(line, terminal)
 
-    with Chronicle(config.run, near(config.listen[0]), tell, folder, untold=LOGGED, book=book) as chronicle:
+    with Chronicle(
+        config.run, near(config.listen[0]), tell, folder, untold=LOGGED, book=book, on_whole=on_whole
+    ) as chronicle:
         try:
             with contextlib.redirect_stdout(_Words(tell, config)):
                 broke = run_plant(config, make_links=links_of)
         except (StoppedError, KeyboardInterrupt) as stop:
             farewell(chronicle, config)
             return Ended(interrupted=str(stop) or "SIGINT")
-    if chronicle.trouble:
-        say(chronicle.trouble)
     return Ended(broke=broke)
 
 
@@ -153,7 +160,12 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) ->
 
 
 def all_here(
-    config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None, book: Book
+    config: PlantConfig,
+    agents: tuple[AgentConfig, ...],
+    logs: Path,
+    folder: Path | None,
+    book: Book,
+    on_whole: OnWhole | None = None,
 ) -> Ended:
     """Run the plant and all its agents as processes of their own, until the run is ended.
 
@@ -169,6 +181,8 @@ def all_here(
         Where to record the run.
     book : Book
         Takes what is told of emulated links.
+    on_whole : OnWhole, optional
+        Takes the record, if it is whole.
     """
     signal.signal(signal.SIGTERM, _stop)
     config = _recorded(config, folder)
@@ -187,7 +201,10 @@ def all_here(
             say(said)
 
     try:
-        with Chronicle(config.run, endpoint, say, folder, book=book) as chronicle, Children() as children:
+        with (
+            Chronicle(config.run, endpoint, say, folder, book=book, on_whole=on_whole) as chronicle,
+            Children() as children,
+        ):
             children.add(
                 Child(PLANT, ["-m", "scenarios.emulation.plant"], config, logs / "plant.log", on_exit, on_word)
             )
@@ -221,8 +238,6 @@ def farewell(chronicle: Chronicle, config: PlantConfig) -> None:
         say("the run ended before it began")
     else:
         say(f"ended at t = {chronicle.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
-    if chronicle.trouble:
-        say(chronicle.trouble)
 
 
 def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +75,13 @@ class History:
         """
         on: Flags = (self.P != 0.0) | (self.Q != 0.0)
         return on
+
+    def until(self, t: float) -> History:
+        """Its rows up to a time (s), that one included."""
+        rows = self.t <= t + 1e-9
+        return replace(
+            self, **{field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "inverters"}
+        )
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]]) -> History:

@@ -32,10 +32,10 @@ def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tup
 
 
 def late_moves(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[str]:
-    """Sentences on events that came later than the scenario says, as processes had to end or to come up first."""
+    """Sentences on events that came later than the scenario says, as processes, or people, took their time."""
     came = as_they_came(scenario, recorded)
     return [
-        f"{event.label}, meant for t = {event.t_s:g} s, came at {t:g} s, as its process took that long; "
+        f"{event.label}, meant for t = {event.t_s:g} s, came at {t:g} s, when the last of its agents had moved; "
         "what is measured of it begins there"
         for event, (_, t) in zip(scenario.events, came, strict=True)
         if t > event.t_s + 1e-9

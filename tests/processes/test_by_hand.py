@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -10,6 +11,23 @@ from pathlib import Path
 import pytest
 
 from tests.processes.terminals import Desk, Terminal, free_endpoint
+
+EVENTS = """
+[time]
+end_s = 3600.0
+[[event]]
+label = "early"
+t_s = 0.2
+open = ["13-152"]
+[[event]]
+label = "late"
+t_s = 0.6
+open = ["60-160"]
+[case.IV]
+secondary = "all"
+graph = "full"
+"""
+"""Two events: the window of the first is over when the second happens, that of the second never is."""
 
 
 def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:
@@ -25,7 +43,7 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     early = desk.open("agent", "inv2")
     early.expect("inv2: seeks the plant of run lab at tcp/127.0.0.1:")
     early.expect("inv2: no plant yet of run lab at .*; 2 of 60 s waited")
-    plant = plant_of(desk)
+    plant = plant_of(desk, "--out", "here")
     early.expect("inv2: joins at t = ")
     late = desk.open("agent", "inv1")
     late.expect("inv1: joins at t = ")
@@ -55,6 +73,11 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert code == 0
     assert text.startswith("run lab ends at t = ")
     assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
+    plant.expect("NOTE  case IV: the scenario has no event, so there is no window to measure in")
+    by_hand = json.loads((desk.folder / "here" / "metrics.json").read_text())["by_hand"]["departures"]
+    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in by_hand[-4:]] == [
+        *("inv1 joined", "inv2 left", "inv2 joined", "switch 13-152 opened")
+    ]
 
 
 def test_a_plant_waits_for_its_agents_as_long_as_told(desk: Desk) -> None:
@@ -179,13 +202,15 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
 @pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGINT", 130), ("SIGTERM", 143)])
 def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, status: int) -> None:
-    """The plant and nine agents at once; `down`, Ctrl-C or SIGTERM end them all."""
-    up = desk.open_bare("up", "calm.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
+    """The plant and nine agents at once; `down`, Ctrl-C or SIGTERM end them all, with numbers beside the history."""
+    (desk.folder / "events.toml").write_text(EVENTS)
+    up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
     for _ in range(9):
         up.expect("inv[1-9] joined")
     children = [int(pid) for pid in Path(f"/proc/{up.pid}/task/{up.pid}/children").read_text().split()]
     assert len(children) == 10
     desk.open("watch").expect(r"inv1 .* inv2-9 ")
+    up.expect("0.60 s  switch 60-160 opened")
 
     if by == "down":
         assert desk.type("down")[0] == 0
@@ -197,5 +222,12 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     for child in children:
         with pytest.raises(ProcessLookupError):
             os.kill(child, 0)
-    recorded = sorted(path.name for path in (desk.folder / "here" / "IV").iterdir())
-    assert recorded == ["events.csv", "history.csv"]
+    up.expect(r"NOTE  case IV: ended at .* s, before the end of late \(0.6 to 3600 s\): they have no numbers")
+    here = desk.folder / "here"
+    assert (here / "status.txt").read_text() == "complete\n"
+    assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv"]
+    metrics = json.loads((here / "metrics.json").read_text())
+    assert metrics["by_hand"] | {"ended_s": 0.0} == {
+        **{"ended_s": 0.0, "not_reached": ["late"], "disturbed": [], "departures": []}
+    }
+    assert metrics["cases"]["IV"]["early"]["f_error_Hz"] > 0.0

@@ -41,8 +41,10 @@ def plug_and_play(drawing: Drawing) -> Figure:
         ):
             panel.set_ylabel(label)
         lines = {line.get_color(): line for line in grid[0, 0].get_lines() if line.get_label() in drawing.plates.names}
-        kinds = {MOVER[0]: "", STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
-        shown = [(line, kinds[str(colour)] or line.get_label()) for colour, line in lines.items()]
+        on = np.all([history.present.all(axis=0) for history in drawing.histories.values()], axis=0)
+        movers = ", ".join(name for name, stays in zip(drawing.plates.names, on.tolist(), strict=True) if not stays)
+        kinds = {MOVER[0]: movers, STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
+        shown = [(line, kinds[str(colour)]) for colour, line in lines.items()]
         handles, labels = [line for line, _ in shown], [label for _, label in shown]
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

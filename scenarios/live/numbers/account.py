@@ -1,0 +1,147 @@
+"""What a run by hand came to: metrics.json, report.txt and figures, as `gridpeers run` makes them of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from math import inf
+
+import msgspec
+
+from scenarios.live.book import Book
+from scenarios.live.numbers.departures import Compared, compare
+from scenarios.live.show.events import line_of
+from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.findings import find
+from scenarios.results.folder import shown, write_whole
+from scenarios.results.history import History, Plates
+from scenarios.results.islands import part_of
+from scenarios.results.metrics import Window
+from scenarios.results.moves import as_they_came, late_moves
+from scenarios.results.numbers import Ran, metrics_json
+from scenarios.results.record import Recorded
+from scenarios.results.report import Report, plain
+from scenarios.spec.moves import inverters_of
+from wire.messages import Pacing
+
+_SHOWN = 3
+"""So many departures are told in a note; all of them are in metrics.json."""
+
+
+class Account:
+    """Takes the record of a run by hand once it is whole, and gives account of it.
+
+    Parameters
+    ----------
+    ran : Ran
+        The run: its scenario has one case, and its folder is there.
+    book : Book
+        What emulated links did.
+    """
+
+    def __init__(self, ran: Ran, book: Book) -> None:
+        self._ran, self._book = ran, book
+        (self._case,) = ran.scenario.cases
+        self._recorded: Recorded | None = None
+        self._pacing: Pacing | None = None
+
+    def __call__(self, recorded: Recorded, pacing: Pacing | None) -> None:
+        """Take the record, and how the plant kept pace."""
+        self._recorded, self._pacing = recorded, pacing
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is a whole record to give account of."""
+        return self._recorded is not None
+
+    def write(self) -> Report:
+        """Measure what the scenario's windows have, write it with its figures, and return what there is to tell.
+
+        No claim of the paper is judged: a run by hand is one case, and people had their hands in it.
+        """
+        assert self._recorded is not None
+        ran, case, recorded = self._ran, self._case, self._recorded
+        compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.rows[-1][0])
+        history, plates = self._columns(recorded)
+        measured = compared.measured
+        found = find(
+            measured,
+            ran.feeder,
+            plates,
+            {case: history.until(ran.scenario.time.end_s)},
+            {case: as_they_came(measured, recorded.events)},
+        )
+        report = Report(
+            scenario=ran.scenario.name,
+            titles={case: ran.scenario.cases[case].title},
+            found=found,
+            verdicts=(),
+            experiment="" if compared.disturbed else ran.scenario.paper,
+            notes=[f"case {case}: {note}" for note in self._notes(compared)],
+            folder=shown(ran.folder) + "/",
+        )
+        pacing = {} if self._pacing is None else {case: self._pacing}
+        links = {case: sha256} if (sha256 := self._book.links_sha256) else {}
+        by_hand = {
+            "ended_s": compared.ended,
+            "not_reached": [window.label for window in compared.not_reached],
+            "disturbed": compared.disturbed,
+            "departures": _lines(compared),
+        }
+        write_whole(
+            ran.folder / "metrics.json", metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand)
+        )
+        write_whole(ran.folder / "report.txt", plain(report))
+
+        from scenarios.results.plots import draw_all  # matplotlib takes longer to import than all else
+
+        draw_all(self._drawing(compared, history, plates), ran.folder / "plots")
+        return report
+
+    def _columns(self, recorded: Recorded) -> tuple[History, Plates]:
+        """The history without the spare inverters that nobody ever started, and nameplates in its order."""
+        feeder, history = self._ran.feeder, History.of(recorded.inverters, recorded.rows)
+        rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
+        own, present = {row.name for row in inverters_of(self._ran.scenario, feeder)}, history.present
+        names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
+        return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
+
+    def _drawing(self, compared: Compared, history: History, plates: Plates) -> Drawing:
+        """What to draw: the whole run, with the scenario's events by name, and a line where people departed from it."""
+        assert self._recorded is not None
+        scenario, events = self._ran.scenario, self._recorded.events
+        reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
+        scenario = msgspec.structs.replace(scenario, events=reached)
+        marks = [*as_they_came(scenario, events), *(("", event.t) for event in compared.departures if event.t > 0.0)]
+        drawing = drawing_of(scenario, self._ran.feeder, plates, {self._case: history}, list(dict.fromkeys(marks)))
+        return replace(drawing, moves=any(event.kind == "inverter" for event in events))
+
+    def _notes(self, compared: Compared) -> Iterable[str]:
+        """What a reader must know of these numbers."""
+        assert self._recorded is not None
+        ended, scenario = f"{compared.ended:g} s", self._ran.scenario
+        if not scenario.events:
+            yield "the scenario has no event, so there is no window to measure in"
+        elif compared.not_reached:
+            what = "nothing was measured" if not compared.measured.events else "they have no numbers"
+            yield f"ended at {ended}, before the end of {_named(compared.not_reached)}: {what}"
+        elif compared.ended > scenario.time.end_s:
+            yield f"measured up to {scenario.time.end_s:g} s, where the scenario ends; the history goes on to {ended}"
+        yield from late_moves(compared.measured, self._recorded.events)
+        if compared.disturbed:
+            lines = _lines(compared, compared.measured.time.end_s)
+            more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
+            yield (
+                f"{', '.join(compared.disturbed)}: not what the scenario means by it, which does not tell of: "
+                f"{'; '.join(lines[:_SHOWN])}{more}"
+            )
+
+
+def _named(windows: Iterable[Window]) -> str:
+    """Windows with their times."""
+    return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
+
+
+def _lines(compared: Compared, end: float = inf) -> list[str]:
+    """Departures before a time (s), a line each."""
+    return [line_of(event).strip() for event in compared.departures if event.t < end]

@@ -1,0 +1,43 @@
+"""The end of a run by hand: its account, and the one line in its folder on how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rich.console import Console
+
+from scenarios.live.folders import Folders
+from scenarios.live.hand import Ended
+from scenarios.live.numbers.account import Account
+from scenarios.results.report import show
+from wire.drive import StoppedError
+
+
+def conclude(ended: Ended, account: Account, kept: Folders) -> Ended:
+    """Give account of a run that has ended, show it, and note how it ended.
+
+    Ctrl-C and SIGTERM are as good an end as any: the run has no other. Only a second one leaves it without numbers.
+
+    Parameters
+    ----------
+    ended : Ended
+        How the run ended.
+    account : Account
+        With the record, if that is whole.
+    kept : Folders
+        With the run folder.
+    """
+    if ended.broke or not account.ready:
+        kept.note(f"broken: {ended.broke or 'no whole record'}")
+        return ended
+    try:
+        show(account.write(), Console())
+    except (StoppedError, KeyboardInterrupt) as stop:
+        kept.note("broken: interrupted while its numbers were made")
+        return replace(ended, interrupted=str(stop) or "SIGINT")
+    except OSError as error:
+        broke = f"its numbers cannot be written: {error}"
+        kept.note(f"broken: {broke}")
+        return replace(ended, broke=broke)
+    kept.note("complete")
+    return ended
