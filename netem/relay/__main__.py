@@ -5,17 +5,12 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from types import FrameType
 
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
 from netem.relay.faults import UNITS
 from netem.relay.words import HELP
 
 OK, USAGE = 0, 2
-
-
-class _EndError(Exception):
-    """Somebody wants it to end."""
 
 
 def main(arguments: list[str]) -> int:
@@ -29,7 +24,7 @@ def main(arguments: list[str]) -> int:
     except (EndpointError, FaultsError, RelayError) as error:
         sys.stderr.write(f"{error}\n")
         return USAGE
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     try:
         with relay:
             print(relay.do("show"), flush=True)
@@ -39,7 +34,7 @@ def main(arguments: list[str]) -> int:
                     return OK
             while True:  # no more lines, as in the background: go on until told to end
                 signal.pause()
-    except (KeyboardInterrupt, _EndError):
+    except KeyboardInterrupt:
         return OK
 
 
@@ -48,10 +43,6 @@ def _answer(relay: Relay, line: str) -> str:
         return relay.do(line)
     except (WordError, FaultsError) as error:
         return "refused: " + "; ".join(str(error).splitlines())
-
-
-def _end(signum: int, frame: FrameType | None) -> None:
-    raise _EndError
 
 
 def _parser() -> argparse.ArgumentParser:

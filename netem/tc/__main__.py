@@ -5,16 +5,11 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from types import FrameType
 
 from netem.relay.faults import UNITS, Faults, FaultsError
 from netem.tc import Impaired, TcError, netem_steps, steps_without_netem, why_no_netem
 
 OK, NO, USAGE = 0, 1, 2
-
-
-class _EndError(Exception):
-    """Somebody wants it to end."""
 
 
 def main(arguments: list[str]) -> int:
@@ -30,7 +25,7 @@ def main(arguments: list[str]) -> int:
     print(missing or "this kernel has tc netem", flush=True)
     if options.device is None:
         return NO if missing else OK
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     try:
         faults = Faults(**{name: getattr(options, name) for name in UNITS})
         steps = (steps_without_netem if missing else netem_steps)(options.device, faults)
@@ -40,7 +35,7 @@ def main(arguments: list[str]) -> int:
             print(f"{options.device}: {faults}; until Ctrl-C", flush=True)
             while True:
                 signal.pause()
-    except (KeyboardInterrupt, _EndError):
+    except KeyboardInterrupt:
         return OK
     except FaultsError as error:
         sys.stderr.write(f"{error}\n")
@@ -48,10 +43,6 @@ def main(arguments: list[str]) -> int:
     except TcError as error:
         sys.stderr.write(f"{error}\n")
         return NO
-
-
-def _end(signum: int, frame: FrameType | None) -> None:
-    raise _EndError
 
 
 if __name__ == "__main__":
