@@ -16,7 +16,7 @@ from scenarios.results.reference import TOPICS, page
 from scenarios.spec.model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
 from wire import keys, messages
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[4] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (
     Scenario,
     Time,

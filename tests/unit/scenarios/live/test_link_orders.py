@@ -32,8 +32,8 @@ from scenarios.spec.writing import to_toml
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from tests.unit import test_freerun_agent as agent_side
-from tests.unit import test_freerun_plant as plant_side
+from tests.unit.agents import test_freerun_agent as agent_side
+from tests.unit.plant import test_freerun_plant as plant_side
 from wire.messages import LinkAnswer, LinkOrder, Measurement
 
 SETUP = Setup(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
