@@ -42,7 +42,7 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   continuous law loses stability too. For the voltage, over random networks v = H V_set, z = (1 - H) V_set and periods:
   none of 8000 unstable with equal ratings, nor with ratings up to threefold apart and periods up to 30 ms. With longer
   periods 2 of 45000 were, by 0.2 % a period at most: long paths with a bigger inverter far from the leaders.
-  `tests/unit/test_law.py` repeats both searches, for the paper's weights and for degree-normalised ones.
+  `tests/unit/agents/test_law.py` repeats both searches, for the paper's weights and for degree-normalised ones.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
 `agents.handling` has these and other ways, and other weights c_ij than 1; with any of them the law stays this.
