@@ -99,7 +99,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
                     return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
             except (KeyboardInterrupt, WorkersError) as error:
-                kept = f"{len(folder.done)} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
+                kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
                 if isinstance(error, WorkersError):
                     fail([str(error), kept], BROKEN)
                 fail([f"interrupted; {kept}"], exit_code(error))

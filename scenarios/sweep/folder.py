@@ -46,7 +46,7 @@ class SweepFolder:
     """
 
     def __init__(self, folder: Path, plan: Plan) -> None:
-        self.path = folder
+        self.path, self._size = folder, len(plan.runs)
         self.done: dict[int, Done] = {}
         """Finished runs by number."""
         whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
@@ -74,6 +74,11 @@ class SweepFolder:
     ) -> None:
         self._journal.close()
         os.close(self._lock)
+
+    @property
+    def kept(self) -> int:
+        """Number of finished runs that will be found again: Ctrl-C can come after one was kept, before it was counted."""
+        return len(_read(self.path / JOURNAL, self._size))
 
     def add(self, done: Done) -> None:
         """Keep a finished run."""

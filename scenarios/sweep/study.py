@@ -61,7 +61,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Tell, *, jobs: int, dask: str =
                     tell(len(folder.done))
         except BaseException as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-            set_status(folder.path, f"broken: {why} after {len(folder.done)} of {len(plan.runs)} runs")
+            set_status(folder.path, f"broken: {why} after {folder.kept} of {len(plan.runs)} runs")
             raise
     table = table_of(plan, folder.done)
     path = write_table(table, folder.path)

@@ -1,7 +1,8 @@
 """The runs of a sweep over all cores of this machine, or over a Dask cluster: the same tasks through joblib.
 
-Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, so that none of them writes
-a traceback over the terminal, and they are ended when the command leaves.
+Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, and they are ended when the
+command leaves. What they and their helpers would write over the terminal at such an end is left out: a run's error
+comes as its result.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from joblib.externals.loky import get_reusable_executor
 
 from scenarios.sweep.file import Run
 from scenarios.sweep.one import Done, run_one
+
+_WARNINGS = "PYTHONWARNINGS"
 
 DASK_PATIENCE = 10.0
 """Longest wait for a scheduler, and for its first worker (s)."""
@@ -41,7 +44,7 @@ def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[Don
         for number, run in runs:
             yield run_one(number, run.scenario, run.case)
         return
-    with parallel_config(backend="loky", n_jobs=jobs, initializer=_end_with, initargs=(os.getpid(),)):
+    with parallel_config(backend="loky", n_jobs=jobs, initializer=_prepare, initargs=(os.getpid(),)):
         try:
             yield from _parallel(runs)
         finally:
@@ -102,16 +105,28 @@ def _close(results: Any) -> None:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back in this thread and in what it starts; one that came meanwhile comes after."""
+    """Hold Ctrl-C back in this thread and in what it starts; one that came meanwhile comes after.
+
+    The tracker of the workers' semaphores, started here too, else warns of those of workers that were ended.
+    """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    warnings = os.environ.get(_WARNINGS)
+    os.environ[_WARNINGS] = ",".join(filter(None, [warnings, "ignore:resource_tracker:UserWarning"]))
     try:
         yield
     finally:
+        if warnings is None:
+            del os.environ[_WARNINGS]
+        else:
+            os.environ[_WARNINGS] = warnings
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_with(parent: int) -> None:
-    """End this worker when the command is killed: nobody else would, for minutes."""
+def _prepare(parent: int) -> None:
+    """Have this worker be silent, and end when the command is killed: nobody else would end it, for minutes."""
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 2)
+    os.close(silence)
 
     def watch() -> None:
         while os.getppid() == parent:
