@@ -77,7 +77,7 @@ class SweepFolder:
 
     @property
     def kept(self) -> int:
-        """Number of finished runs that will be found again: Ctrl-C can come after one was kept, before it was counted."""
+        """Number of finished runs that will be found again; Ctrl-C can come between keeping a run and counting it."""
         return len(_read(self.path / JOURNAL, self._size))
 
     def add(self, done: Done) -> None:
