@@ -144,10 +144,7 @@ def _checked_links(links: str, record: LinkRecord, folder: Path) -> list[str]:
     from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
 
     setup = Setup.of_text(links)
-    check = LinkCheck(record, setup.netem, setup.microgrids)
-    record.write(folder / "links.csv")
-    write_whole(folder / "links.json", check.to_json())
-    return list(check.lines())
+    return LinkCheck(record, setup.netem, setup.microgrids).write(folder)
 
 
 def _run_case(

@@ -84,9 +84,7 @@ class Book:
             from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
 
             check = LinkCheck(self._record, self._setup.netem, self._setup.microgrids, self.changes)
-            self._record.write(self._folder / "links.csv")
-            write_whole(self._folder / "links.json", check.to_json())
-            told += check.lines()
+            told += check.write(self._folder)
         file = self._replay or (self._by_the_way if self._orders else None)
         if file is not None:
             told.append(f"the links as they were: gridpeers run {shown(file)}")

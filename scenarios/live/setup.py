@@ -11,9 +11,10 @@ from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.equipment import Feeder
 from scenarios.live.place import UsageError, check_wait
-from scenarios.spec import Scenario, suggestion
+from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.netem import netem_of, setup_of
+from wire.nearest import suggestion
 
 SPEEDS = (0.1, 50.0)
 """Least and greatest speed (s of run time per s of wall time) that is of any use."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 from netem.check.rows import Row
 from netem.check.verify import verify
@@ -12,6 +13,7 @@ from netem.spec.change import Change, schedule_of
 from netem.spec.fault import Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
+from scenarios.results.folder import write_whole
 from scenarios.results.links import LinkRecord
 from wire.messages import PLANT
 
@@ -60,6 +62,12 @@ class LinkCheck:
         tests = [row._asdict() for row in self.rows]
         whole = {"trace_sha256": self._record.sha256, "accounts": counts, "tests": tests}
         return json.dumps(whole, indent=1, default=str) + "\n"
+
+    def write(self, folder: Path) -> list[str]:
+        """Write links.csv and links.json; sentences for the report."""
+        self._record.write(folder / "links.csv")
+        write_whole(folder / "links.json", self.to_json())
+        return list(self.lines())
 
     def lines(self) -> Iterable[str]:
         """Sentences for the report."""

@@ -3,6 +3,5 @@
 from scenarios.spec.loading import catalogue, find_scenario, load_scenario
 from scenarios.spec.mistakes import ScenarioError
 from scenarios.spec.model import Case, Event, Scenario
-from wire.nearest import suggestion
 
-__all__ = ["Case", "Event", "Scenario", "ScenarioError", "catalogue", "find_scenario", "load_scenario", "suggestion"]
+__all__ = ["Case", "Event", "Scenario", "ScenarioError", "catalogue", "find_scenario", "load_scenario"]
