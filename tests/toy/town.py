@@ -171,6 +171,10 @@ class Town:
                 self._take(kind, key, payload)
         return self
 
+    def was_put_off(self) -> bool:
+        """Whether the plant tells that its schedule was put off."""
+        return self.telemetry is not None and self.telemetry.pacing is not None and self.telemetry.pacing.slipped > 0.0
+
     def until_event(self, subject: str, text: str, after: int = 0) -> Town:
         """Wait for a plant's event on a subject with a text in it."""
         return self.until(

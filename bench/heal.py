@@ -1,0 +1,112 @@
+"""How long a cut between hosts takes to heal, whenever it heals, and whether those who were not cut off notice it.
+
+Two hosts (network namespaces): the plant and six agents of the paper's feeder on one, three on the other. The other is
+cut off for 1.7 to 3.2 s, again and again: around the 2 s after which Zenoh gives a silent link up, the worst time to
+heal, as one side may have given up and the other not.
+
+    .venv/bin/python bench/heal.py [--repeat 40] [--seed 1]
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import tempfile
+from collections.abc import Iterable
+from itertools import permutations
+from pathlib import Path
+from time import monotonic
+
+from latency import load, say, two_hosts
+from speed import machine
+from watched import NotInTimeError, Watched, describe
+
+from scenarios.drivers.fleet import _endpoint
+from tests.processes.hosts import Hosts
+
+AWAY = ("inv7", "inv8", "inv9")
+"""Who is on the other host: one grid-forming, two grid-following."""
+
+SHORTEST, LONGEST = 1.7, 3.2
+"""Of a cut (s)."""
+
+REST = (0.5, 1.5)
+"""Time (s) between a heal and the next cut."""
+
+PATIENCE = 60.0
+"""Longest wait (s) for a heal."""
+
+LEGEND = """
+healed     healing -> every agent has all eight others in its sums, as their AgentStatus tell
+noticed    cuts in which one of the six who were not cut off lost another of the six from its sums
+sessions   new sessions that agents opened, as a link had not been made anew on both sides"""
+
+
+def wait(fleet: Watched, seconds: float) -> None:
+    """Take in what comes for so long."""
+    end = monotonic() + seconds
+    fleet.until(lambda: monotonic() >= end, "time goes by", seconds + 1.0)
+
+
+def sessions(logs: Path) -> int:
+    """How often agents said that they open a new session."""
+    return sum(path.read_text().count("opens a new session") for path in logs.glob("inv*.log"))
+
+
+def noticed(fleet: Watched, here: Iterable[str]) -> bool:
+    """Whether, since `mark`, anybody who was not cut off went out of the sums of another."""
+    pairs = set(permutations(here, 2))
+    return any((who, whom) in pairs and not into for _, who, whom, into in fleet.turns)
+
+
+def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int]:
+    """Times (s) of so many heals, and in how many cuts the others noticed."""
+    here = [name for name in fleet.names if name not in AWAY]
+    took, disturbed = [], 0
+    for i in range(repeat):
+        fleet.mark(fleet.names)
+        cut = rng.uniform(SHORTEST, LONGEST)
+        hosts.cut(2)
+        wait(fleet, cut)
+        hosts.heal(2)
+        began = monotonic()
+        fleet.all_use(*fleet.names, patience=PATIENCE)
+        took.append(max(at for at, *_ in fleet.turns) - began)
+        disturbed += noticed(fleet, here)
+        say(f"{i + 1} of {repeat}: cut for {cut:.2f} s, healed after {took[-1]:.2f} s")
+        wait(fleet, rng.uniform(*REST))
+    return took, disturbed
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--repeat", type=int, default=40, help="how many cuts")
+    parser.add_argument("--seed", type=int, default=1, help="of how long they last")
+    arguments = parser.parse_args()
+    print(machine())
+    print(f"load (1, 5, 15 min) before {load()}")
+    with tempfile.TemporaryDirectory() as folder, two_hosts() as hosts:
+        if hosts is None:
+            return 1
+        listen = f"tcp/{hosts.address(1)}:0"
+        elsewhere = {name: (f"tcp/{hosts.address(2)}:0", hosts.at(2)) for name in AWAY}
+        fleet = Watched(Path(folder), _endpoint((listen,)), listen, elsewhere)
+        say("the fleet starts")
+        with fleet:
+            took, disturbed = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))
+        opened = sessions(Path(folder))
+    print(f"\n{'(ms)':40}{'n':>6} {'p50':>9} {'p95':>9} {'max':>9}")
+    print(f"{'healed':40}{describe(took)}")
+    print(f"{'noticed by the others':40}{disturbed:6}")
+    print(f"{'new sessions':40}{opened:6}")
+    print(LEGEND)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except NotInTimeError as error:
+        sys.exit(str(error))
