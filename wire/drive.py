@@ -128,7 +128,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     StoppedError
         If a word to stop comes into the inbox.
     """
-    take = session.inbox.take
+    take = session.take
     now = monotonic()
     while True:
         perform(core.take_actions(), session, log)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from wire.foreign import keep_thread_state
-from wire.inbox import Inbox, Kind
+from wire.inbox import Inbox, Kind, Stamped
 from wire.keys import LATEST_ONLY
 from wire.lingering import do_not_linger
 
@@ -122,9 +122,10 @@ class Session:
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
             self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
             self._changeable = False
-        if clock == "wall":
-            handler = self._direct(lambda event: do_not_linger())
-            self._declared.append(self._session.info.declare_link_events_listener(handler, history=True))
+        self._links: Any = None
+        if clock == "wall":  # not by a callback: one that comes while Python is being ended would abort the process
+            channel: Any = zenoh.handlers.RingChannel(1)
+            self._links = self._session.info.declare_link_events_listener(channel, history=True)
         self.id = str(self._session.zid())
         """Unique id of this session: the instance of who holds it."""
 
@@ -150,6 +151,12 @@ class Session:
     def misplaced(self) -> bool:
         """Whether a router has answered too late for this session to be its client: another one should be opened."""
         return self._changeable and bool(self._session.info.routers_zid())
+
+    def take(self, wanted: int, timeout: float | None) -> list[Stamped]:
+        """Take what has come out of the inbox, as `Inbox.take` does, and see to links that are new."""
+        if self._links is not None and self._links.try_recv() is not None:
+            do_not_linger()
+        return self.inbox.take(wanted, timeout)
 
     def subscribe(self, key: str) -> None:
         """Have messages on a key, without wildcards, put into the inbox."""

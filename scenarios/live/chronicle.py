@@ -109,7 +109,7 @@ class Chronicle:
 
     def _follow(self) -> None:
         while not self.ended:
-            for kind, _, payload, _ in self._session.inbox.take(1, None):
+            for kind, _, payload, _ in self._session.take(1, None):
                 if kind == "word":
                     return
                 if kind == "message" and not self._take(payload):

@@ -87,7 +87,7 @@ class Visit:
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes]]:
         """Wait (s) for something to happen; give key and bytes of the messages among it."""
-        for kind, key, payload, _ in self._session.inbox.take(1, max(0.0, seconds)):
+        for kind, key, payload, _ in self._session.take(1, max(0.0, seconds)):
             if kind == "message":
                 yield key, payload
             elif kind != "word":
