@@ -120,9 +120,10 @@ class Side:
 
     def _is_offered(self, message: AnyMessage, payload: bytes, at: float) -> bool:
         """Give a message to the link that it came over, if that is an emulated one; whether it was."""
-        if self._links is None or not self._links.touched(message.sender):
+        links, src = self._links, message.sender
+        if links is None or src in links.clear or not links.touched(src):
             return False
-        self._links.offer(message.sender, message.seq, message.t, at, payload)
+        links.offer(src, message.seq, message.t, at, payload)
         return True
 
     def _arrived(self, now: float) -> list[AnyMessage]:

@@ -105,9 +105,10 @@ class Side:
 
     def _is_offered(self, state: State, payload: bytes, at: float) -> bool:
         """Give a state to the link that it came over, if that is an emulated one; whether it was."""
-        if self._links is None or not self._links.touched(state.sender):
+        links, src = self._links, state.sender
+        if links is None or src in links.clear or not links.touched(src):
             return False
-        self._links.offer(state.sender, state.seq, state.t, at, payload)
+        links.offer(src, state.seq, state.t, at, payload)
         return True
 
     def _arrived(self, now: float) -> Iterable[State]:

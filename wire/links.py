@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Protocol
 
 
@@ -25,6 +25,11 @@ class Links(Protocol):
 
     `netem` has the real one; without any (None) a core takes messages as they come.
     """
+
+    @property
+    def clear(self) -> Set[str]:
+        """Senders to whose messages nothing ever happens, as far as is known: asked of every message, so no call."""
+        ...
 
     def touched(self, src: str) -> bool:
         """Whether anything might ever happen to messages from there; else they need not be offered."""
