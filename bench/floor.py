@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from time import monotonic, perf_counter
 
-from scenarios.drivers.fleet import _endpoint
+from scenarios.drivers.rendezvous import rendezvous
 from wire.session import Session
 
 ROOT = "gridpeers/floor"
@@ -23,7 +23,7 @@ HELLO_PERIOD = 0.02
 
 def measure(peers: int, rounds: int) -> float:
     """Time (s) of so many rounds with so many peers, their start not counted."""
-    endpoint = _endpoint(())
+    endpoint = rendezvous(())
     names = [f"p{i}" for i in range(peers)]
     command = [sys.executable, __file__, endpoint, str(rounds), json.dumps(names)]
     others = [subprocess.Popen([*command, name]) for name in names]

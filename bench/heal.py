@@ -22,7 +22,7 @@ from latency import load, say, two_hosts
 from speed import machine
 from watched import NotInTimeError, Watched, describe
 
-from scenarios.drivers.fleet import _endpoint
+from scenarios.drivers.rendezvous import rendezvous
 from tests.processes.hosts import Hosts
 
 AWAY = ("inv7", "inv8", "inv9")
@@ -92,7 +92,7 @@ def main() -> int:
             return 1
         listen = f"tcp/{hosts.address(1)}:0"
         elsewhere = {name: (f"tcp/{hosts.address(2)}:0", hosts.at(2)) for name in AWAY}
-        fleet = Watched(Path(folder), _endpoint((listen,)), listen, elsewhere)
+        fleet = Watched(Path(folder), rendezvous((listen,)), listen, elsewhere)
         say("the fleet starts")
         with fleet:
             took, disturbed = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))

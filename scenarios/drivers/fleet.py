@@ -5,7 +5,6 @@ The fleet decides nothing about the run. It records the plant's telemetry like a
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from time import monotonic
@@ -18,10 +17,11 @@ from plant.runtime import READY
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.drivers.outcome import Outcome
+from scenarios.drivers.rendezvous import rendezvous
 from wire.codec import RejectedError, Rejects, decode
 from wire.keys import Keys
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
-from wire.session import Session, SessionError
+from wire.session import Session
 
 RECORDER = "fleet"
 """Name of the fleet's recorder in its run."""
@@ -90,7 +90,7 @@ def run_processes(
     wall = plant_config.clock == "wall"
     if wall:  # who waits for the plant waits for its compiler too
         agents = {name: msgspec.structs.replace(config, deadline=BUILD_DEADLINE) for name, config in agents.items()}
-    endpoint = _endpoint(plant_config.listen)
+    endpoint = rendezvous(plant_config.listen)
     plant_config = msgspec.structs.replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
     first = [name for name in agents if name in plant_config.agents]
     order = list(start_order) if start_order is not None else [PLANT, *first]
@@ -143,28 +143,6 @@ def _start(
         return Child(name, list(plant_command or usual), plant_config, log, on_exit, on_word)
     config = msgspec.structs.replace(agents[name], connect=(endpoint,), incarnation=life)
     return Child(name, ["-m", "scenarios.emulation.agent" if config.links else "agents"], config, log, on_exit)
-
-
-def _endpoint(listen: tuple[str, ...]) -> str:
-    """Endpoint of the rendezvous: the given one, if it is free, or a free one of this host."""
-    endpoint = listen[0] if listen else "tcp/127.0.0.1:0"
-    protocol, _, address = endpoint.partition("/")
-    host, _, port = address.rpartition(":")
-    if protocol != "tcp" or not host or not port.isascii() or not port.isdigit():
-        raise SessionError(
-            f'listen: "{endpoint}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one'
-        )
-    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # else a run that just ended is in the way
-        try:
-            probe.bind((host.strip("[]"), int(port)))
-            probe.listen()
-        except OSError as error:
-            raise SessionError(
-                f"listen: cannot use {endpoint}: {error.strerror or error}; choose another port, or 0 for a free one"
-            ) from None
-        return f"{protocol}/{host}:{probe.getsockname()[1]}"
 
 
 class _Watch:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes.terminals import Desk, free_endpoint
+from scenarios.drivers.rendezvous import rendezvous
+from tests.processes.terminals import Desk
 
 CALM = """
 [time]
@@ -23,5 +24,5 @@ graph = "full"
 def desk(tmp_path: Path) -> Iterator[Desk]:
     """Terminals of one run, at a port of its own."""
     (tmp_path / "calm.toml").write_text(CALM)
-    with Desk(tmp_path, "--run", "lab", "--connect", free_endpoint()) as terminals:
+    with Desk(tmp_path, "--run", "lab", "--connect", rendezvous()) as terminals:
         yield terminals

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -16,13 +15,6 @@ from types import TracebackType
 
 DEADLINE = 40.0
 """Longest wait (s) for any line; on an idle machine all come within 3 s."""
-
-
-def free_endpoint() -> str:
-    """Endpoint at a port of the loopback that nobody uses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 class Terminal:

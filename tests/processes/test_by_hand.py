@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes.terminals import Desk, Terminal, free_endpoint
+from scenarios.drivers.rendezvous import rendezvous
+from tests.processes.terminals import Desk, Terminal
 
 EVENTS = """
 [time]
@@ -158,7 +159,7 @@ def test_a_spare_inverter_comes_on_line_like_all_others(desk: Desk) -> None:
 def test_two_runs_side_by_side_do_not_meet(desk: Desk, tmp_path: Path) -> None:
     """Each plant sees its own agents alone; a wrong name is told the right ones."""
     plant_of(desk)
-    with Desk(tmp_path, "--run", "other", "--connect", free_endpoint()) as elsewhere:
+    with Desk(tmp_path, "--run", "other", "--connect", rendezvous()) as elsewhere:
         endpoint = elsewhere.options[-1]
         other = elsewhere.open_bare("plant", "calm.toml", "--run", "other", "--listen", endpoint, "--wait", "0")
         other.expect("t = 0; speed")

@@ -17,6 +17,7 @@ import msgspec
 import pytest
 
 from scenarios.drivers.fleet import run_processes
+from scenarios.drivers.rendezvous import rendezvous
 from tests.toy import toy_plant
 from tests.toy.runs import FleetRun
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -116,8 +117,7 @@ def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
 
 def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
     """A namesake started in mid-run leaves with status 3 and a word why; the run does not notice."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    endpoint = rendezvous()
     plant, agents = toy_configs(3, end=LONG)
     run, refused = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
 

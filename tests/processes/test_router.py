@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 import zenoh
 
-from tests.processes.terminals import Desk, free_endpoint
+from scenarios.drivers.rendezvous import rendezvous
+from tests.processes.terminals import Desk
 
 CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'
 
@@ -19,7 +20,7 @@ class Router:
     """A Zenoh router on the loopback, that can be taken away and brought back."""
 
     def __init__(self) -> None:
-        self.endpoint = free_endpoint()
+        self.endpoint = rendezvous()
         self._session: Any = None
 
     def start(self) -> None:

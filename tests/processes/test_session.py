@@ -1,17 +1,17 @@
 from __future__ import annotations
 
-import socket
 import sys
 from time import monotonic
 
 import pytest
 
+from scenarios.drivers.rendezvous import rendezvous
 from wire.session import Session, SessionError
 
 
 def test_a_port_in_use_is_explained() -> None:
     """Who listens second is told which endpoint, and what to do."""
-    endpoint = free_endpoint()
+    endpoint = rendezvous()
     first = Session("plant", listen=(endpoint,))
     try:
         with pytest.raises(SessionError, match=r"plant: cannot listen on tcp/127.* the port is in use; choose another"):
@@ -31,7 +31,7 @@ def test_a_missing_zenoh_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_subscription_proven_by_a_query_is_in_place() -> None:
     """What discovery relies on: once a neighbour has answered after the subscription, its next publication arrives."""
     for _ in range(20):
-        endpoint = free_endpoint()
+        endpoint = rendezvous()
         sender, receiver = Session("a", listen=(endpoint,)), Session("b", connect=(endpoint,))
         try:
             sender.answer("gridpeers/t/nameplate", b"me")
@@ -46,12 +46,6 @@ def test_a_subscription_proven_by_a_query_is_in_place() -> None:
         finally:
             receiver.close()
             sender.close()
-
-
-def free_endpoint() -> str:
-    """An endpoint of this host that nobody listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
 
 
 def take_one(session: Session) -> tuple[str, str, bytes]:

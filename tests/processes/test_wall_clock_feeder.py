@@ -14,8 +14,8 @@ from msgspec.structs import replace
 
 from plant.pacing import TOLERATED
 from scenarios.drivers.children import Child
-from scenarios.drivers.fleet import _endpoint
 from scenarios.drivers.outcome import Outcome
+from scenarios.drivers.rendezvous import rendezvous
 from scenarios.live.setup import Wishes, set_up
 from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
@@ -29,7 +29,7 @@ class Feeder:
     def __init__(self, folder: Path, end: float) -> None:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
-        self.endpoint = _endpoint(())
+        self.endpoint = rendezvous()
         plant, agents = set_up(scenario, feeder, Wishes(run="feeder", case="IV", duration=end), self.endpoint)
         self.agents = {agent.name: replace(agent, connect=(self.endpoint,)) for agent in agents}
         self.rated = [agent.P_rated for agent in agents]

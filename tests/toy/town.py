@@ -11,7 +11,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from scenarios.drivers.children import Child, Children
-from scenarios.drivers.fleet import _endpoint
+from scenarios.drivers.rendezvous import rendezvous
 from scenarios.results.links import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
@@ -67,7 +67,7 @@ class Town:
         **changes: Any,
     ) -> None:
         plant, agents = toy_configs(n, run=run)
-        self.endpoint = _endpoint(())
+        self.endpoint = rendezvous(())
         self.plant_config = replace(
             plant,
             clock="wall",
