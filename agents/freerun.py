@@ -19,30 +19,24 @@ plant holds for it. An agent that finds itself woken late (frozen, or starved) d
 
 from __future__ import annotations
 
-from typing import Literal
-
 from msgspec.structs import replace
 
 from agents.cadence import Cadence
-from agents.claims import Claims
 from agents.config import AgentConfig
 from agents.heard import Heard
-from agents.hearing import Hearing
 from agents.orders import Orders
+from agents.peers import Peers
+from agents.roll_call import RollCall
 from agents.side import REPORT_TICKS, Side
+from agents.tally import Phase, Tally
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
 from wire.links import Links
-from wire.messages import PLANT, AgentStatus, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop
+from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop
 from wire.timer import Timer
-
-Phase = Literal["seeking", "waiting", "running"]
 
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
-
-SILENT = 1.0
-"""Time (s, wall) without a message of the plant, or of a neighbour whom it hears, after which that one is silent."""
 
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
@@ -74,18 +68,17 @@ class FreeAgent(Side):
         self.phase: Phase = "seeking"
         self.astray = False
         """Whether it closes only to begin again with a new session."""
-        self.missed = 0
-        """Ticks skipped, as their time was over."""
-        self.ticks = self.sent = self.used = 0
+        self.tally = Tally()
+        """What it has done."""
         self._first_routes = dict(self._routes)
         # a clock that is to drift must drift
         self._cadence = Cadence(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
-        self._lateness = 0.0
-        self._ran = False
-        self._heard = Heard(config.speed)
-        self._hearing = Hearing()
+        self.heard = Heard(config.speed)
+        """What came, and how old it is."""
+        self._peers = Peers(self._agent)
+        self._roll_call = RollCall(config.name, self.heard, self._peers)
         self._leaving = ""
         """Why it leaves, once the plant has been told."""
         self._left = 0
@@ -97,16 +90,10 @@ class FreeAgent(Side):
         self.phase = "seeking"
         self._routes = dict(self._first_routes)
         self._plant_there = False
-        self._measurement: Measurement | None = None
-        self._measured_at = 0.0
-        """When the last measurement arrived, over the links."""
         self._run_time = 0.0
         """That of the last measurement that came off the wire (s)."""
-        self._claims = Claims()
-        self._met: set[str] = set()
-        """Names whose nameplate is known."""
-        self._neighbours: tuple[str, ...] = ()
-        self._heard.forget_all()
+        self._peers.forget_all()
+        self.heard.forget_all()
         self._in_sums: tuple[str, ...] = ()
         """Neighbours in the sums of the last tick."""
 
@@ -141,9 +128,7 @@ class FreeAgent(Side):
             self._give_up = now + self._config.deadline
         if self.astray:
             self.astray = False
-            self._hearing = self._hearing.next()
-            for name in self._met:
-                self._agent.forget(name)
+            self._roll_call.next_session()
             self._agent.let_go()
             self._forget_everybody()
 
@@ -162,8 +147,7 @@ class FreeAgent(Side):
             self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
             return
         if self.phase == "running":
-            self.missed += skipped
-            self._lateness = max(self._lateness, late)
+            self.tally.woken(late, skipped)
             if late * self._config.speed > self._config.max_age:
                 self._hold(f"woken {late:.2f} s late; waits for news")
         self._take_arrived(now)
@@ -179,32 +163,10 @@ class FreeAgent(Side):
 
     def _note_astray(self, now: float) -> None:
         """Ask for a new session if this one has not brought what it should, or not taken it, for too long."""
-        silent = self._unheard(now)
-        self._hearing.whole |= self.phase == "running" and not silent
-        lost = self._hearing.lost(silent, now)
-        if not lost:
-            return
-        what = {
-            PLANT: "nothing comes from the plant" + (", though it is there" if self._plant_there else ""),
-            self._name: "the plant is heard, but does not hear this agent",
-        }
-        self._go_astray(what.get(lost, f"the plant hears {lost}, but nothing comes from it here"))
-
-    def _unheard(self, now: float) -> tuple[str, ...]:
-        """Who should be heard and is not: the plant, a neighbour that the plant hears, or oneself, by the plant."""
-        if self._ran and self._heard.silence(PLANT, now) > SILENT:
-            return (PLANT,)
-        if self.phase != "running" or self._measurement is None:
-            return ()
-        self._ran = True
-        roster = self._measurement.roster
-        mute = () if self._name in roster else (self._name,)
-        return *mute, *(name for name in roster if name != self._name and self._is_silent(name, now))
-
-    def _is_silent(self, name: str, now: float) -> bool:
-        if name not in self._met:
-            return True
-        return name in self._neighbours and self._heard.silence(name, now) > SILENT
+        measured = self.heard.measurement if self.phase == "running" else None
+        why = self._roll_call.complaint(None if measured is None else measured.roster, now)
+        if why:
+            self._go_astray(why)
 
     def _go_astray(self, why: str) -> None:
         self.astray = True
@@ -215,15 +177,13 @@ class FreeAgent(Side):
         if self.over or self._leaving:
             return
         self._report_links(final=True)
-        self._leave()
+        name, life = self._name, self._config.incarnation
+        message = Leave(sender=name, incarnation=life, seq=self.tally.sent, t=self.heard.t)
+        self._publish(self.keys.leave(name), encode(message))
         if self._plant_there:
             self._leaving = reason
         else:
             self.stopped = reason
-
-    def _leave(self) -> None:
-        message = Leave(sender=self._name, incarnation=self._config.incarnation, seq=self.sent, t=self._t)
-        self._publish(self.keys.leave(self._name), encode(message))
 
     def _say(self, text: str) -> None:
         self._actions.append(Say(f"{self._name}: {text}"))
@@ -239,8 +199,8 @@ class FreeAgent(Side):
                     self.phase = "waiting"
                     self._say("the plant is there; waits for its measurement")
             case ("alive", "agent", name, instance) if name != self._name:
-                if self._claims.appeared(name, instance):
-                    self._fetch_nameplate(name)
+                if self._peers.appeared(name, instance):
+                    self._fetch_nameplate(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
@@ -249,46 +209,48 @@ class FreeAgent(Side):
                 self._plant_there = False
                 self._hold("the plant is gone; holds, and seeks it again")
                 self.phase = "seeking"
-            case ("alive", "agent", name, instance) if self._claims.vanished(name, instance):
+            case ("alive", "agent", name, instance) if self._peers.vanished(name, instance):
                 self._routes.pop(self.keys.nameplate(name, instance), None)
-                self._forget(name)
-                if name in self._claims:
-                    self._fetch_nameplate(name)
+                self.heard.forget(name)
+                self._listen()
+                self._ask_again(name)
 
-    def _fetch_nameplate(self, name: str) -> None:
-        key = self.keys.nameplate(name, self._claims.instance(name))
-        self._routes[key] = (name, lambda message, payload, now: self._on_nameplate(name, message))
+    def _fetch_nameplate(self, name: str, instance: str) -> None:
+        key = self.keys.nameplate(name, instance)
+        self._routes[key] = (name, self._on_nameplate)
         self._actions.append(Fetch(key))
 
-    def _ask_again(self) -> None:
-        """Ask once more for the nameplates that have not come: a question dies with its link."""
-        for name in self._claims:
-            if name not in self._met:
-                self._fetch_nameplate(name)
+    def _ask_again(self, *names: str) -> None:
+        """Ask for the nameplates that have not come, of all or of some: a question dies with its link."""
+        for name, instance in self._peers.unknown:
+            if not names or name in names:
+                self._fetch_nameplate(name, instance)
 
-    def _forget(self, name: str) -> None:
-        self._met.discard(name)
-        self._heard.forget(name)
-        self._agent.forget(name)
-        self._meet_neighbours()
+    def _listen(self) -> None:
+        """Listen to whom the rule names."""
+        for name in self._peers.neighbours:
+            key = self.keys.state(name)
+            if key not in self._routes:
+                self._routes[key] = (name, self._on_state)
+                self._actions.append(Listen(key))
 
     def _hold(self, why: str) -> None:
         """Stop ticking; what was heard is of no use any more."""
         if self.phase == "running":
             self.phase = "waiting"
             self._say(why)
-        self._measurement, self._in_sums = None, ()
-        self._heard.drop()
+        self._in_sums = ()
+        self.heard.drop()
         self._agent.let_go()
 
     # ---------------------------------------------------------------- messages
 
     def _used(self, message: AnyMessage, now: float) -> None:
-        self.used += 1
+        self.tally.used += 1
 
     def _misled(self, expected: str, sender: str) -> None:
         """Note a message that came under another's key; many of them prove that key numbers are confused."""
-        if self._hearing.crossed() and self._ran and not self.astray:
+        if self._roll_call.crossed() and not self.astray:
             self._go_astray(f"messages of {sender} come under the key of {expected}")
 
     def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
@@ -307,11 +269,11 @@ class FreeAgent(Side):
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
         self._check_life(message)
-        self._heard.came(message, now)
+        self.heard.came(message, now)
         self._cadence.measured(now)
         self._run_time = message.t
         if not self._is_offered(message, payload, now * self._config.speed):
-            self._measurement, self._measured_at = message, now
+            self.heard.keep(message, now)
 
     def _check_life(self, message: AnyMessage) -> None:
         """Refuse what an earlier plant said; of another one, begin anew."""
@@ -323,7 +285,7 @@ class FreeAgent(Side):
                 self._hold("the plant has a new life; starts from what it measures")
                 self._orders.restart()
             self._plant_incarnation = message.incarnation
-            self._heard.forget(PLANT)
+            self.heard.forget(PLANT)
 
     def _on_order(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, LinkOrder):
@@ -336,19 +298,17 @@ class FreeAgent(Side):
     def _take_arrived(self, now: float) -> None:
         """Use what the emulated links have let through by now; what was overtaken is of no use."""
         for message in self._arrived(now * self._config.speed):
-            if isinstance(message, Measurement) and message.incarnation == self._plant_incarnation:
-                if self._measurement is None or message.seq > self._measurement.seq:
-                    self._measurement, self._measured_at = message, now
-            elif isinstance(message, State) and message.sender in self._met and not self._agent.hear(message):
-                self._heard.keep(message, now)
+            if isinstance(message, Measurement):
+                if message.incarnation == self._plant_incarnation:
+                    self.heard.keep(message, now)
+            elif isinstance(message, State) and self._peers.has_met(message.sender) and not self._agent.hear(message):
+                self.heard.keep(message, now)
 
-    def _on_nameplate(self, name: str, message: AnyMessage) -> None:
+    def _on_nameplate(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, Nameplate):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Nameplate")
-        if not self._agent.meet(message):
-            raise RejectedError("ghost", f"life {message.incarnation} of {name}, which has a later one")
-        self._met.add(name)
-        self._meet_neighbours()
+        self._peers.meet(message)
+        self._listen()
 
     def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, State):
@@ -356,82 +316,48 @@ class FreeAgent(Side):
         reason = self._agent.judge(message)
         if reason:
             raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
-        self._heard.came(message, now)
-        if self._links is not None and not self._heard.has(PLANT):
+        self.heard.came(message, now)
+        if self._links is not None and not self.heard.has(PLANT):
             return  # the plant tells what was ordered before it sends a measurement: till then no link is known
         if not self._is_offered(message, payload, now * self._config.speed):
             self._agent.hear(message)
-            self._heard.keep(message, now)
-
-    def _meet_neighbours(self) -> None:
-        """Apply the rule to who is present, and listen to whom it names."""
-        self._neighbours = self._agent.in_neighbours((self._name, *sorted(self._met)))
-        for name in self._neighbours:
-            key = self.keys.state(name)
-            if key not in self._routes:
-                self._routes[key] = (name, self._on_state)
-                self._actions.append(Listen(key))
+            self.heard.keep(message, now)
 
     # ---------------------------------------------------------------- ticks
 
-    @property
-    def _t(self) -> float:
-        return 0.0 if self._measurement is None else self._measurement.t
-
-    def _age(self, name: str, now: float) -> float:
-        """Age of a neighbour's last state (s of run time); infinite if none was heard."""
-        return self._heard.age(name, now, self._t)
-
     def _young(self, now: float) -> tuple[str, ...]:
         limit = self._config.control.handling.max_age or self._config.max_age
-        return tuple(name for name in self._neighbours if self._age(name, now) <= limit)
+        return tuple(name for name in self._peers.neighbours if self.heard.age(name, now) <= limit)
 
     def _tick(self, now: float) -> None:
         if not self._plant_there:
             return  # what the dead plant said last would still look fresh
-        measurement, config = self._measurement, self._config
-        if measurement is None or (now - self._measured_at) * config.speed > config.max_age:
+        measurement = self.heard.measured(now, self._config.max_age)
+        if measurement is None:
             self._hold("no measurement of late; holds")
             return
         if self.phase != "running":
             self.phase = "running"
             self._say(f"joins at t = {measurement.t:g} s, from {measurement.P_set:.0f} W and {measurement.V_set:.1f} V")
         young = self._young(now)
-        ages = {name: self._age(name, now) for name in young}
-        state = replace(self._agent.tick(measurement, young, ages), seq=self.sent)
+        ages = {name: self.heard.age(name, now) for name in young}
+        state = replace(self._agent.tick(measurement, young, ages), seq=self.tally.sent)
         self._in_sums = tuple(name for name in young if self._agent.shares_island(name))
-        self.ticks += 1
-        self.sent += 1
-        if self.ticks % REPORT_TICKS == 0:
+        self.tally.ticks += 1
+        self.tally.sent += 1
+        if self.tally.ticks % REPORT_TICKS == 0:
             self._report_links()
         self._publish(self.keys.state(self._name), encode(state))
 
     def _publish_status(self, now: float) -> None:
-        awaited = {
-            "seeking": f"the plant of run {self._config.run}",
-            "waiting": f"a measurement of {self._name} from the plant",
-            "running": "",
-        }
-        ages = [self._age(name, now) for name in self._neighbours]
-        status = AgentStatus(
-            sender=self._name,
-            incarnation=self._config.incarnation,
-            seq=self.sent,
-            t=self._t,
-            phase=self.phase,
-            waits_for=awaited[self.phase],
-            island="" if self._measurement is None else self._measurement.island,
-            neighbours=self._neighbours,
-            ages=tuple(age if age < float("inf") else -1.0 for age in ages),
-            used=self._in_sums,
-            received=self.used,
-            sent=self.sent,
+        status = self.tally.take_status(
+            self._config,
+            self.phase,
+            self.heard,
+            now,
+            neighbours=self._peers.neighbours,
+            in_sums=self._in_sums,
             rejected=sum(self.rejects.counts.values()),
-            lost=self._heard.lost,
-            ticks=self.ticks,
-            missed=self.missed,
-            lateness=self._lateness,
             impaired=() if self._links is None else self._links.impaired(self._run_time),
         )
-        self._lateness = 0.0
         self._publish(self.keys.status(self._name), encode(status))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wire.codec import RejectedError
-from wire.messages import AnyMessage, State
+from wire.messages import AnyMessage, Measurement, State
 
 
 class Heard:
@@ -22,8 +22,12 @@ class Heard:
     >>> state = State(sender="inv2", incarnation=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0, island="")
     >>> heard.came(state, now=10.0)
     >>> heard.keep(state, now=10.0)
-    >>> heard.age("inv2", now=10.25, t=0.5), heard.age("inv2", now=10.25, t=2.0), heard.age("inv3", now=10.25, t=0.5)
-    (0.25, 1.5, inf)
+    >>> heard.age("inv2", now=10.25), heard.age("inv3", now=10.25)
+    (0.25, inf)
+    >>> heard.keep(Measurement(sender="plant", incarnation=1, seq=100, t=2.0, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0,
+    ...     P_set=0.0, V_set=277.0, grid_connected=False, island="inv1", roster=()), now=10.25)
+    >>> heard.t, heard.age("inv2", now=10.25)
+    (2.0, 1.5)
     """
 
     def __init__(self, speed: float) -> None:
@@ -34,6 +38,9 @@ class Heard:
         """Number of the last message of each that came off the wire, and when."""
         self._kept: dict[str, tuple[State, float]] = {}
         """Last state of each agent that the links let through, and when."""
+        self.measurement: Measurement | None = None
+        """The own measurement that counts: the last that the link from the plant let through."""
+        self._measured_at = 0.0
 
     def came(self, message: AnyMessage, now: float) -> None:
         """Note what came off the wire, and how many did not.
@@ -59,19 +66,31 @@ class Heard:
         """Time (s, wall) since something came from somebody; infinite if nothing has."""
         return now - self._came[name][1] if name in self._came else float("inf")
 
-    def keep(self, state: State, now: float) -> None:
-        """Note a state that may be used."""
-        self._kept[state.sender] = state, now
+    def keep(self, message: State | Measurement, now: float) -> None:
+        """Note what may be used: a state, or the own measurement if it is later than the last."""
+        if isinstance(message, State):
+            self._kept[message.sender] = message, now
+        elif self.measurement is None or message.seq > self.measurement.seq:
+            self.measurement, self._measured_at = message, now
 
-    def age(self, name: str, now: float, t: float) -> float:
+    @property
+    def t(self) -> float:
+        """Run time of the own measurement (s); 0 if there is none."""
+        return 0.0 if self.measurement is None else self.measurement.t
+
+    def measured(self, now: float, max_age: float) -> Measurement | None:
+        """The own measurement, if it came not longer ago than `max_age` (s of run time)."""
+        return None if (now - self._measured_at) * self._speed > max_age else self.measurement
+
+    def age(self, name: str, now: float) -> float:
         """Age of somebody's last state (s of run time); infinite if there is none.
 
-        That since it came, or that by its own time beside `t`, the time of the own measurement (s), if that is more.
+        That since it came, or that by its own time beside the own measurement's, if that is more.
         """
         if name not in self._kept:
             return float("inf")
         state, at = self._kept[name]
-        return max((now - at) * self._speed, t - state.t)
+        return max((now - at) * self._speed, self.t - state.t)
 
     def forget(self, name: str) -> None:
         """Forget all of somebody, as its process is gone."""
@@ -81,8 +100,9 @@ class Heard:
     def forget_all(self) -> None:
         """Forget everybody, but not how many messages were lost."""
         self._came.clear()
-        self._kept.clear()
+        self.drop()
 
     def drop(self) -> None:
-        """Use no state that has come so far: it is of no use any more."""
+        """Use nothing that has come so far: it is of no use any more."""
         self._kept.clear()
+        self.measurement = None

@@ -32,7 +32,7 @@ from scenarios.spec.writing import to_toml
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from tests.unit.agents import test_freerun_agent as agent_side
+from tests.unit.agents import free_lab as agent_side
 from tests.unit.plant import test_freerun_plant as plant_side
 from wire.messages import LinkAnswer, LinkOrder, Measurement
 
@@ -148,13 +148,13 @@ def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
     lab.measure(1)
     lab.state("inv2", 1, 0.02, P_set=90e3)
     lab.go(0.0)
-    before = lab.side._heard.age("inv2", lab.now, t=0.02)
+    before = lab.side.heard.age("inv2", lab.now)
     order(lab, 2, 0.04, Order(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
     lab.measure(2)
     lab.state("inv2", 2, 0.04, P_set=70e3)
     lab.go(0.02)
 
-    assert (before, lab.side._heard.age("inv2", lab.now, t=0.04)) == (0.02, 0.0)
+    assert (before, lab.side.heard.age("inv2", lab.now)) == (0.02, 0.0)
     assert answers(lab) == [(1, True, "inv2 -> inv1"), (2, True, "inv2, inv3 -> inv1")]
 
 
@@ -167,7 +167,7 @@ def test_before_the_plant_has_spoken_nothing_of_a_neighbour_is_used() -> None:
     lab.state("inv2", 1, 3.0, P_set=90e3)
     lab.go(0.0)
 
-    assert lab.side._heard.age("inv2", lab.now, t=3.0) == float("inf")
+    assert lab.side.heard.age("inv2", lab.now) == float("inf")
     assert lab.status().impaired == ("inv2",)
 
 
