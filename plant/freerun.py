@@ -20,11 +20,12 @@ from __future__ import annotations
 from typing import Literal
 
 from plant.config import PlantConfig
+from plant.heard import Heard
 from plant.interface import LivePlant
-from plant.orders import Orders
-from plant.pacing import TOLERATED, Pacer, sentence
+from plant.ordering import Ordering
+from plant.pacing import Pacer
 from plant.reporting import measurement_of
-from plant.service import NO_LINKS, Service
+from plant.service import Service
 from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Fetch, Say
 from wire.clock import time_of
@@ -40,9 +41,6 @@ TELEMETRY = 0.2
 
 LEAD = 0.25
 """Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
-
-HEARD = 1.0
-"""Time (s, wall) after its last state for which an agent is told to the others as one that is heard."""
 
 AGAIN = 1.0
 """Time (s, wall) after which a nameplate that has not come is asked for again: a question dies with its link."""
@@ -72,18 +70,13 @@ class FreePlant(Side):
         self.plant = plant
         self.pacer = Pacer(config.T_c / config.speed, 0.0)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
-        self._states: dict[str, State] = {}
-        self._last: dict[str, int] = {}
-        """Number of the last state of each agent."""
         self._asked: dict[str, float] = {}
         """When each was last asked for its nameplate."""
-        self._heard: dict[str, float] = {}
-        """When the last state of each agent came."""
+        self._heard = Heard()
         self._step_due = False
         self._deadline = 0.0
-        self._complained = False
         self._service = Service(self)
-        self._orders = Orders(config.incarnation)
+        self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         self._obeyed_keys = {self.keys.obeyed(name): name for name in plant.inverters}
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
         self._report_keys = {self.keys.report(name) for name in plant.inverters}
@@ -141,7 +134,7 @@ class FreePlant(Side):
 
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
-        self._say(f"ends: {reason}. {self._pace()}")
+        self._say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
         self._deadline = now + CLOSING
@@ -192,8 +185,9 @@ class FreePlant(Side):
 
     def _drop(self, name: str) -> None:
         del self.instances[name]
-        self._orders.forget(name)
-        for known in (self.plates, self._states, self._last, self._asked, self._heard, self._set_by):
+        self.ordering.forget(name)
+        self._heard.forget(name)
+        for known in (self.plates, self._asked, self._set_by):
             known.pop(name, None)
 
     # ---------------------------------------------------------------- messages
@@ -205,17 +199,14 @@ class FreePlant(Side):
             name = message.sender
             if key in self._state_keys and isinstance(message, State):
                 self._check_sender(self._state_keys[key], message)
-                if message.seq <= self._last.get(name, -1):
-                    raise RejectedError("stale", f"State({message.seq}) of {name} after {self._last[name]}")
-                self._last[name], self._heard[name] = message.seq, now
+                self._heard.came(message, now)
                 if not self._is_offered(message, payload, now * self.config.speed):
-                    self._states[name] = message
+                    self._heard.keep(message)
             elif key in self._report_keys and isinstance(message, LinkReport):
                 self._publish(self.keys.telemetry, payload)
             elif key in self._obeyed_keys and isinstance(message, LinkAnswer):
                 self._check_sender(self._obeyed_keys[key], message)
-                self._orders.done(name, message.seq)
-                self._pass_on(message)
+                self.ordering.answered(name, message)
             elif key in self._leave_keys and isinstance(message, Leave):
                 self._check_sender(self._leave_keys[key], message)
                 self._on_leave(name, now)
@@ -235,7 +226,7 @@ class FreePlant(Side):
         self.plates[name] = plate
         self._connect(name, True, now)
         self._note(name, f"{name} joined")
-        self._send_orders(now)
+        self.ordering.send(self.plates, now)
         self._gather(now)
 
     def _on_leave(self, name: str, now: float) -> None:
@@ -253,9 +244,9 @@ class FreePlant(Side):
         answer = self._service.serve(command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
         if answer.ok and command.verb == "link":
-            self._send_orders(now)
+            self.ordering.send(self.plates, now)
         elif answer.ok and command.verb == "links":
-            self._ask_links(command.reply_to)
+            self.ordering.ask(self.plates, self.t, command.reply_to)
         if command.verb == "down":
             self.close("the run was ended by command", now)
 
@@ -266,8 +257,6 @@ class FreePlant(Side):
             self.cause = error
             self.abort(str(error), now)
 
-    # ---------------------------------------------------------------- emulated links
-
     def order(self, text: str, reply_to: str, now: float) -> LinkOrder:
         """Have links do what a person ordered, from one control period after the due tick on: till then all know it.
 
@@ -276,60 +265,16 @@ class FreePlant(Side):
         ValueError
             If it is no order, or the run has no emulated links.
         """
-        if self._links is None:
-            raise ValueError(NO_LINKS)
-        said = self._links.told(text)
         overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
         t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
-        self._links.order(text, t)
-        order = self._orders.give(text, t, reply_to)
-        text = f"order {order.seq} to links: {said}, from t = {t:g} s on"
-        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=text))
-        self._publish(self.keys.telemetry, encode(order))
+        order, said = self.ordering.give(text, t, reply_to)
+        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=said))
         return order
-
-    def _send_orders(self, now: float) -> None:
-        """Send everybody the orders that he has not been sent, or not answered."""
-        for name in self.plates:
-            for order in self._orders.due(name, now):
-                self._publish(self.keys.order(name), encode(order))
-
-    def _ask_links(self, reply_to: str) -> None:
-        """Have everybody tell how his links stand, and tell it of the own."""
-        question = encode(self._orders.question(self.t, reply_to))
-        for name in self.plates:
-            self._publish(self.keys.order(name), question)
-        assert self._links is not None
-        self._pass_on(
-            LinkAnswer(
-                sender=PLANT,
-                incarnation=self.config.incarnation,
-                seq=0,
-                t=self.t,
-                ok=True,
-                text="",
-                reply_to=reply_to,
-                data=self._links.standing(self.t),
-            )
-        )
-
-    def _pass_on(self, answer: LinkAnswer) -> None:
-        """Give the answer to an order to who gave it."""
-        try:
-            check_name("reply_to", answer.reply_to)
-        except ValueError as error:
-            raise RejectedError("garbled", str(error)) from None
-        self._publish(self.keys.answer(answer.reply_to), encode(answer))
-
-    @property
-    def has_links(self) -> bool:
-        """Whether orders to emulated links can be given."""
-        return self._links is not None
 
     @property
     def impaired(self) -> tuple[str, ...]:
         """Agents between whom and the plant a fault holds now."""
-        return () if self._links is None else self._links.impaired(self.t)
+        return self.ordering.impaired(self.t)
 
     # ---------------------------------------------------------------- steps
 
@@ -368,7 +313,7 @@ class FreePlant(Side):
             self._keep_pace(now)
             if self.phase == "running":
                 self._move()
-                self._send_orders(now)
+                self.ordering.send(self.plates, now)
                 self._measure(now)
                 for name in sorted(self.instances.keys() - self.plates.keys()):
                     if now - self._asked[name] >= AGAIN:
@@ -389,23 +334,23 @@ class FreePlant(Side):
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
         if slipped:
-            text = f"hopelessly late: the schedule was put off by {slipped:.3f} s of wall time"
-            self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
-            self._say(text)
-        late, of = self.pacer.late, self._ticks
-        if self._complained or not (self.pacer.behind if of is None else late > TOLERATED * of):
+            self._warn(f"hopelessly late: the schedule was put off by {slipped:.3f} s of wall time")
+        if not self.pacer.take_failure(of=self._ticks):
             return
-        self._complained = True
-        text = f"cannot keep pace at speed {self.config.speed:g}: {self._pace()}; give it a lower speed or more cores"
-        self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
-        self._say(text)
+        speed = self.config.speed
+        text = f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores"
+        self._warn(text)
         if self.config.strict:
             self.abort(f"plant: {text}", now)
+
+    def _warn(self, text: str) -> None:
+        self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
+        self._say(text)
 
     def _measure(self, now: float) -> None:
         """Send every agent that is present its measurement, and who is heard."""
         readings, t, tick, incarnation = self.plant.measure(), self.t, self.tick, self.config.incarnation
-        roster = tuple(name for name in self.plant.inverters if now - self._heard.get(name, -HEARD) < HEARD)
+        roster = self._heard.roster(self.plant.inverters, now)
         for name in self.plates:
             message = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
             self._publish(self.keys.measurement(name), encode(message))
@@ -418,10 +363,9 @@ class FreePlant(Side):
         self._step_due = False
         for state in self._arrived(now * self.config.speed):
             if state.sender in self.plates:
-                self._states[state.sender] = state
-        for name, state in self._states.items():
-            self.plant.hold(name, state.P_set, state.V_set)
-        self._states.clear()
+                self._heard.keep(state)
+        for state in self._heard.take():
+            self.plant.hold(state.sender, state.P_set, state.V_set)
         try:
             self.plant.advance()
         except RuntimeError as error:
@@ -437,9 +381,6 @@ class FreePlant(Side):
         return True
 
     # ---------------------------------------------------------------- what is told
-
-    def _pace(self) -> str:
-        return sentence(self.pacer.report(), self.pacer.period)
 
     def _note(self, subject: str, text: str) -> None:
         self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:g} s"))

@@ -47,6 +47,7 @@ class Pacer:
         self._start = now
         self._delays: deque[float] = deque(maxlen=_KEPT)
         self._worst = self._slipped = 0.0
+        self._failed = False
 
     @property
     def due(self) -> float:
@@ -65,10 +66,18 @@ class Pacer:
         self._slipped += delay
         return delay
 
-    @property
-    def behind(self) -> bool:
-        """Whether more steps are late than may be."""
-        return self.steps >= FIRST and self.late > TOLERATED * self.steps
+    def take_failure(self, of: int | None) -> bool:
+        """Whether it is clear now, and was not before, that pace cannot be kept.
+
+        Parameters
+        ----------
+        of : int or None
+            Steps of the whole run, of which `TOLERATED` may be late; without an end those made so far count.
+        """
+        judged = of is not None or self.steps >= FIRST
+        fails = judged and self.late > TOLERATED * (self.steps if of is None else of)
+        news, self._failed = fails and not self._failed, self._failed or fails
+        return news
 
     def report(self) -> Pacing:
         """Percentiles of the delays so far."""
@@ -86,6 +95,9 @@ class Pacer:
             worst=self._worst,
             slipped=self._slipped,
         )
+
+    def __str__(self) -> str:
+        return sentence(self.report(), self.period)
 
 
 def sentence(pacing: Pacing, period: float) -> str:

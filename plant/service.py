@@ -11,9 +11,6 @@ from wire.messages import PLANT, Answer, Command
 if TYPE_CHECKING:
     from plant.freerun import FreePlant
 
-NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
-"""What is answered to an order in vain."""
-
 
 class Service:
     """Serves commands.
@@ -64,8 +61,7 @@ class Service:
         if command.verb == "link":
             order = side.order(command.argument, command.reply_to, now)
             return {"number": order.seq, "t": order.t, "asked": agents}
-        if not side.has_links:
-            raise ValueError(NO_LINKS)
+        side.ordering.check()
         return {"number": 0, "t": side.t, "asked": agents}
 
     def status(self) -> dict[str, Any]:

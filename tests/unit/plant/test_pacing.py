@@ -16,17 +16,29 @@ def test_percentiles_are_those_of_the_delays() -> None:
     assert [report.p50, report.p95, report.p99, report.worst] == pytest.approx([0.50, 0.95, 0.99, 0.99])
 
 
-def test_behind_means_more_than_one_percent_late() -> None:
-    """Judged after the first steps only."""
+def test_pace_is_not_kept_if_more_than_one_percent_is_late() -> None:
+    """Of the steps so far in a run without an end, after the first of them; it is news only once."""
     pacer = Pacer(1.0, now=0.0)
     pacer.note(pacer.due + 2.0)
-    assert not pacer.behind
+    assert not pacer.take_failure(of=None)
     for _ in range(FIRST - 2):
         pacer.note(pacer.due)
-    assert not pacer.behind
+    assert not pacer.take_failure(of=None)
     pacer.note(pacer.due + 2.0)
 
-    assert pacer.behind
+    assert pacer.take_failure(of=None)
+    assert not pacer.take_failure(of=None)
+
+
+def test_a_run_with_an_end_has_failed_as_soon_as_too_many_of_its_steps_are_late() -> None:
+    """Four of 350 are; nothing that comes later can make up for them."""
+    pacer = Pacer(1.0, now=0.0)
+    news = []
+    for _ in range(5):
+        pacer.note(pacer.due + 2.0)
+        news.append(pacer.take_failure(of=350))
+
+    assert news == [False, False, False, True, False]
 
 
 def test_a_late_step_is_made_up_for_but_a_hopeless_delay_is_not() -> None:
