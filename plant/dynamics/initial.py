@@ -12,35 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from plant.dynamics.arithmetic import A120
 from plant.dynamics.circuit import Circuit
+from plant.dynamics.error import PlantError
+from plant.dynamics.inverters import Inverters
+from plant.dynamics.phasors import PHASES, aligned_sum
 from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
 from plant.dynamics.solve import solve_network
-
-PHASES = np.array([1.0, A120.conjugate(), A120])
-"""Balanced set of phasors, phase A at 0."""
-
-
-class PlantError(RuntimeError):
-    """The plant has no solution: the message says where, and what to try."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Units:
-    """The inverters as the initialisation sees them, one entry each."""
-
-    S_b: Real
-    """Rating (VA)."""
-    V_b: Real
-    """Nominal voltage (V)."""
-    y_f: Complex
-    """Filter admittance (S); 0 for the current-source form."""
-    m_q: Real
-    """Q-V droop (pu per pu)."""
-    forming: NDArray[np.bool_]
-    """Which are GFM."""
-    S_max: Real
-    """Apparent-power limit (pu); infinite for a GFM."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,16 +37,16 @@ class OperatingPoint:
 class _PowerFlow:
     """Fixed point between the network and inverters that keep their power."""
 
-    def __init__(self, circuit: Circuit, units: Units, held: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
         # the filters of GFM stay in the network, for their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
-        self.reduction = Reduction(circuit, y, units.forming, online)
+        self.reduction = Reduction(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
         self.net = self._linearise()
 
     def _linearise(self) -> Reduced:
-        theta = np.zeros(self.units.S_b.size)
+        theta = np.zeros(len(self.units))
         return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
 
     def voltages(self, J: Complex) -> Complex:
@@ -96,7 +73,7 @@ class _PowerFlow:
         scale = units.S_b / units.V_b
         for iteration in range(500):
             V = self.voltages(J)
-            V_1 = (V @ np.array([1.0, A120, A120**2]))[:, None] / 3.0
+            V_1 = aligned_sum(V)[:, None] / 3.0
             V_1 = np.where(V_1 == 0.0, 1.0, V_1)
             own = np.sum(V * np.conj(y * V), axis=1, keepdims=True)
             wanted = np.where(keep, J, np.conj((S + own) / (3.0 * V_1)) * PHASES)
@@ -114,13 +91,12 @@ class _PowerFlow:
 
 def equilibrium(
     circuit: Circuit,
-    units: Units,
+    units: Inverters,
     P: Real,
     Q: Real,
     V_set: Real | None,
     *,
     swing_voltage: Complex = PHASES,
-    online: NDArray[np.bool_] | None = None,
 ) -> OperatingPoint:
     """Operating point of section 7.
 
@@ -129,7 +105,7 @@ def equilibrium(
     circuit
         The network at the start.
     units
-        The inverters.
+        The inverters; those that are not connected have no part in it.
     P
         Real power of each (pu); ignored for a swing.
     Q
@@ -138,16 +114,13 @@ def equilibrium(
         Voltage set-point of each (pu), from which Q follows by droop; None to keep Q.
     swing_voltage
         The three phasors that a swing holds (pu of nominal).
-    online
-        Connected inverters; all by default.
 
     Raises
     ------
     PlantError
         If there is no such point.
     """
-    n = units.S_b.size
-    online = np.ones(n, bool) if online is None else online
+    n, online = len(units), units.connected
     _, label = circuit.components()
     island = label[circuit.terminals[:, 0]]
     sourced = np.isin(island, label[circuit.sources])
@@ -162,7 +135,7 @@ def equilibrium(
         sources=np.concatenate([circuit.sources, nodes]),
         source_voltage=np.concatenate([circuit.source_voltage, at_swing]),
     )
-    flow = _PowerFlow(held, units, swing, online)
+    flow = _PowerFlow(held, units, swing)
     J = np.zeros((n, 3), complex)
     if V_set is None:
         J, V = flow.solve(J, P, Q, swing)
@@ -175,13 +148,42 @@ def equilibrium(
         drawn = circuit.Y @ node_voltage + circuit.C[:, flow.reduction.branches] @ flow.I_b
         S = np.sum(V * np.conj(drawn[circuit.terminals]), axis=1)
         own = np.sum(V * np.conj(units.y_f[:, None] * V), axis=1)
-        V_1 = V @ np.array([1.0, A120, A120**2]) / 3.0
+        V_1 = aligned_sum(V) / 3.0
         J[swing] = np.conj((S + own) / (3.0 * V_1))[swing, None] * PHASES
-        flow = _PowerFlow(circuit, units, np.zeros(n, bool), online)
+        flow = _PowerFlow(circuit, units, np.zeros(n, bool))
         J, V = flow.solve(J, P, Q, swing)
 
     I_out = J - flow.y[:, None] * V
     return OperatingPoint(J=I_out + units.y_f[:, None] * V, V=V, I=I_out, V_branch=flow.V_b)
+
+
+def stand_at(units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None) -> None:
+    """Give the inverters the set-points and the controllers' states with which they rest at an operating point.
+
+    Parameters
+    ----------
+    units
+        The inverters; written.
+    point
+        Where they are to rest.
+    online
+        Those that deliver; the others keep `P` and `V_set` as set-points and their states.
+    P, V_set
+        What the point was found with (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
+        V_set := v, Q_set := q; else all the reactive power comes from the droop.
+    """
+    S = np.sum(point.V * np.conj(point.I), axis=1) / units.S_b
+    v = np.mean(np.abs(point.V), axis=1) / units.V_b
+    units.J, units.V, units.I = point.J.copy(), point.V.copy(), point.I.copy()
+    for i in range(len(units)):
+        if not online[i]:
+            units.set_points[i] = P[i], 1.0 if V_set is None else V_set[i], 0.0
+            continue
+        if units.forming[i] or V_set is not None:
+            units.set_points[i] = S[i].real, v[i] + units.m_q[i] * S[i].imag, 0.0
+        else:
+            units.set_points[i] = S[i].real, v[i], S[i].imag
+        units.rest(i, S[i], v[i])
 
 
 def _by_droop(

@@ -31,30 +31,31 @@ TRAJECTORY = {
 
 def test_the_autotest_starts_where_gridlabd_starts() -> None:
     """Row 25: initial power, P_set and V_set are those of GridLAB-D with tight tolerances."""
-    plant = autotest(AUTOTEST_GFL)
+    units = autotest(AUTOTEST_GFL).inverters
 
-    S = plant.V[0] * np.conj(plant.J[0] - plant.y_f[0] * plant.V[0])
+    S = units.V[0] * np.conj(units.J[0] - units.y_f[0] * units.V[0])
 
     assert S.sum() == pytest.approx(74724.351 - 9147.850j, abs=1e-3)
     assert S.real == pytest.approx([24909.957, 24907.197, 24907.197], abs=1e-3)
-    assert plant.set_points[0, 0] == pytest.approx(0.3736217572, abs=1e-10)
-    assert plant.set_points[0, 1] == pytest.approx(0.9976983563, abs=1e-10)
+    assert units.set_points[0, 0] == pytest.approx(0.3736217572, abs=1e-10)
+    assert units.set_points[0, 1] == pytest.approx(0.9976983563, abs=1e-10)
 
 
 def test_the_autotest_trajectory_is_gridlabds() -> None:
     """Row 25: power of phase A and frequency follow GridLAB-D through two load steps, to 1e-4 W and 1e-6 Hz."""
     plant = autotest(AUTOTEST_GFL)
+    units = plant.inverters
     seen = {}
     first_solution = None
     for step in range(999, 3000):
         t = round(step * plant.h, 3)
         if t == 2.0:
             plant.connect(autotest_circuit(2.304 + 4.608j))
-            first_solution = (plant.V[0, 0] * np.conj(plant.J[0, 0] - plant.y_f[0] * plant.V[0, 0])).real
+            first_solution = (units.V[0, 0] * np.conj(units.J[0, 0] - units.y_f[0] * units.V[0, 0])).real
         elif t == 4.0:
             plant.connect(autotest_circuit(2.304))
         f = plant.run(1)[0, 0, 0]
-        seen[t] = ((plant.V[0, 0] * np.conj(plant.I[0, 0])).real, f)
+        seen[t] = ((units.V[0, 0] * np.conj(units.I[0, 0])).real, f)
 
     for t, (published, tight, f) in TRAJECTORY.items():
         assert seen[t][0] == pytest.approx(tight, abs=1e-4), f"P_A at label {t}"

@@ -21,15 +21,15 @@ def frequency_step(plant: Dynamics, df: float, seconds: float) -> NDArray[np.flo
     The bus moves between the two solutions of a step, too, which the plant's fixed sources do not; on a stiff bus the
     network solution is the bus itself, so the inverter's passes can be called without it.
     """
-    state, g, h = plant.gfl_state, plant.gfl[0], plant.h
-    J = plant.J[0].copy()
+    units, h = plant.inverters, plant.h
+    state, g, J = units.gfl_state, units.gfl[0], units.J[0].copy()
     rows = []
     for k in range(round(seconds / h)):
         x0, d = state.copy(), state.copy()
         for second in (False, True):
             V = V_B * BALANCED * np.exp(2j * np.pi * df * (k + second) * h)
             p = np.sum(V * np.conj(J - g["y_f"] * V)).real / S_B
-            P_set, V_set, Q_set = plant.set_points[0]
+            P_set, V_set, Q_set = units.set_points[0]
             J = np.array(gfl.advance_gfl(g, P_set, V_set, Q_set, x0[0], state[0], d[0], *V, *J, h, second))
         rows.append((float(state["f"][0]), p))
     return np.array(rows)
@@ -38,11 +38,11 @@ def frequency_step(plant: Dynamics, df: float, seconds: float) -> NDArray[np.flo
 @pytest.mark.parametrize(("h", "expected"), [(0.002, 61.4315), (0.0002, 61.387)])
 def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> None:
     """Row 14: a jump of 10 degrees shows at once through both gains, before the corrector."""
-    plant = on_stiff_bus(GFL_D, h=h)
-    x, d = plant.gfl_state.copy(), plant.gfl_state.copy()
+    units = on_stiff_bus(GFL_D, h=h).inverters
+    x, d = units.gfl_state.copy(), units.gfl_state.copy()
     V = V_B * BALANCED * np.exp(1j * np.deg2rad(10.0))
 
-    gfl.advance_gfl(plant.gfl[0], 0.0, 1.0, 0.0, plant.gfl_state[0], x[0], d[0], *V, *plant.J[0], h, False)
+    gfl.advance_gfl(units.gfl[0], 0.0, 1.0, 0.0, units.gfl_state[0], x[0], d[0], *V, *units.J[0], h, False)
 
     assert x["f"][0] == pytest.approx(expected, abs=0.01)
 
@@ -50,7 +50,7 @@ def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> Non
 def test_the_pll_after_a_phase_jump() -> None:
     """Row 14: it undershoots to 59.940 Hz a tenth of a second after the jump."""
     plant = on_stiff_bus(GFL_D)
-    plant.set_source(V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)))
+    plant.network.set_source(V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)))
 
     f = plant.run(200)[:, 0, 0]
 
@@ -73,7 +73,7 @@ def test_the_pll_after_a_frequency_step() -> None:
 def test_frequency_watt() -> None:
     """Row 16: 1 % droop gives 0.5 pu for -0.3 Hz, through the lags of 0.05 and 0.5 s."""
     plant = on_stiff_bus(WATT)
-    plant.set_points[0, 0] = 0.3
+    plant.inverters.set_points[0, 0] = 0.3
     plant.run(3000)
 
     p = frequency_step(plant, -0.3, 6.0)[:, 1]
@@ -94,7 +94,7 @@ def test_frequency_watt_with_the_default_droop() -> None:
 
 def test_the_dead_band_jumps() -> None:
     """Row 18: past the edge of the dead band the full deviation acts."""
-    record = on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).gfl[0]
+    record = on_stiff_bus(replace(WATT, db_UF=0.036, db_OF=0.036)).inverters.gfl[0]
 
     assert gfl.power_reference(record, 0.3, 59.965) == pytest.approx(0.3, abs=1e-12)
     assert gfl.power_reference(record, 0.3, 59.963) == pytest.approx(0.3 + 0.0617, abs=1e-4)
@@ -103,7 +103,7 @@ def test_the_dead_band_jumps() -> None:
 def test_volt_var() -> None:
     """Row 19: 5 % droop gives 0.4 pu of var for -2 %, through the lags of 0.05 and 0.2 s."""
     plant = on_stiff_bus(replace(GFL_D, volt_var=True))
-    plant.set_source(0.98 * V_B * BALANCED)
+    plant.network.set_source(0.98 * V_B * BALANCED)
 
     q = plant.run(2000)[:, 0, 2] / S_B
 
@@ -113,7 +113,7 @@ def test_volt_var() -> None:
 
 def test_var_takes_what_power_leaves() -> None:
     """Row 20: at P_d = 0.8 the var reference is clipped at 0.6."""
-    record = on_stiff_bus(replace(GFL_D, volt_var=True)).gfl[0]
+    record = on_stiff_bus(replace(GFL_D, volt_var=True)).inverters.gfl[0]
 
     assert gfl.var_reference(record, 1.0, 0.0, 0.9, 0.8) == pytest.approx(0.6, abs=1e-6)
 
@@ -121,9 +121,9 @@ def test_var_takes_what_power_leaves() -> None:
 def test_the_current_loop() -> None:
     """Row 21: a step of P* of 0.3 rings at 4.57 Hz, with the overshoot and decay of the pole -11.49 +- j28.74 1/s."""
     plant = on_stiff_bus(GFL_D)
-    plant.set_points[0, 0] = 0.3
+    plant.inverters.set_points[0, 0] = 0.3
     plant.run(3000)
-    plant.set_points[0, 0] = 0.6
+    plant.inverters.set_points[0, 0] = 0.6
 
     out = plant.run(1000)[:, 0] / S_B
     p, q = out[:, 1], out[:, 2]
@@ -142,12 +142,13 @@ def test_the_current_loop() -> None:
 def test_the_current_reference_is_clipped() -> None:
     """Row 22: at half voltage 0.8 pu of power would need 1.6 pu of current; 1.0 is given, and 0.5 pu of power."""
     plant = on_stiff_bus(GFL_D)
-    plant.set_points[0, 0] = 0.8
+    plant.inverters.set_points[0, 0] = 0.8
     plant.run(2000)
-    plant.set_source(0.5 * V_B * BALANCED)
+    plant.network.set_source(0.5 * V_B * BALANCED)
 
     plant.run(3000)
-    i = plant.I[0, 0] * np.exp(-1j * plant.gfl_state["theta"][0]) / plant.gfl["I_b"][0]
+    units = plant.inverters
+    i = units.I[0, 0] * np.exp(-1j * units.gfl_state["theta"][0]) / units.gfl["I_b"][0]
 
     assert i.real == pytest.approx(1.0, abs=1e-3)
     assert plant.readings()[0, 1] / S_B == pytest.approx(0.5, abs=1e-3)
@@ -163,8 +164,8 @@ def test_a_diverging_current_controller_is_refused(wrong: GflParameters) -> None
 def test_the_refused_gains_do_diverge() -> None:
     """Row 23: the refusal is not overcautious: let through, the gains blow up."""
     plant = on_stiff_bus(GFL_D)
-    plant.gfl["F_current"] = 1.0
-    plant.set_points[0, 0] = 0.3
+    plant.inverters.gfl["F_current"] = 1.0
+    plant.inverters.set_points[0, 0] = 0.3
 
     p = plant.run(200)[:, 0, 1] / S_B
 

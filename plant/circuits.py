@@ -1,0 +1,79 @@
+"""The circuits of a feeder: for each set of closed switches, the network as the dynamics want it."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from plant.dynamics import Circuit, PlantError
+from plant.loads import LoadBranches
+from plant.network import Network
+
+
+class Circuits:
+    """A feeder's circuits, each made at the first call for its switches and then the same object.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self._network, self._loads = network, network.loads()
+        self._made: dict[frozenset[str], Circuit] = {}
+
+    def of(self, closed: frozenset[str]) -> Circuit:
+        """Give the circuit with these switches closed.
+
+        Raises
+        ------
+        PlantError
+            If an inverter is tied to another through ideal devices: nothing would decide how they share.
+        """
+        if closed not in self._made:
+            self._made[closed] = circuit_of(self._network, closed, self._loads)
+        return self._made[closed]
+
+
+def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:
+    """Make the circuit of a feeder with these switches closed; `loads` are those at their own nodes.
+
+    Raises
+    ------
+    PlantError
+        As `Circuits.of`.
+    """
+    merge = network.merge(closed)
+    on = loads.on(merge)
+    n, m = len(network.nodes), len(on)
+    branch = np.arange(m)
+    delta = on.n_to >= 0
+    C = sp.csc_array(
+        (
+            np.concatenate([on.a_from, -on.a_to[delta]]),
+            (np.concatenate([on.n_from, on.n_to[delta]]), np.concatenate([branch, branch[delta]])),
+        ),
+        shape=(n, m),
+    )
+    raw = np.array([[network.index(unit.bus, phase) for phase in "ABC"] for unit in network.inverters], np.int64)
+    raw = raw.reshape(-1, 3)
+    terminals = merge.representative[raw]
+    owner: dict[int, str] = {}
+    for unit, nodes, at in zip(network.inverters, terminals, raw, strict=True):
+        if int(nodes[0]) in owner or not np.allclose(merge.ratio[at], 1.0):
+            raise PlantError(
+                f"{unit.name} at bus {unit.bus} is tied to {owner.get(int(nodes[0]), 'another source')} by closed "
+                "switches or a regulator, without any impedance between them: move it behind a line"
+            )
+        owner[int(nodes[0])] = unit.name
+    return Circuit(
+        Y=network.admittance(closed),
+        sources=network.source_nodes,
+        source_voltage=network.source_voltage,
+        terminals=terminals,
+        C=C,
+        S=on.S,
+        I0=on.I0,
+        V_branch=on.V_nom * np.exp(1j * on.phi0),
+    )

@@ -1,0 +1,152 @@
+"""The inverters of a circuit as arrays: what each is, and the state that steps and switching change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.config import GflParameters, GfmParameters
+from plant.dynamics import gfl as gfl_model
+from plant.dynamics import gfm as gfm_model
+from plant.dynamics.reduction import Real
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inverter:
+    """One inverter at a circuit's terminal."""
+
+    name: str
+    """For messages."""
+    kind: Literal["GFM", "GFL"]
+    S_b: float
+    """Rating, base of its per-unit quantities (VA)."""
+    V_b: float
+    """Nominal voltage (V, line-to-neutral)."""
+    m_p: float
+    """P-f droop (pu per pu)."""
+    m_q: float
+    """Q-V droop (pu per pu)."""
+    parameters: GfmParameters | GflParameters
+    """Of its kind."""
+
+
+class Inverters:
+    """All inverters of a circuit, in the order of its terminals.
+
+    Parameters
+    ----------
+    units
+        What each is.
+    connected
+        Which are switched on; all by default.
+
+    Attributes
+    ----------
+    forming : bool[n]
+        Which are GFM.
+    gfm, gfm_at, gfm_state
+        Records of `plant.dynamics.gfm.PARAMETERS`, the inverter each belongs to, and their states.
+    gfl, gfl_at, gfl_state
+        The same for `plant.dynamics.gfl`.
+    S_b, V_b, m_p, m_q : float64[n]
+        Ratings (VA), nominal voltages (V) and droops (pu per pu).
+    S_max : float64[n]
+        Apparent-power limits (pu); infinite for a GFM.
+    y_f : complex128[n]
+        Filter admittances (S per phase); 0 for a current source.
+    connected : bool[n]
+        Inverters switched on; they deliver only in a live island.
+    set_points : float64[n, 3]
+        P_set, V_set, Q_set (pu); may be written between steps.
+    J, V, I : complex128[n, 3]
+        Norton injections (A), terminal voltages (V) and currents out of the inverters (A).
+    """
+
+    def __init__(self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None) -> None:
+        n = len(units)
+        self.units = units
+        self.forming = np.array([unit.kind == "GFM" for unit in units], dtype=bool)
+        self.gfm_at, self.gfl_at = np.flatnonzero(self.forming), np.flatnonzero(~self.forming)
+        self.gfm = np.array([_pack(units[i]) for i in self.gfm_at.tolist()], gfm_model.PARAMETERS)
+        self.gfl = np.array([_pack(units[i]) for i in self.gfl_at.tolist()], gfl_model.PARAMETERS)
+        self.gfm_state = np.zeros(self.gfm_at.size, gfm_model.STATE)
+        self.gfl_state = np.zeros(self.gfl_at.size, gfl_model.STATE)
+        self.S_b = np.array([unit.S_b for unit in units])
+        self.V_b = np.array([unit.V_b for unit in units])
+        self.m_p = np.array([unit.m_p for unit in units])
+        self.m_q = np.array([unit.m_q for unit in units])
+        self.S_max = np.full(n, np.inf)
+        self.S_max[self.gfl_at] = self.gfl["S_max"]
+        self.y_f = np.zeros(n, complex)
+        self.y_f[self.gfm_at], self.y_f[self.gfl_at] = self.gfm["y_f"], self.gfl["y_f"]
+        self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
+        self.set_points = np.zeros((n, 3))
+        self.J = np.zeros((n, 3), complex)
+        self.V = np.zeros((n, 3), complex)
+        self.I = np.zeros((n, 3), complex)
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    def theta(self) -> Real:
+        """Angle of every GFM's internal voltage (rad); 0 for a GFL."""
+        theta = np.zeros(len(self))
+        theta[self.gfm_at] = self.gfm_state["theta"]
+        return theta
+
+    def rest(self, i: int, S: complex, v: float) -> None:
+        """Set an inverter's controller to rest at its present J, V and I.
+
+        Parameters
+        ----------
+        i
+            The inverter.
+        S
+            Its terminal power (pu).
+        v
+            Its mean terminal voltage (pu).
+        """
+        if self.forming[i]:
+            k = int(np.searchsorted(self.gfm_at, i))
+            gfm_model.settle(self.gfm[k], self.gfm_state[k], self.J[i, 0], S, v)
+        else:
+            k = int(np.searchsorted(self.gfl_at, i))
+            gfl_model.settle(self.gfl[k], self.gfl_state[k], self.V[i], self.I[i], S, v)
+
+    def limit_power(self, i: int, P_max: float) -> None:
+        """Bound a grid-following inverter's P reference (W) from the next step on.
+
+        Raises
+        ------
+        ValueError
+            If the inverter is grid-forming: its power is what the network takes, not what a reference says.
+        """
+        if self.forming[i]:
+            raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
+        self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
+
+    def readings(self, online: NDArray[np.bool_]) -> Real:
+        """Present f (Hz), P (W), Q (var), V (V) from the last solution, n x 4, before any step was taken.
+
+        Parameters
+        ----------
+        online
+            Inverters that deliver; of the others f is nominal, P and Q are 0.
+        """
+        S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
+        S[~online] = 0.0
+        f = np.full(S.size, gfl_model.F_NOM)
+        f[self.gfm_at] += self.gfm_state["w"] / (2.0 * np.pi)
+        f[self.gfl_at] = np.where(online[self.gfl_at], self.gfl_state["f"], gfl_model.F_NOM)
+        return np.column_stack([f, S.real, S.imag, np.mean(np.abs(self.V), axis=1)])
+
+
+def _pack(unit: Inverter) -> NDArray[np.void]:
+    """Give one unit's record as its kind's compiled pass wants it."""
+    if isinstance(unit.parameters, GfmParameters):
+        return gfm_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q)
+    return gfl_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q)

@@ -1,0 +1,25 @@
+"""Three phases as one: the balanced set of phasors, and how much of it is in any three phasors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from plant.dynamics.arithmetic import A120
+from plant.dynamics.reduction import Complex
+
+PHASES = np.array([1.0, A120.conjugate(), A120])
+"""Balanced set of phasors, phase A at 0."""
+
+_ONTO_A = np.array([1.0, A120, A120**2])
+"""What turns a balanced set's phases onto phase A."""
+
+
+def aligned_sum(V: Complex) -> Complex:
+    """Sum of the phasors in the last axis (A, B, C), each turned onto phase A: three times their positive sequence.
+
+    Examples
+    --------
+    >>> float(abs(aligned_sum(240.0 * PHASES)).round(9)), float(abs(aligned_sum(240.0 * PHASES[::-1])).round(9))
+    (720.0, 0.0)
+    """
+    return np.asarray(V @ _ONTO_A)

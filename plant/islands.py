@@ -1,0 +1,73 @@
+"""Who is in which island: by the inverters' names, and as the events that a run reports."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.reduction import Reduction
+from plant.network import Network
+from wire.messages import PlantEvent
+
+GRID = "grid"
+"""Name of the island that the substation feeds."""
+
+
+class Islands:
+    """Names a feeder's islands, and reports them.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._inverters = tuple(unit.name for unit in network.inverters)
+        self._dead: list[str] = []
+
+    def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
+        """Each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
+        label = reduction.inverter_island.tolist()
+        fed = [bool(reduction.has_source[k]) for k in label]
+        first: dict[int, str] = {}
+        for k, name, sourced in zip(label, self._inverters, fed, strict=True):
+            first.setdefault(k, GRID if sourced else name)
+        return [first[k] for k in label], fed
+
+    def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
+        """Tell at t (s) which inverters feed which island, and what is newly dead, with these switches closed."""
+        names, _ = self.names(reduction)
+        events = []
+        for name in dict.fromkeys(names):
+            members = [
+                unit
+                for unit, of, online in zip(self._inverters, names, reduction.online, strict=True)
+                if of == name and online
+            ]
+            if members:
+                text = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
+                events.append(PlantEvent(t=t, kind="island", subject=name, text=text))
+        return events + self.report_dead(t, closed, reduction)
+
+    def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
+        """Tell at t (s) of the buses that nothing feeds any more, and of the inverters and loads on them."""
+        before = set(self._dead)
+        self._dead = self._dead_buses(closed, reduction.live[reduction.label])
+        new = [bus for bus in self._dead if bus not in before]
+        if not new:
+            return []
+        network = self._network
+        lost = sum(load.S[p].real for load in network.feeder.loads if load.bus in new for p in range(3)) / 1e3
+        some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
+        idle = [unit.name for unit in network.inverters if unit.bus in new]
+        text = f"dead: {len(new)} buses ({some}) without substation or GFM, {lost:.0f} kW of load not served"
+        text += f", {', '.join(idle)} idle" if idle else ""
+        return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
+
+    def _dead_buses(self, closed: frozenset[str], live: NDArray[np.bool_]) -> list[str]:
+        """Buses of which no node is live, in the feeder's order."""
+        alive = live[self._network.merge(closed).representative]
+        fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
+        return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]

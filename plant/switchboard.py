@@ -1,0 +1,83 @@
+"""Which switches are closed, and at which step which of them is operated."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+
+from plant.config import SwitchEvent
+from plant.network import Network
+from wire.messages import PlantEvent
+
+_PAST = {"open": "opened", "close": "closed"}
+
+
+class Switchboard:
+    """The switches of a feeder.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    events
+        Operations on schedule.
+    h
+        Step (s).
+
+    Attributes
+    ----------
+    closed : frozenset of str
+        Names of the switches that are closed now.
+
+    Raises
+    ------
+    ValueError
+        If an event names no switch; the message lists those there are.
+    """
+
+    def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
+        self._network, self._h = network, h
+        self.closed = network.closed0
+        self._at: dict[int, list[tuple[str, str]]] = {}
+        for event in events:
+            self.put(round(event.t / h), event.switch, event.action)
+
+    @property
+    def steps(self) -> Collection[int]:
+        """Steps at which switches are or were operated."""
+        return self._at.keys()
+
+    def put(self, step: int, name: str, action: str) -> None:
+        """Have a switch operated at a step ("open" or "close"), by its name or alias.
+
+        Raises
+        ------
+        ValueError
+            If there is no such switch; the message lists those there are.
+        """
+        self._at.setdefault(step, []).append((self._network.switch_name(name), action))
+
+    def foreseen(self) -> Iterator[frozenset[str]]:
+        """Switches that will be closed after each step with operations, in order of time, those now past included."""
+        closed = self.closed
+        for step in sorted(self._at):
+            for name, action in self._at[step]:
+                closed = _operated(closed, name, action)
+            yield closed
+
+    def operate(self, step: int) -> list[PlantEvent]:
+        """Operate the switches of a step, all at once; tells of each what was done."""
+        t = round(step * self._h, 9)
+        events = []
+        for name, action in self._at[step]:
+            known = name in self.closed
+            self.closed = _operated(self.closed, name, action)
+            alias = self._network.switches[name].alias
+            shown = f"{alias} ({name})" if alias else name
+            already = known == (action == "close")
+            what = f"was {'closed' if known else 'open'} already" if already else _PAST[action]
+            events.append(PlantEvent(t=t, kind="switch", subject=name, text=f"switch {shown} {what}"))
+        return events
+
+
+def _operated(closed: frozenset[str], name: str, action: str) -> frozenset[str]:
+    return closed | {name} if action == "close" else closed - {name}
