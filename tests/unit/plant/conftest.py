@@ -1,0 +1,20 @@
+"""The feeders that many tests look at; a network is never written to, so one serves all."""
+
+from __future__ import annotations
+
+import pytest
+
+from plant.network import Network
+from plant.tables import read_feeder
+
+
+@pytest.fixture(scope="session")
+def network() -> Network:
+    """The networked microgrids."""
+    return Network(read_feeder("microgrid123"))
+
+
+@pytest.fixture(scope="session")
+def standard() -> Network:
+    """The standard feeder."""
+    return Network(read_feeder("standard123"))
