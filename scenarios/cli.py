@@ -1,7 +1,7 @@
 """The command `gridpeers`. Heavy modules are imported where they are used, so that help comes at once.
 
-Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage or a bad file, 3 the run broke, 130 interrupted by
-Ctrl-C, 141 nobody reads the output any more, 143 by SIGTERM.
+Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage, a bad file, or output that cannot be written,
+3 the run broke, 130 interrupted by Ctrl-C, 141 nobody reads the output any more, 143 by SIGTERM.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from scenarios.usage import (
     load,
     require,
 )
-from wire.output import flush, watch_readers
+from wire.output import speaking
 
 app = typer.Typer(
     add_completion=False,
@@ -70,15 +70,15 @@ def main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    watch_readers(quits=True)
-    try:
-        app()
-    except KeyboardInterrupt:
-        fail(["interrupted; everything that was started has ended"], INTERRUPTED)
-    except ModuleNotFoundError as error:
-        fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
-    finally:
-        flush()  # what a closed pipe does at the interpreter's own end would be a complaint
+    with speaking("gridpeers"):
+        try:
+            app()
+        except KeyboardInterrupt:
+            fail(["interrupted; everything that was started has ended"], INTERRUPTED)
+        except ModuleNotFoundError as error:
+            fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
+        except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
+            fail([str(error)], BROKEN)
 
 
 @app.command()

@@ -24,7 +24,7 @@ from scenarios.emulation.setup import Setup
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
-from scenarios.results.folder import set_status, shown, write_whole
+from scenarios.results.folder import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
 from scenarios.results.moves import as_they_came, late_moves
@@ -35,7 +35,7 @@ from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.writing import to_toml
 from wire.messages import Pacing, Telemetry
-from wire.output import ReaderGoneError
+from wire.output import OutputLostError
 
 Driver = Literal["processes", "inprocess"]
 """How a case is run: as one process per agent over Zenoh, or all in this process."""
@@ -71,23 +71,36 @@ def run(request: Request, progress: Progress) -> Report:
     BrokenRunError
         If a case broke. What came until then stays in the folder, and `status.txt` tells that it is not whole.
     """
-    (request.folder / "log").mkdir()
-    with (request.folder / "log" / "run.log").open("w", encoding="utf-8") as log:
+    try:
+        return _logged(request, progress)
+    except KeyboardInterrupt as error:
+        by = "by SIGTERM" if isinstance(error, TerminatedError) else "from the keyboard"
+        set_broken(request.folder, f"interrupted {by}")
+        raise
+    except (BrokenRunError, OutputLostError) as error:
+        set_broken(request.folder, str(error))
+        raise
+    except OSError as error:  # there was no room for anything, not even for the log
+        text = refusal(request.folder, error)
+        set_broken(request.folder, text)
+        raise BrokenRunError(text) from error
+
+
+def _logged(request: Request, progress: Progress) -> Report:
+    """Run all cases; what breaks them is in the log, an error of the program with its traceback."""
+    file = request.folder / "log" / "run.log"
+    file.parent.mkdir()
+    with file.open("w", encoding="utf-8") as log:
         try:
             return _run(request, progress, log)
-        except KeyboardInterrupt as error:
-            by = "by SIGTERM" if isinstance(error, TerminatedError) else "from the keyboard"
-            set_status(request.folder, f"broken: interrupted {by}")
-            raise
-        except (BrokenRunError, ReaderGoneError) as error:
+        except (BrokenRunError, OutputLostError) as error:
             print(f"broken: {error}", file=log)
-            set_status(request.folder, f"broken: {error}")
             raise
         except Exception as error:
+            if no_room(error):
+                raise
             traceback.print_exc(file=log)
-            text = f"{type(error).__name__}: {error}"
-            set_status(request.folder, f"broken: {text}")
-            raise BrokenRunError(f"{text} (traceback in {shown(request.folder / 'log' / 'run.log')})") from error
+            raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
 
 
 def _run(request: Request, progress: Progress, log: TextIO) -> Report:

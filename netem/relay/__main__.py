@@ -9,6 +9,7 @@ import sys
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
 from netem.relay.faults import UNITS
 from netem.relay.words import HELP
+from wire.output import speaking
 
 OK, USAGE = 0, 2
 
@@ -66,4 +67,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with speaking("netem.relay"):
+        sys.exit(main(sys.argv[1:]))

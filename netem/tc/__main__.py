@@ -8,6 +8,7 @@ import sys
 
 from netem.relay.faults import UNITS, Faults, FaultsError
 from netem.tc import Impaired, TcError, netem_steps, steps_without_netem, why_no_netem
+from wire.output import speaking
 
 OK, NO, USAGE = 0, 1, 2
 
@@ -46,4 +47,5 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with speaking("netem.tc"):
+        sys.exit(main(sys.argv[1:]))

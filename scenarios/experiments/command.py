@@ -36,8 +36,10 @@ def experiment(
     """
     needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
     require(needed)
+    import shlex
+
     from scenarios.experiments.registry import EXPERIMENTS, FromSweep
-    from scenarios.results.folder import RUNS, shown
+    from scenarios.results.folder import RUNS, refusal, shown
     from wire.nearest import suggestion
 
     if name == "list":
@@ -47,9 +49,13 @@ def experiment(
     if name not in EXPERIMENTS:
         fail([f'no experiment "{name}"; {suggestion(name, tuple(EXPERIMENTS), "experiments")}'], BAD_INPUT)
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
-    again = f"gridpeers experiment {name}" + (f" --out {out}" if out else "")
+    again = f"gridpeers experiment {name}" + (f" --out {shlex.quote(str(out))}" if out else "")
     result = _swept(source, folder, jobs, again) if isinstance(source, FromSweep) else _told(source, folder)
-    for path in result.write(folder):
+    try:
+        files = result.write(folder)
+    except OSError as error:
+        fail([refusal(folder, error)], BROKEN)
+    for path in files:
         typer.echo(shown(path))
 
 

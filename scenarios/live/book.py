@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import platform
 from collections.abc import Sequence
@@ -134,7 +135,14 @@ def check_new(option: str, file: Path | None) -> None:
     """Raise UsageError if a file is there already, or cannot be made where it is to be."""
     if file is None:
         return
-    if file.exists():
-        raise UsageError(f"{option} {file}: is there already; move it, or give another name")
-    if not file.absolute().parent.is_dir():
-        raise UsageError(f"{option} {file}: there is no folder {file.parent}; make it first")
+    try:
+        if file.exists():
+            raise UsageError(f"{option} {file}: is there already; move it, or give another name")
+        if not file.absolute().parent.is_dir():
+            raise UsageError(f"{option} {file}: there is no folder {file.parent}; make it first")
+        with contextlib.suppress(FileExistsError):  # what another run was killed at
+            trial = file.with_name(f"{file.name}.partial")
+            trial.touch(exist_ok=False)
+            trial.unlink()
+    except OSError as error:
+        raise UsageError(f"{option} {file}: cannot be written: {error.strerror}; give another name") from None

@@ -66,6 +66,8 @@ class Chronicle:
         """When that was told (s, monotonic); None before the run began."""
         self.ended = False
         """Whether the last telemetry is in."""
+        self.lost = ""
+        """What could not be recorded, and why; "" if there was nothing of the kind."""
         self._trouble = ""
         self._session = Session(self.NAME, connect=(endpoint,), gossip=False, clock="wall")
         self._session.subscribe(keys.telemetry)
@@ -84,12 +86,20 @@ class Chronicle:
         self._session.inbox.put(("word", _STOP, b""))
         self._thread.join()
         self._session.close()
-        for line in () if self._book is None else self._book.close(self.t):
-            self._tell(line)
+        if self._book is not None:
+            try:
+                for line in self._book.close(self.t):
+                    self._tell(line)
+            except OSError as error:
+                self._lose(f"the record of links cannot be written: {error.strerror}")
         if self._recorder is not None:
             self._finish(self._recorder)
         if self._trouble:
             self._tell(self._trouble)
+
+    def _lose(self, why: str) -> None:
+        """Note why something is not recorded; the first reason is that of all others."""
+        self.lost = self._trouble = self.lost or why
 
     def _finish(self, recorder: Recorder) -> None:
         """Give the files their names, and hand on the record; if it is not whole, they keep the partial ones."""
@@ -103,9 +113,12 @@ class Chronicle:
                 recorded = recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
                 if self._on_whole is not None:
                     self._on_whole(recorded, self.pacing)
+            recorder.close()
         except RecordError as error:
             self._trouble = str(error)
-        recorder.close()
+            recorder.close()
+        except OSError as error:
+            self._lose(f"the record cannot be written: {error.strerror}")
 
     def _follow(self) -> None:
         while not self.ended:
@@ -137,7 +150,7 @@ class Chronicle:
             if self._recorder is not None:
                 self._recorder(message)
         except (RecordError, OSError) as error:
-            self._trouble = f"the record ends at {self.t:g} s: {error}"
+            self._lose(f"the record ends at {self.t:g} s: {getattr(error, 'strerror', None) or error}")
             return False
         return True
 
@@ -147,6 +160,6 @@ class Chronicle:
         try:
             self._book(message)
         except OSError as error:
-            self._trouble = f"the record of links ends at {self.t:g} s: {error}"
+            self._lose(f"the record of links ends at {self.t:g} s: {error.strerror}")
             return False
         return True

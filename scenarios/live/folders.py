@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from scenarios.results.folder import new_folder, set_status, write_whole
+from scenarios.results.folder import FolderError, new_folder, refusal, set_broken, set_status, write_whole
 from scenarios.run import versions
 from scenarios.spec import Scenario
 from scenarios.spec.writing import to_toml
@@ -33,10 +33,15 @@ class Folders:
     def __init__(self, logs: Path, record: Path | None = None, whole: Path | None = None) -> None:
         self.logs, self.record, self.whole = logs, record, whole
 
-    def note(self, status: str) -> None:
-        """Write the one line of status.txt."""
+    def complete(self) -> None:
+        """Have status.txt say that all is there."""
         if self.whole is not None:
-            set_status(self.whole, status)
+            set_status(self.whole, "complete")
+
+    def broken(self, why: str) -> None:
+        """Have status.txt say why not."""
+        if self.whole is not None:
+            set_broken(self.whole, why)
 
 
 @contextmanager
@@ -53,14 +58,19 @@ def folders(out: Path | None, scenario: Scenario) -> Iterator[Folders]:
     Raises
     ------
     FolderError
-        If the folder has something in it, is a file, or cannot be made.
+        If the folder has something in it, is a file, or cannot be made or written.
     """
     if out is None:
         with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
             yield Folders(Path(logs))
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
-    write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": BY_HAND} | versions()))
-    (whole / "log").mkdir()
+    try:
+        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": BY_HAND} | versions()))
+        (whole / "log").mkdir()
+    except OSError as error:
+        why = refusal(whole, error)
+        set_broken(whole, why)
+        raise FolderError(why) from None
     (case,) = scenario.cases
     yield Folders(whole / "log", whole / case, whole)

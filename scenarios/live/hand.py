@@ -124,7 +124,7 @@ def plant_here(config: PlantConfig, folder: Path | None, book: Book, on_whole: O
         except (StoppedError, KeyboardInterrupt) as stop:
             farewell(chronicle, config)
             return Ended(interrupted=str(stop) or "SIGINT")
-    return Ended(broke=broke)
+    return Ended(broke=broke or chronicle.lost)
 
 
 def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) -> Ended:
@@ -225,8 +225,9 @@ def all_here(
             finally:
                 misfortunes.end(children)
                 farewell(chronicle, config)
-            plant = children[PLANT]
-            return Ended(broke="" if plant.status == 0 else plant.report(f"after t = {chronicle.t:.2f} s"))
+        plant = children[PLANT]
+        broke = "" if plant.status == 0 else plant.report(f"after t = {chronicle.t:.2f} s")
+        return Ended(broke=broke or chronicle.lost)
     except (StoppedError, KeyboardInterrupt) as stop:
         return Ended(interrupted=str(stop) or "SIGINT")
 

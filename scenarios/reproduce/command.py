@@ -66,9 +66,9 @@ def _reproduce(
     from scenarios.reproduce.found import Reproduction
     from scenarios.reproduce.work import Work
     from scenarios.reproduce.writing import write
-    from scenarios.results.folder import FolderError, new_folder, set_status, shown
+    from scenarios.results.folder import FolderError, new_folder, refusal, set_broken, shown
     from scenarios.run import BrokenRunError
-    from wire.output import ReaderGoneError
+    from wire.output import OutputLostError
 
     now = datetime.now().astimezone()
     try:
@@ -92,14 +92,15 @@ def _reproduce(
                 only=only or "",
             )
             write(whole, work, folder)
-    except (BrokenRunError, RuntimeError) as error:
-        set_status(folder, f"broken: {error}")
-        fail([f"a run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
-    except ReaderGoneError as error:
-        set_status(folder, f"broken: {error}")
+    except (BrokenRunError, RuntimeError, OSError) as error:
+        why = refusal(folder, error) if isinstance(error, OSError) else str(error)
+        set_broken(folder, why)
+        fail([f"a run broke: {why}", f"what came until then is in {shown(folder)}/"], BROKEN)
+    except OutputLostError as error:
+        set_broken(folder, str(error))
         raise
     except KeyboardInterrupt as error:
-        set_status(folder, "broken: interrupted")
+        set_broken(folder, "interrupted")
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     for line in _told(whole):
         console.print(line, markup=False, highlight=False, soft_wrap=True)

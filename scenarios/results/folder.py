@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from datetime import datetime
 from pathlib import Path
 
 RUNS = Path("runs")
 """Where runs go when the user names no folder, seen from the working directory."""
+
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""What a system says that takes no more bytes, whatever is done to the file."""
 
 
 class FolderError(ValueError):
@@ -54,11 +59,43 @@ def set_status(folder: Path, status: str) -> None:
     write_whole(folder / "status.txt", status.replace("\n", " ") + "\n")
 
 
+def set_broken(folder: Path, why: str) -> None:
+    """Write "broken: why" to status.txt, if need be into the room that it has already; it is no error if none can."""
+    with contextlib.suppress(OSError):
+        try:
+            set_status(folder, f"broken: {why}")
+        except OSError:
+            with (folder / "status.txt").open("r+", encoding="utf-8") as file:
+                file.write("broken: " + why.replace("\n", " ") + "\n")
+                file.truncate()
+
+
+def no_room(error: BaseException) -> bool:
+    """Whether the system takes no more bytes, as of a full disk."""
+    return isinstance(error, OSError) and error.errno in _NO_ROOM
+
+
+def refusal(folder: Path, error: OSError) -> str:
+    """What of a folder could not be written, and why.
+
+    Examples
+    --------
+    >>> refusal(Path("here"), OSError(errno.ENOSPC, "No space left on device"))
+    'here: cannot be written: No space left on device'
+    """
+    return f"{error.filename or shown(folder)}: cannot be written: {error.strerror}" if no_room(error) else str(error)
+
+
 def write_whole(path: Path, text: str) -> None:
     """Write a file at once or not at all."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8", newline="\n")
-    partial.replace(path)
+    try:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise
 
 
 def shown(folder: Path) -> str:

@@ -82,7 +82,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
     from scenarios.interruption import exit_code, interruptible
     from scenarios.remaining import remaining
-    from scenarios.results.folder import FolderError, shown
+    from scenarios.results.folder import FolderError, refusal, shown
     from scenarios.sweep.folder import SweepFolder
     from scenarios.sweep.study import study
     from scenarios.sweep.workers import WorkersError, cores
@@ -98,11 +98,11 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
                         tell(f"{plan.name}, {done} of {size} runs", done)
 
                     return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
-            except (KeyboardInterrupt, WorkersError) as error:
+            except (KeyboardInterrupt, OSError, WorkersError) as error:
                 kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
-                if isinstance(error, WorkersError):
-                    fail([str(error), kept], BROKEN)
-                fail([f"interrupted; {kept}"], exit_code(error))
+                if isinstance(error, KeyboardInterrupt):
+                    fail([f"interrupted; {kept}"], exit_code(error))
+                fail([refusal(path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
 

@@ -6,6 +6,7 @@ cut off by a kill has no line feed; it is removed when the sweep goes on, and it
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -72,7 +73,8 @@ class SweepFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._journal.close()
+        with contextlib.suppress(OSError):  # a run that found no room; those that are kept are on the disk already
+            self._journal.close()
         os.close(self._lock)
 
     @property

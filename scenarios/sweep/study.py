@@ -8,7 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.results.folder import set_status
+from scenarios.results.folder import refusal, set_broken, set_status
 from scenarios.sweep.file import Plan
 from scenarios.sweep.folder import SweepFolder
 from scenarios.sweep.table import table_of, write_table
@@ -50,19 +50,26 @@ def study(plan: Plan, folder: SweepFolder, tell: Tell, *, jobs: int, dask: str =
     dask : str, optional
         Address of a Dask scheduler to use instead.
     """
+    try:
+        return _study(plan, folder, tell, jobs, dask)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            why = "interrupted"
+        else:
+            why = refusal(folder.path, error) if isinstance(error, OSError) else str(error)
+        set_broken(folder.path, f"{why} after {folder.kept} of {len(plan.runs)} runs")
+        raise
+
+
+def _study(plan: Plan, folder: SweepFolder, tell: Tell, jobs: int, dask: str) -> Summary:
     before = len(folder.done)
     tell(before)
     left = [(number, run) for number, run in enumerate(plan.runs) if number not in folder.done]
     if left:
-        try:
-            with closing(on_dask(left, dask) if dask else on_this_machine(left, min(jobs, len(left)))) as results:
-                for done in results:
-                    folder.add(done)
-                    tell(len(folder.done))
-        except BaseException as error:
-            why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-            set_status(folder.path, f"broken: {why} after {folder.kept} of {len(plan.runs)} runs")
-            raise
+        with closing(on_dask(left, dask) if dask else on_this_machine(left, min(jobs, len(left)))) as results:
+            for done in results:
+                folder.add(done)
+                tell(len(folder.done))
     table = table_of(plan, folder.done)
     path = write_table(table, folder.path)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,6 +38,23 @@ def test_a_command_that_nobody_reads_ends_without_a_word(words: list[str], close
     assert (done.returncode, done.stderr) == (141, "")
     if words[0] == "run":
         assert (tmp_path / "here" / "status.txt").read_text() == "broken: nobody reads its output any more\n"
+
+
+@pytest.mark.parametrize(
+    "words", [["netem.tc"], ["netem.relay", "tcp/127.0.0.1:0", "tcp/127.0.0.1:1"]], ids=lambda words: words[0]
+)
+def test_the_tools_of_netem_end_as_gridpeers_does(words: list[str], closed_pipe: int) -> None:
+    """A relay, or faults set by tc, that nobody heard of do not stay behind; exit status 141 and no complaint."""
+    done = subprocess.run(
+        [sys.executable, "-m", *words],
+        stdin=subprocess.DEVNULL,
+        stdout=closed_pipe,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=DEADLINE,
+    )
+
+    assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk, closed_pipe: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 from functools import partial
 from pathlib import Path
@@ -76,6 +77,27 @@ def test_no_scheduler_at_the_address_is_told(sweep_file: Write, monkeypatch: pyt
     assert code == 3
     assert "--dask tcp://127.0.0.1:1: no Dask scheduler answers there" in text
     assert "0 of 2 runs are kept in runs/sweeps/mine/; go on with: gridpeers sweep mine.toml\n" in text
+
+
+def test_a_full_disk_ends_a_sweep_that_can_go_on(sweep_file: Write, tmp_path: Path) -> None:
+    """Exit code 3, what could not be written and why, and which command goes on; then there is room, and it does."""
+    sweep_file(GRID)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.fsync", full)
+        code, text = invoke("mine.toml", "--jobs", "1")
+
+    folder = tmp_path / "runs" / "sweeps" / "mine"
+    assert code == 3
+    assert "gridpeers: runs/sweeps/mine: cannot be written: No space left on device\n" in text
+    assert "of 2 runs are kept in runs/sweeps/mine/; go on with: gridpeers sweep mine.toml\n" in text
+    assert (folder / "status.txt").read_text().startswith("broken: runs/sweeps/mine: cannot be written: No space left")
+    assert invoke("mine.toml", "--jobs", "1")[0] == 0
+    assert (folder / "status.txt").read_text() == "complete\n"
+
+
+def full(_: int) -> None:
+    """What a disk without room says."""
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_the_same_command_again_computes_nothing(sweep_file: Write) -> None:

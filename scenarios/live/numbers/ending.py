@@ -28,16 +28,16 @@ def conclude(ended: Ended, account: Account, kept: Folders) -> Ended:
         With the run folder.
     """
     if ended.broke or not account.ready:
-        kept.note(f"broken: {ended.broke or 'no whole record'}")
+        kept.broken(ended.broke or "no whole record")
         return ended
     try:
         show(account.write(), Console())
+        kept.complete()
     except (StoppedError, KeyboardInterrupt) as stop:
-        kept.note("broken: interrupted while its numbers were made")
+        kept.broken("interrupted while its numbers were made")
         return replace(ended, interrupted=str(stop) or "SIGINT")
     except OSError as error:
-        broke = f"its numbers cannot be written: {error}"
-        kept.note(f"broken: {broke}")
+        broke = f"its numbers cannot be written: {error.strerror or error}"
+        kept.broken(broke)
         return replace(ended, broke=broke)
-    kept.note("complete")
     return ended

@@ -210,7 +210,9 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
     assert code == 3
     assert "no such luck" in text
     assert "Traceback" not in text
-    assert Path("here/status.txt").read_text() == "broken: RuntimeError: no such luck\n"
+    assert Path("here/status.txt").read_text() == (
+        "broken: RuntimeError: no such luck (traceback in here/log/run.log)\n"
+    )
     assert "Traceback" in Path("here/log/run.log").read_text()
     assert not list(Path("here").rglob("history.csv"))
     assert not Path("here/metrics.json").exists()

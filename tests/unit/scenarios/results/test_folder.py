@@ -1,11 +1,12 @@
 """Where a run's results go, and that nothing there is overwritten."""
 
+import errno
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
-from scenarios.results.folder import FolderError, new_folder, set_status
+from scenarios.results.folder import FolderError, new_folder, set_broken, set_status, write_whole
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 
@@ -51,3 +52,22 @@ def test_the_status_is_one_line(tmp_path: Path) -> None:
     set_status(tmp_path, "broken: inv3 died\nlast lines")
 
     assert (tmp_path / "status.txt").read_text() == "broken: inv3 died last lines\n"
+
+
+def test_a_full_disk_leaves_no_part_of_a_file_and_the_status_still_tells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no new file can be made, the reason is written into the room that status.txt has; it may be longer."""
+    set_status(tmp_path, "running")
+
+    def full(path: Path, *_: object, **__: object) -> None:
+        path.touch()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(tmp_path / "metrics.json", "{}")
+    set_broken(tmp_path, "cannot be\nwritten")
+
+    assert [path.name for path in tmp_path.iterdir()] == ["status.txt"]
+    assert (tmp_path / "status.txt").read_text() == "broken: cannot be written\n"
