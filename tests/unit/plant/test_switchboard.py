@@ -1,0 +1,55 @@
+import pytest
+
+from plant.config import SwitchEvent
+from plant.network import Network
+from plant.switchboard import Switchboard
+
+H = 0.002
+
+
+def event(t: float, switch: str, action: str) -> SwitchEvent:
+    """An operation on schedule."""
+    return SwitchEvent(t=t, switch=switch, action="open" if action == "open" else "close")
+
+
+def test_a_step_operates_its_switches_together(network: Network) -> None:
+    """All switches of one step are operated at once, by whatever name, and each is told with its alias."""
+    board = Switchboard(network, (event(0.5, "sw1_2", "open"), event(0.5, "152-13", "open")), H)
+
+    told = board.operate(250)
+
+    assert list(board.steps) == [250]
+    assert board.closed == network.closed0 - {"67s-67", "13-152"}
+    assert [(note.t, note.kind, note.subject, note.text) for note in told] == [
+        (0.5, "switch", "67s-67", "switch sw1_2 (67s-67) opened"),
+        (0.5, "switch", "13-152", "switch 13-152 opened"),
+    ]
+
+
+def test_an_idle_operation_says_so(network: Network) -> None:
+    """Closing a closed switch, or opening an open one, changes nothing and is told as such."""
+    board = Switchboard(network, (event(0.0, "13-152", "close"),), H)
+    board.put(1, "13-152", "open")
+    board.put(1, "13-152", "open")
+
+    texts = [note.text for step in (0, 1) for note in board.operate(step)]
+
+    assert texts == [
+        "switch 13-152 was closed already",
+        "switch 13-152 opened",
+        "switch 13-152 was open already",
+    ]
+
+
+def test_switch_states_are_foreseen_in_order_of_time(network: Network) -> None:
+    """The states of a schedule are known before any of it has come, however it is written down."""
+    board = Switchboard(network, (event(2.0, "13-152", "close"), event(1.0, "13-152", "open")), H)
+
+    assert list(board.foreseen()) == [network.closed0 - {"13-152"}, network.closed0]
+    assert board.closed == network.closed0
+
+
+def test_an_unknown_switch_is_refused_when_it_is_put_down(network: Network) -> None:
+    """A misspelled switch is an error at the start of a run, not at its time."""
+    with pytest.raises(ValueError, match=r'switch "13-125": no such switch'):
+        Switchboard(network, (event(1.0, "13-125", "open"),), H)
