@@ -26,7 +26,7 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> None:
     before = network.reduction.online
     network.change(circuit)
     online = network.reduction.online
-    stopped, regained = before & ~online, online & ~before
+    regained = online & ~before
     units.J[~online] = 0.0
     for i in np.flatnonzero(regained & units.forming).tolist():
         _black_start(units, i)
@@ -38,8 +38,6 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> None:
         units.rest(i, 0.0, _mean_voltage(units, i))
     if regained.any():
         network.solve()
-    if stopped.any():
-        units.V[~network.reduction.live[network.reduction.inverter_island]] = 0.0
 
 
 def switch_inverter(units: Inverters, network: LiveNetwork, i: int, on: bool) -> None:
