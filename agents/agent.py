@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from agents.config import AgentConfig
 from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
+from agents.slip import Slips
 from agents.topology import in_neighbours
 from wire.messages import Measurement, Nameplate, State
 
@@ -60,11 +61,15 @@ class Agent:
         self._gains = gains_in_force(config.control.gains, handling)
         self._kappa_c = handling.kappa_c if handling.weights == "degree-normalised" else None
         self._stops = handling.anti_windup == "conditional"
+        self._is_told_islands = handling.islands == "switches"
+        self._slips = Slips(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
         self._follows_P, self._follows_V = Follows(handling.T_sat), Follows(handling.T_sat)
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
         """Own island at the last two measurements, the latest first."""
+        self._apart: frozenset[str] = frozenset()
+        """Neighbours that are out of step."""
 
     def knows(self, name: str) -> bool:
         """Whether the nameplate of an agent has been seen."""
@@ -91,6 +96,8 @@ class Agent:
     def _drop(self, name: str) -> None:
         self._heard.pop(name, None)
         self._worth.forget(name)
+        if self._slips is not None:
+            self._slips.forget(name)
 
     def let_go(self) -> None:
         """Have the next tick start from the set-points that its measurement shows, as the first one does."""
@@ -98,13 +105,15 @@ class Agent:
         self._islands = ("", "")
 
     def shares_island(self, name: str) -> bool:
-        """Whether the last state heard of a neighbour is from the own island, as far as is known.
+        """Whether the last state heard of a neighbour is from the own island, as far as is known (`Handling.islands`).
 
         A state is older than the own measurement. So that nobody leaves out everybody at the tick at which all go from
         one island to another, the island before counts too.
         """
         state = self._heard.get(name)
-        return state is not None and (not state.island or not self._islands[0] or state.island in self._islands)
+        if state is None or self._slips is not None:
+            return state is not None and name not in self._apart
+        return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
         """Whom this agent listens to among the known agents of a roster, by the run's rule."""
@@ -153,6 +162,8 @@ class Agent:
         """
         config = self.config
         self._islands = (measurement.island, self._islands[0] or measurement.island)
+        if self._slips is not None:
+            self._apart = self._out_of_step(self._slips, measurement, neighbours)
         if not self._takes_part or measurement.grid_connected or self._P_set is None or self._V_set is None:
             # On hold the set-points follow the plant's, so that the law starts without a bump when the island forms.
             self._P_set, self._V_set = measurement.P_set, measurement.V_set
@@ -193,8 +204,20 @@ class Agent:
             P_set=P_set,
             V_set=V_set,
             Q=measurement.Q,
-            island=measurement.island,
+            island=measurement.island if self._is_told_islands else "",
+            angle=None if self._slips is None else self._slips.angle,
         )
+
+    def _out_of_step(self, slips: Slips, measurement: Measurement, neighbours: Sequence[str]) -> frozenset[str]:
+        """Neighbours that the frequency tells to stand in another island; on the grid nobody does."""
+        t = measurement.t
+        if measurement.grid_connected:
+            slips.restart()
+        slips.sensed(t, measurement.f)
+        for name in neighbours:
+            if name in self._heard:
+                slips.heard(name, self._heard[name].t, self._heard[name].angle)
+        return frozenset(name for name in neighbours if slips.apart(name, t))
 
     def _means(
         self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None

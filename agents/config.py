@@ -60,6 +60,12 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     T_sat: float = 0.5
     """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
     "conditional". > 0."""
+    islands: Literal["switches", "frequency", "ignored"] = "switches"
+    """How an agent knows which neighbours stand in another island, to leave them out: it is told ("switches"), it sees
+    them fall out of step ("frequency"), or it does not ("ignored"). Whether the grid is there it is always told."""
+    slip_max: float = 0.01
+    """Slip (cycles) against the own inverter from which on a neighbour stands in another island, for "frequency";
+    more than the angles between inverters of one island ever swing. > 0."""
 
 
 GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]

@@ -84,7 +84,16 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 
 
-class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):
+    """The integral of an inverter's frequency: two that differ ever more are not in step."""
+
+    cycles: Number
+    """int (f - f_nom) dt."""
+    since: Number
+    """Run time whence it counts (s): it begins anew where measurements are missing."""
+
+
+class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """What an agent decided at tick k: its set-points, heard by its neighbours and by the plant."""
 
     P_set: Number
@@ -96,6 +105,8 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     island: Name = ""
     """Island the inverter stood in at that measurement: who stands in another one leaves this state out of its sums.
     Empty if it is not known."""
+    angle: Angle | None = None
+    """Where the inverter's angle stood at that measurement; sent only where islands are told apart by it."""
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):

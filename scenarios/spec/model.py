@@ -129,7 +129,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 UNIT_OF_KEY: dict[type, dict[str, str]] = {
     Gains: dict.fromkeys(("V_full", "P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
-    Handling: dict.fromkeys(("T_age", "max_age", "T_sat"), "s"),
+    Handling: {**dict.fromkeys(("T_age", "max_age", "T_sat"), "s"), "slip_max": "cycles"},
     GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
     | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu"),
     GflParameters: dict.fromkeys(("T_if", "T_ff", "T_pf", "T_vf", "T_qf"), "s")

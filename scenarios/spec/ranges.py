@@ -33,6 +33,7 @@ RANGES: dict[tuple[type, str], Range] = {
     (Handling, "kappa_c"): Range("gain kappa_c", "1/s", 1e-3, 1e4, above_zero=True),
     (Handling, "beta_c"): Range("factor beta_c", "", 0.0, 1e4),
     (Handling, "T_sat"): Range("a time until an inverter counts as saturated", "s", 1e-3, 60.0, above_zero=True),
+    (Handling, "slip_max"): Range("the greatest slip within an island", "cycles", 1e-4, 0.5, above_zero=True),
     (GfmParameters, "w_lim"): Range("the limiters' bound w_lim", "", 0.1, 1e4, above_zero=True),
     (GflParameters, "F_current"): Range("the cross-coupling gain F_current", "", 0.0, 1.0),
 }

@@ -13,9 +13,12 @@ from scenarios.spec.configs import configs
 from tests.toy.runs import Rows, first_difference
 
 
-@pytest.mark.parametrize(("name", "case"), [("intermittency", "200kW"), ("reduced-communication", "link-failure")])
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [("intermittency", "200kW"), ("reduced-communication", "link-failure"), ("unheard-switches", "frequency")],
+)
 def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str) -> None:
-    """Available power that changes, and a missing link: the same history to the last bit. Tables III, IV."""
+    """Available power that changes, a missing link, islands seen by frequency: the same history to the last bit."""
     scenario, feeder = load_scenario(name)
     events: tuple[Event, ...] = tuple(replace(event, t_s=0.1 + 0.1 * i) for i, event in enumerate(scenario.events[:2]))
     if name == "reduced-communication":

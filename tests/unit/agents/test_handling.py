@@ -14,6 +14,7 @@ from agents.agent import Agent
 from agents.config import Control, Gains, Handling
 from agents.freerun import FreeAgent
 from agents.handling import Follows, Worth, gains_in_force
+from agents.slip import Slips
 from scenarios.spec import load_scenario
 from scenarios.sweep.one import run_one
 from tests.toy.toy_configs import agent_config
@@ -226,10 +227,42 @@ def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pul
     assert [message.P_set > 50e3 for message in decided if isinstance(message, State)] == [pulls]
 
 
+@pytest.mark.parametrize(
+    ("islands", "told", "used"),
+    [("switches", ("mg1", False), False), ("frequency", ("", True), True), ("ignored", ("", False), True)],
+)
+def test_what_is_told_of_the_own_island_and_made_of_anothers(islands: Any, told: Any, used: bool) -> None:
+    """Its name, or the own angle, or nothing; and a neighbour that names another island is out by the switches only."""
+    it = agent(islands=islands)
+    it.tick(measured(0, island="mg1"), ("inv2",))
+    it.hear(replace(state("inv2", 0), island="mg2"))
+    said = it.tick(measured(1, island="mg1"), ("inv2",))
+
+    assert (said.island, said.angle is not None) == told
+    assert it.shares_island("inv2") == used
+    assert (said.P_set > 50e3) == used
+    assert (b"angle" in encode(said)) == told[1]
+
+
+def test_a_neighbour_out_of_step_is_left_out_until_the_grid_is_back() -> None:
+    """At 59 Hz it slips by 0.02 cycles in a period; on the grid all are in step, and nothing of it is kept."""
+    it, angles = agent(islands="frequency"), Slips(60.0, 0.01)
+    shared = []
+    for k in range(6):
+        grid = k == 5
+        angles.sensed(T * k, 59.0)
+        it.hear(replace(state("inv2", k), angle=angles.angle))
+        it.tick(measured(k, grid_connected=grid), ("inv2",))
+        shared.append(it.shares_island("inv2"))
+
+    assert shared == [True, False, False, False, False, True]
+
+
 @pytest.mark.parametrize("handling", [
     Handling(stale="skip"), Handling(stale="age-weighted"), Handling(max_age=0.1), Handling(anti_windup="none"),
     Handling(anti_windup="conditional"), Handling(weights="degree-normalised"),
     Handling(weights="degree-normalised", stale="age-weighted", anti_windup="conditional"),
+    Handling(islands="frequency"), Handling(islands="ignored"),
 ])  # fmt: skip
 def test_with_good_links_every_way_restores_and_shares(handling: Handling) -> None:
     """Case IV on the real plant has 60 Hz and equal power within 1.2 s of the islanding, whatever the way."""
