@@ -9,6 +9,8 @@ network could not carry what the inverters did.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from msgspec.structs import replace
 
@@ -23,7 +25,7 @@ FLEETS = {
     "2 GFM, 6 GFL": (("inv4",), ("13-152", "60-160")),
     "1 GFM, 4 GFL": (("inv4", "inv7", "inv8", "inv9"), ("13-152", "60-160")),
 }
-SETTINGS = {
+SETTINGS: dict[str, dict[str, Any]] = {
     "defaults": {},
     "F_current 0": {"F_current": 0.0},
     "F_current 0.3": {"F_current": 0.3},

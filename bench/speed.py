@@ -47,11 +47,12 @@ def main() -> None:
     arguments = parser.parse_args()
     scenario, feeder = load_scenario("islanding")
     plant_config, agent_configs = configs(scenario, feeder, arguments.case)
-    ticks = round(plant_config.end / plant_config.T_c)
+    end = scenario.time.end_s
+    ticks = round(end / plant_config.T_c)
     print(machine())
     print(
-        f"islanding, case {arguments.case}: {plant_config.end:g} s simulated, {ticks} ticks, "
-        f"{round(plant_config.end / plant_config.settings.h)} steps, {len(agent_configs)} agents; "
+        f"islanding, case {arguments.case}: {end:g} s simulated, {ticks} ticks, "
+        f"{round(end / plant_config.settings.h)} steps, {len(agent_configs)} agents; "
         f"medians of {arguments.repeat}\n"
     )
     with tempfile.TemporaryDirectory() as folder:

@@ -18,6 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, befor
 import platform
 import resource
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -77,7 +78,7 @@ def main() -> None:
     print(f"sweep : plain loop {all_cores / one:5.2f}   (of which cores: at most {cores()})")
 
 
-def loop(runs: tuple[Run, ...], folder: Path) -> float:
+def loop(runs: Sequence[Run], folder: Path) -> float:
     """Time (s) of runs one after the other."""
     from plant.tables import read_feeder
 
@@ -89,9 +90,9 @@ def loop(runs: tuple[Run, ...], folder: Path) -> float:
         with Recorder(folder / str(number)) as recorder:
             outcome = run_inprocess(plant, agents, recorder)
             assert not outcome.broke, outcome.broke
-            recorded = recorder.finish(plant.end, plant.record_step)
+            recorded = recorder.finish(scenario.time.end_s, plant.record_step)
         history = History.of(recorded.inverters, recorded.rows)
-        for window in metrics.windows([(event.label, event.t_s) for event in scenario.events], plant.end):
+        for window in metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s):
             metrics.measure(history, Plates.of(feeder.inverters), window, F_NOM)
     return perf_counter() - began
 
