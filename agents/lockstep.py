@@ -10,17 +10,8 @@ A driver (`agents.runtime` over Zenoh, `scenarios.drivers.inprocess` on a bus) d
 until `side.over`, the last actions included. `now` is the driver's clock (s) and serves deadlines only: nothing that is
 computed depends on it.
 
-**Finding each other.** Nothing tells an agent who exists. For every token of another agent it fetches the nameplate.
-Whom the rule makes its in-neighbour it listens to, then fetches the nameplate once more: subscription and query take
-the same way in the same order, so the answer proves that the neighbour's publications will come. For rules that
-look at pairs this happens at once; for a ring, when `Prepare` has named the roster. `Ready` goes to the plant when all
-nameplates of the roster are known and all in-neighbours proven.
-
-**Ticking.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
-computes and sends State(k). A State(k) that overtakes the own Measurement(k) is kept back until tick k is done, so
-what is used never depends on who was faster. Whoever is no longer on roster k is left out at once, so that it does not
-matter whether its last state or its end is heard first. At its first tick an agent has no roster k-1 and listens to
-nobody.
+How it finds the others, and when it is ready to tick with them, is written in `agents.introductions`; what it waits for
+at each tick, in `agents.turn`.
 
 **No deadlock.** State(k) waits for Measurement(k) and States(k-1) only, Measurement(k) for States(k-1) only: every
 wait is for something earlier, so the earliest thing not yet sent always can be, if its sender lives. The token of a
@@ -35,17 +26,15 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import AgentConfig
+from agents.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
 from agents.side import REPORT_TICKS, Side
-from agents.topology import is_pairwise
+from agents.turn import Turn
 from wire.actions import Fetch, Listen
 from wire.clock import time_of
 from wire.codec import RejectedError, encode
 from wire.links import Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
-
-Peer = tuple[str, str]
-"""Name and instance of an agent."""
 
 CLOSING = 2.0
 """Longest wait (s) for the neighbours' last states, and for word that the report on emulated links has come."""
@@ -71,24 +60,13 @@ class AgentSide(Side):
         super().__init__(config, instance, links)
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate))
-        self._T_c, self._incarnation = config.T_c, config.incarnation
-        self._pairwise = is_pairwise(config.control)
         self._patience = Patience(config.name, PATIENCE * config.deadline)
-        self._known: dict[Peer, bool] = {}
-        """Peers whose nameplate is known; True once they have proven to hear our subscription."""
-        self._proving: set[Peer] = set()
-        self._vanished: set[Peer] = set()
-        """Peers whose token is gone."""
-        self._prepare: Prepare | None = None
-        self._members: dict[str, str] = {}
-        self._ready_sent = False
-        self._tick: int | None = None
-        self._measurement: Measurement | None = None
+        self._introductions = Introductions(self._agent, instance)
+        self._turn = Turn()
         self._roster: tuple[str, ...] = ()
+        """That of the last tick."""
         self._neighbours: tuple[str, ...] = ()
-        self._waiting: dict[str, str] = {}
-        """In-neighbours, and their instances, whose state of the tick before has not come yet."""
-        self._ahead: dict[str, tuple[State, bytes]] = {}
+        """In-neighbours on it."""
         self._ending = ""
         """Why it is about to close."""
         self._reported = False
@@ -106,9 +84,7 @@ class AgentSide(Side):
     @property
     def wanted(self) -> int:
         """Number of messages without which the next tick cannot be computed."""
-        if self._tick is None or not self._ready_sent:
-            return 1
-        return max(1, len(self._waiting) + (self._measurement is None))
+        return self._turn.wanted if self._introductions.ready else 1
 
     @property
     def until(self) -> float | None:
@@ -123,14 +99,11 @@ class AgentSide(Side):
         """Who is awaited, and for what."""
         if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
-        if self._prepare is None:
+        if self._introductions.roster is None:
             return (Awaited("Prepare", PLANT),)
-        if not self._ready_sent:
-            return tuple(Awaited("nameplate", name) for name in self._unproven())
-        tick = self._tick or 0
-        if self._measurement is None:
-            return (Awaited(f"Measurement({tick})", PLANT),)
-        return tuple(Awaited(f"State({tick - 1})", name) for name in self._neighbours if name in self._waiting)
+        if not self._introductions.ready:
+            return tuple(Awaited("nameplate", name) for name in self._introductions.missing())
+        return self._turn.missing()
 
     def expire(self, now: float) -> None:
         """Give up if the deadline has passed."""
@@ -152,8 +125,7 @@ class AgentSide(Side):
                 # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
                 self._patience.rest()
             case ("alive", "agent", name, instance) if name != self._name:
-                self._vanished.discard((name, instance))
-                self._fetch_nameplate((name, instance))
+                self._do(self._introductions.appeared(Peer(name, instance)), now)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
@@ -161,16 +133,12 @@ class AgentSide(Side):
             case ("alive", "plant") if self._ending:
                 self.stopped = self._ending
             case ("alive", "plant") if not self.over:
-                tick = "" if self._tick is None else f" at tick {self._tick}"
+                tick = "" if self._turn.tick is None else f" at tick {self._turn.tick}"
                 self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
             case ("alive", "agent", name, instance):
-                peer = name, instance
-                self._vanished.add(peer)
-                self._known.pop(peer, None)
-                self._proving.discard(peer)
-                self._routes.pop(self.keys.nameplate(*peer), None)
-                if self._waiting.get(name) == instance:
-                    del self._waiting[name]
+                self._introductions.vanished(Peer(name, instance))
+                self._routes.pop(self.keys.nameplate(name, instance), None)
+                if self._turn.lost(name, instance):
                     self._compute(now)
 
     # ---------------------------------------------------------------- messages
@@ -190,7 +158,9 @@ class AgentSide(Side):
         if isinstance(message, Stop):
             self._end(message.reason, now)
         elif isinstance(message, Prepare):
-            self._on_prepare(message, now)
+            steps = self._introductions.prepare(message)
+            self._patience.renew(now)
+            self._do(steps, now)
         else:
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
 
@@ -210,7 +180,7 @@ class AgentSide(Side):
             return
         self._ending = reason
         self._patience.until = now + CLOSING
-        if not self._waiting:
+        if not self._turn.waiting:
             self._report_the_last()
 
     def _report_the_last(self) -> None:
@@ -218,73 +188,32 @@ class AgentSide(Side):
             self._reported = True
             self._report_links(final=True)
 
-    def _on_prepare(self, message: Prepare, now: float) -> None:
-        if len(message.instances) != len(message.roster):
-            raise RejectedError("garbled", f"{len(message.roster)} names but {len(message.instances)} instances")
-        if self._prepare is not None and message.seq <= self._prepare.seq:
-            raise RejectedError("stale", f"roster {message.seq}, {self._prepare.seq} is known")
-        members = dict(zip(message.roster, message.instances, strict=True))
-        if members.get(self._name) != self._instance:
-            raise RejectedError("unexpected", f"roster {message.seq} is without this process")
-        self._prepare, self._members, self._ready_sent = message, members, False
-        self._patience.renew(now)
-        self._make_ready(now)
+    # ---------------------------------------------------------------- introductions
 
-    def _fetch_nameplate(self, peer: Peer) -> None:
+    def _do(self, steps: list[Step], now: float) -> None:
+        for step in steps:
+            match step:
+                case Ask(peer):
+                    self._ask(peer)
+                case Hear(name):
+                    key = self.keys.state(name)
+                    self._routes[key] = (name, self._on_state)
+                    self._actions.append(Listen(key))
+                case Confirm(roster):
+                    self._patience.renew(now)
+                    life, t = self._config.incarnation, time_of(self._turn.tick or 0, self._config.T_c)
+                    ready = Ready(sender=self._name, incarnation=life, seq=roster, t=t)
+                    self._publish(self.keys.ready(self._name), encode(ready))
+
+    def _ask(self, peer: Peer) -> None:
         key = self.keys.nameplate(*peer)
-        if key not in self._routes:
-            self._routes[key] = (peer[0], lambda message, payload, now: self._on_nameplate(peer, message, now))
-            self._actions.append(Fetch(key))
+        self._routes[key] = (peer.name, lambda message, payload, now: self._on_nameplate(peer, message, now))
+        self._actions.append(Fetch(key))
 
     def _on_nameplate(self, peer: Peer, message: AnyMessage, now: float) -> None:
         if not isinstance(message, Nameplate):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Nameplate")
-        if peer in self._proving:
-            self._proving.discard(peer)
-            self._known[peer] = True
-        elif peer not in self._known:
-            if not self._agent.meet(message):
-                raise RejectedError("ghost", f"life {message.incarnation} of {peer[0]}, which has a later one")
-            self._known[peer] = False
-            if self._pairwise and self._agent.in_neighbours((self._name, peer[0])):
-                self._listen_to(peer)
-        self._make_ready(now)
-
-    def _listen_to(self, peer: Peer) -> None:
-        state = self.keys.state(peer[0])
-        if state not in self._routes:
-            self._routes[state] = (peer[0], self._on_state)
-            self._actions.append(Listen(state))
-        self._proving.add(peer)
-        self._actions.append(Fetch(self.keys.nameplate(*peer)))
-
-    def _unproven(self) -> list[str]:
-        """Members whose nameplate is missing; when there is none, in-neighbours without proof."""
-        unknown = [name for name, instance in self._members.items() if not self._has_met((name, instance))]
-        neighbours = self._agent.in_neighbours(self._members)
-        return unknown or [name for name in neighbours if not self._known[name, self._members[name]]]
-
-    def _has_met(self, peer: Peer) -> bool:
-        return peer in self._known or peer[0] == self._name
-
-    def _make_ready(self, now: float) -> None:
-        if self._prepare is None or self._ready_sent:
-            return
-        unproven = self._unproven()
-        for name in unproven:
-            peer = name, self._members[name]
-            if self._has_met(peer) and peer not in self._proving:
-                self._listen_to(peer)
-        if not unproven:
-            self._ready_sent = True
-            self._patience.renew(now)
-            ready = Ready(
-                sender=self._name,
-                incarnation=self._incarnation,
-                seq=self._prepare.seq,
-                t=time_of(self._tick or 0, self._T_c),
-            )
-            self._publish(self.keys.ready(self._name), encode(ready))
+        self._do(self._introductions.answered(peer, message), now)
 
     # ---------------------------------------------------------------- ticks
 
@@ -292,15 +221,9 @@ class AgentSide(Side):
         self._check_plant(message)
         if not isinstance(message, Measurement) or message.to != self._name:
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
-        if not self._ready_sent:
+        if not self._introductions.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
-        if self._tick is None:
-            self._tick = message.seq
-            self._ahead = {name: early for name, early in self._ahead.items() if early[0].seq == message.seq}
-        if message.seq != self._tick or self._measurement is not None:
-            kind = "unexpected" if message.seq > self._tick else "stale"
-            raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
-        self._measurement = message
+        self._turn.grant(message)
         if not self._is_offered(message, payload, message.t):
             self._sensed = message
         self._patience.renew(now)
@@ -309,19 +232,12 @@ class AgentSide(Side):
     def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
         if not isinstance(message, State):
             raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
-        name, seq = message.sender, message.seq
         reason = self._agent.judge(message)
         if reason:
-            raise RejectedError(reason, f"State({seq}) of life {message.incarnation} of {name}")
-        if self._tick is None or seq == self._tick:
-            self._ahead[name] = message, payload
-        elif seq == self._tick - 1:
+            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
+        if self._turn.take(message, payload):
             self._hear(message, payload)
-            self._waiting.pop(name, None)
             self._compute(now)
-        else:
-            kind = "stale" if seq < self._tick else "unexpected"
-            raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
 
     def _hear(self, state: State, payload: bytes) -> None:
         if not self._is_offered(state, payload, state.t):
@@ -337,34 +253,27 @@ class AgentSide(Side):
 
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if all that it needs is here."""
-        measurement, tick = self._measurement, self._tick
-        if self._ending and not self._waiting:
-            self._report_the_last()
-        if measurement is None or tick is None or self._ending:
+        if self._ending:
+            if not self._turn.waiting:
+                self._report_the_last()
             return
-        for name in self._waiting.keys() - set(measurement.roster):
-            del self._waiting[name]
-        if self._waiting:
+        measurement = self._turn.granted()
+        if measurement is None:
             return
         neighbours = tuple(name for name in self._neighbours if name in measurement.roster)
         self._take_arrived(measurement.t)
         sensed = self._sensed or measurement  # the first one is how the agent is set up, and always there
         if sensed is not measurement:
-            sensed = replace(sensed, seq=tick, t=measurement.t)
+            sensed = replace(sensed, seq=measurement.seq, t=measurement.t)
         stalled = self._links is not None and self._links.stalled(measurement.t)
         # A paused agent's state is for the lock-step alone: no link lets it through.
         state = self._agent.stand_still(measurement) if stalled else self._agent.tick(sensed, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)
-        self._tick, self._measurement = tick + 1, None
-        if self._tick % REPORT_TICKS == 0:
+        if (measurement.seq + 1) % REPORT_TICKS == 0:
             self._report_links()
         if measurement.roster != self._roster:
             self._roster = measurement.roster
             self._neighbours = self._agent.in_neighbours(self._roster)
-        members = ((name, self._members.get(name, "")) for name in self._neighbours)
-        self._waiting = {name: instance for name, instance in members if (name, instance) not in self._vanished}
-        for name, early in self._ahead.items():
-            self._hear(*early)
-            self._waiting.pop(name, None)
-        self._ahead = {}
+        for state, payload in self._turn.next(self._introductions.living(self._neighbours)):
+            self._hear(state, payload)

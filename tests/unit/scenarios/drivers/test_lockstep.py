@@ -1,3 +1,5 @@
+"""Whole runs in simulated time: who is faster, who dies when, and what garbage arrives must not matter."""
+
 from __future__ import annotations
 
 import random
@@ -9,14 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.config import Control, GraphRule
-from agents.lockstep import AgentSide
 from plant.lockstep import PlantSide
 from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.codec import LIMIT, encode
-from wire.messages import Measurement, Prepare, Ready, State, Stop, Telemetry
+from wire.messages import Ready, State, Stop, Telemetry
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -182,144 +183,6 @@ def test_a_plant_without_solution_breaks_the_run_for_all() -> None:
     assert run.telemetry[-1].outcome == run.plant.outcome
     assert run.rows[-1][0] == 0.1
     assert not run.agents
-
-
-def started(n: int = 2) -> tuple[PlantSide, AgentSide]:
-    """A plant that has sent Measurement(0), and one of its agents that has not heard of it yet."""
-    run = links(n=n)
-    agent = run.agent("inv1")
-    while run.plant.phase != "ticking":
-        run.step()
-    return run.plant, agent
-
-
-def test_the_plants_deadline_names_who_is_missing() -> None:
-    """Who, what, the last tick and the last sign of life."""
-    plant, _ = started()
-    state = State(sender="inv1", incarnation=1, seq=0, t=0.0, P_set=5e4, V_set=277.0, Q=0.0)
-    plant.received(plant.keys.state("inv1"), encode(state), 3.0)
-
-    plant.expire(9.9)
-    assert plant.outcome == ""
-    plant.expire(10.5)
-
-    assert plant.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.5 s ago"
-    assert plant.phase == "closing"
-
-
-def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
-    """Agents that never came, and recorders, are named."""
-    config, _ = toy_configs(2)
-    plant = PlantSide(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
-    plant.start(100.0)
-    plant.appeared(plant.keys.alive_agent("inv2", "a"), 101.0)
-
-    plant.expire(110.0)
-
-    assert plant.outcome == (
-        "plant: no token from inv1 within 10 s; nothing was ever heard from inv1. "
-        "no nameplate from inv2 within 10 s; nothing was ever heard from inv2. "
-        "no token from fleet within 10 s; nothing was ever heard from fleet"
-    )
-
-
-def test_an_agent_without_a_plant_says_so() -> None:
-    """It waits twice the deadline, so that a plant would complain first."""
-    agent = AgentSide(agent_config("inv1"), "a")
-    agent.start(0.0)
-    agent.expire(19.9)
-    assert not agent.over
-    agent.expire(20.0)
-
-    assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
-
-
-def test_a_plant_that_still_compiles_is_waited_for() -> None:
-    """Once its token is seen there is no deadline until it calls; its death ends the wait."""
-    agent = AgentSide(agent_config("inv1"), "a")
-    agent.start(0.0)
-    agent.appeared(agent.keys.alive_plant, 1.0)
-
-    assert agent.until is None
-    agent.vanished(agent.keys.alive_plant, 2.0)
-    assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"
-
-
-def two_agents() -> tuple[AgentSide, list[bytes]]:
-    """inv1 with inv2 as its neighbour, at tick 1 and waiting; and the plant's measurements of ticks 0 to 2."""
-    agent, keys = AgentSide(agent_config("inv1"), "a"), AgentSide(agent_config("inv1"), "a").keys
-    other = AgentSide(agent_config("inv2"), "b")
-    agent.start(0.0)
-    agent.appeared(keys.alive_plant, 0.0)
-    agent.appeared(other.token, 0.0)
-    agent.received(*other.nameplate, 0.0)
-    agent.received(*other.nameplate, 0.0)
-    prepare = Prepare(sender="plant", incarnation=1, seq=0, t=0.0, roster=("inv1", "inv2"), instances=("a", "b"))
-    agent.received(keys.control, encode(prepare), 0.0)
-    grants = [
-        encode(
-            Measurement(
-                sender="plant", incarnation=1, seq=k, t=0.02 * k, to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
-                P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", "inv2"),
-            )
-        )
-        for k in range(3)
-    ]  # fmt: skip
-    agent.received(keys.measurement("inv1"), grants[0], 1.0)
-    agent.take_actions()
-    return agent, grants
-
-
-def neighbour_state(k: int, P_set: float = 9e4) -> bytes:
-    """State of inv2 at tick k."""
-    return encode(State(sender="inv2", incarnation=1, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=0.0))
-
-
-def test_an_agent_waits_for_its_neighbours_state_of_the_tick_before() -> None:
-    """The measurement alone is not enough, and the deadline names the neighbour."""
-    agent, grants = two_agents()
-    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
-
-    assert agent.take_actions() == []
-    agent.expire(22.0)
-    assert agent.failed == "inv1: no State(0) from inv2 within 20 s; last heard of inv2: tick 0, 22.0 s ago"
-
-
-def test_a_state_that_comes_too_early_is_kept_back() -> None:
-    """State(1) of a faster neighbour is not used at tick 1, and is at tick 2."""
-    decided = []
-    for early in (True, False):
-        agent, grants = two_agents()
-        first, second = (0, 1) if early else (1, 0)
-        order: list[tuple[str, bytes]] = [(agent.keys.state("inv2"), neighbour_state(k)) for k in (0, 1)]
-        grant = (agent.keys.measurement("inv1"), grants[1])
-        for message in (order[first], order[second], grant) if early else (order[0], grant, order[1]):
-            agent.received(*message, 2.0)
-        agent.received(agent.keys.measurement("inv1"), grants[2], 3.0)
-        decided.append([action[1] for action in agent.take_actions()])
-        assert second != first
-
-    assert len(decided[0]) == 2
-    assert decided[0] == decided[1]
-
-
-def test_a_dead_neighbours_last_value_counts_once_more() -> None:
-    """The wait ends with the token; what was last heard is used."""
-    agent, grants = two_agents()
-    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
-    agent.vanished(agent.keys.alive_agent("inv2", "b"), 2.1)
-
-    assert len(agent.take_actions()) == 1
-    assert not agent.failed
-
-
-def test_the_token_of_another_instance_does_not_end_a_wait() -> None:
-    """A refused namesake that leaves is not the neighbour that is awaited."""
-    agent, grants = two_agents()
-    agent.received(agent.keys.measurement("inv1"), grants[1], 2.0)
-    agent.vanished(agent.keys.alive_agent("inv2", "impostor"), 2.1)
-
-    assert agent.take_actions() == []
 
 
 def test_telemetry_comes_at_once_and_then_in_batches() -> None:

@@ -1,0 +1,75 @@
+"""Who waits in vain in simulated time says for whom, and how long."""
+
+from __future__ import annotations
+
+import random
+
+import msgspec
+
+from agents.lockstep import AgentSide
+from plant.lockstep import PlantSide
+from tests.toy.links import Links
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_plant import ToyPlant
+from wire.codec import encode
+from wire.messages import State
+
+
+def started(n: int = 2) -> PlantSide:
+    """A plant that has sent Measurement(0), and heard nothing since."""
+    run = Links(*toy_configs(n), random.Random(0))
+    while run.plant.phase != "ticking":
+        run.step()
+    return run.plant
+
+
+def test_the_plants_deadline_names_who_is_missing() -> None:
+    """Who, what, the last tick and the last sign of life."""
+    plant = started()
+    state = State(sender="inv1", incarnation=1, seq=0, t=0.0, P_set=5e4, V_set=277.0, Q=0.0)
+    plant.received(plant.keys.state("inv1"), encode(state), 3.0)
+
+    plant.expire(9.9)
+    assert plant.outcome == ""
+    plant.expire(10.5)
+
+    assert plant.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.5 s ago"
+    assert plant.phase == "closing"
+
+
+def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
+    """Agents that never came, and recorders, are named."""
+    config, _ = toy_configs(2)
+    plant = PlantSide(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
+    plant.start(100.0)
+    plant.appeared(plant.keys.alive_agent("inv2", "a"), 101.0)
+
+    plant.expire(110.0)
+
+    assert plant.outcome == (
+        "plant: no token from inv1 within 10 s; nothing was ever heard from inv1. "
+        "no nameplate from inv2 within 10 s; nothing was ever heard from inv2. "
+        "no token from fleet within 10 s; nothing was ever heard from fleet"
+    )
+
+
+def test_an_agent_without_a_plant_says_so() -> None:
+    """It waits twice the deadline, so that a plant would complain first."""
+    agent = AgentSide(agent_config("inv1"), "a")
+    agent.start(0.0)
+    agent.expire(19.9)
+    assert not agent.over
+    agent.expire(20.0)
+
+    assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
+
+
+def test_a_plant_that_still_compiles_is_waited_for() -> None:
+    """Once its token is seen there is no deadline until it calls; its death ends the wait."""
+    agent = AgentSide(agent_config("inv1"), "a")
+    agent.start(0.0)
+    agent.appeared(agent.keys.alive_plant, 1.0)
+
+    assert agent.until is None
+    agent.vanished(agent.keys.alive_plant, 2.0)
+    assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"
