@@ -9,7 +9,7 @@ from plant.equipment import Feeder
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import islands_of, part_of
-from scenarios.results.metrics import Steady
+from scenarios.results.metrics import Steady, Window
 from scenarios.results.paper_tables import Cell
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
@@ -84,13 +84,30 @@ def find(
     events : Mapping[str, Sequence[tuple[str, float]]]
         Label and time (s) of each event, by case, as they came.
     """
+    windows = {case: metrics.windows(events[case], scenario.time.end_s) for case in histories}
+    return find_in(windows, scenario, feeder, plates, histories)
+
+
+def find_in(
+    windows: Mapping[str, Sequence[Window]],
+    scenario: Scenario,
+    feeder: Feeder,
+    plates: Plates,
+    histories: Mapping[str, History],
+) -> Findings:
+    """Measure all cases of a run in given windows, by case; each has the label of an event of the scenario.
+
+    A history may go on after the scenario's end; windows up to there see nothing of that.
+    """
     results: dict[str, dict[str, Steady]] = {}
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     where = islands_of(scenario, feeder)
-    for case, history in histories.items():
+    for case, whole in histories.items():
         results[case], settled[case], islands[case] = {}, {}, {}
-        for window in metrics.windows(events[case], scenario.time.end_s):
+        within = whole.until(scenario.time.end_s)
+        for window in windows[case]:
+            history = within if window.end <= scenario.time.end_s else whole
             results[case][window.label] = metrics.measure(history, plates, window, F_NOM)
             settled[case][window.label] = settling(history, plates, window, F_NOM)
             if len(where[window.label]) > 1:

@@ -74,11 +74,15 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert code == 0
     assert text.startswith("run lab ends at t = ")
     assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
-    plant.expect("NOTE  case IV: the scenario has no event, so there is no window to measure in")
-    by_hand = json.loads((desk.folder / "here" / "metrics.json").read_text())["by_hand"]["departures"]
-    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in by_hand[-4:]] == [
+    plant.expect("NOTE  case IV: events that the scenario does not have: by hand at .* s: switch 13-152 opened")
+    metrics = json.loads((desk.folder / "here" / "metrics.json").read_text())
+    by_hand = metrics["by_hand"]
+    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in by_hand["departures"][-4:]] == [
         *("inv1 joined", "inv2 left", "inv2 joined", "switch 13-152 opened")
     ]
+    ((label, window),) = by_hand["windows"].items()
+    assert window == {"t_s": window["t_s"], "end_s": by_hand["ended_s"], "what": "switch 13-152 opened"}
+    assert metrics["cases"]["IV"][label]["f_error_Hz"] > 0.0
 
 
 def test_a_plant_waits_for_its_agents_as_long_as_told(desk: Desk) -> None:
@@ -229,6 +233,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv"]
     metrics = json.loads((here / "metrics.json").read_text())
     assert metrics["by_hand"] | {"ended_s": 0.0} == {
-        **{"ended_s": 0.0, "not_reached": ["late"], "disturbed": [], "departures": []}
+        **{"ended_s": 0.0, "windows": {}, "too_short": []},
+        **{"not_reached": ["late"], "disturbed": [], "departures": []},
     }
     assert metrics["cases"]["IV"]["early"]["f_error_Hz"] > 0.0

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 import msgspec
 
@@ -12,7 +13,7 @@ from scenarios.live.book import Book
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.live.show.events import line_of
 from scenarios.results.drawing import Drawing, drawing_of
-from scenarios.results.findings import find
+from scenarios.results.findings import find_in
 from scenarios.results.folder import shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import part_of
@@ -55,7 +56,7 @@ class Account:
         return self._recorded is not None
 
     def write(self) -> Report:
-        """Measure what the scenario's windows have, write it with its figures, and return what there is to tell.
+        """Measure what windows there are, write it with its figures, and return what there is to tell.
 
         No claim of the paper is judged: a run by hand is one case, and people had their hands in it.
         """
@@ -63,14 +64,7 @@ class Account:
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.rows[-1][0])
         history, plates = self._columns(recorded)
-        measured = compared.measured
-        found = find(
-            measured,
-            ran.feeder,
-            plates,
-            {case: history.until(ran.scenario.time.end_s)},
-            {case: as_they_came(measured, recorded.events)},
-        )
+        found = find_in({case: compared.opened.measured}, compared.happened, ran.feeder, plates, {case: history})
         report = Report(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},
@@ -84,7 +78,9 @@ class Account:
         links = {case: sha256} if (sha256 := self._book.links_sha256) else {}
         by_hand = {
             "ended_s": compared.ended,
-            "not_reached": [window.label for window in compared.not_reached],
+            "windows": _windows(compared),
+            "too_short": [window.label for window in compared.opened.too_short],
+            "not_reached": [window.label for window in compared.opened.not_reached],
             "disturbed": compared.disturbed,
             "departures": _lines(compared),
         }
@@ -107,39 +103,59 @@ class Account:
         return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
 
     def _drawing(self, compared: Compared, history: History, plates: Plates) -> Drawing:
-        """What to draw: the whole run, with the scenario's events by name, and a line where people departed from it."""
+        """What to draw: the whole run, with all events by name, and a line where people departed otherwise from it."""
         assert self._recorded is not None
         scenario, events = self._ran.scenario, self._recorded.events
         reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
-        scenario = msgspec.structs.replace(scenario, events=reached)
-        marks = [*as_they_came(scenario, events), *(("", event.t) for event in compared.departures if event.t > 0.0)]
-        drawing = drawing_of(scenario, self._ran.feeder, plates, {self._case: history}, list(dict.fromkeys(marks)))
+        marks = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
+        marks += [
+            ("by hand" if event.kind == "switch" else "", event.t) for event in compared.departures if event.t > 0.0
+        ]
+        marks = list(dict.fromkeys(marks))
+        drawing = drawing_of(compared.happened, self._ran.feeder, plates, {self._case: history}, marks)
         return replace(drawing, moves=any(event.kind == "inverter" for event in events))
 
     def _notes(self, compared: Compared) -> Iterable[str]:
         """What a reader must know of these numbers."""
         assert self._recorded is not None
-        ended, scenario = f"{compared.ended:g} s", self._ran.scenario
-        if not scenario.events:
-            yield "the scenario has no event, so there is no window to measure in"
-        elif compared.not_reached:
-            what = "nothing was measured" if not compared.measured.events else "they have no numbers"
-            yield f"ended at {ended}, before the end of {_named(compared.not_reached)}: {what}"
-        elif compared.ended > scenario.time.end_s:
+        ended, scenario, windows = f"{compared.ended:g} s", self._ran.scenario, compared.opened
+        if not scenario.events and not compared.by_hand:
+            yield "the scenario has no event, and nobody made one, so there is no window to measure in"
+        elif windows.not_reached:
+            what = "they have no numbers" if windows.measured else "nothing was measured"
+            yield f"ended at {ended}, before the end of {_named(windows.not_reached)}: {what}"
+        elif scenario.time.end_s < compared.ended and all(w.end <= scenario.time.end_s for w in windows.measured):
             yield f"measured up to {scenario.time.end_s:g} s, where the scenario ends; the history goes on to {ended}"
+        if compared.by_hand:
+            lines = [f"{label}: {what}" for label, what in compared.by_hand.items()]
+            yield f"events that the scenario does not have: {_few(lines)}"
+        if windows.too_short:
+            yield f"too short to be measured: {_named(windows.too_short)}"
         yield from late_moves(compared.measured, self._recorded.events)
         if compared.disturbed:
             lines = _lines(compared, compared.measured.time.end_s)
-            more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
-            yield (
-                f"{', '.join(compared.disturbed)}: not what the scenario means by it, which does not tell of: "
-                f"{'; '.join(lines[:_SHOWN])}{more}"
-            )
+            names = ", ".join(compared.disturbed)
+            yield f"{names}: not what the scenario means by it, which does not tell of: {_few(lines)}"
 
 
 def _named(windows: Iterable[Window]) -> str:
     """Windows with their times."""
     return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
+
+
+def _windows(compared: Compared) -> dict[str, Any]:
+    """Windows that people opened and that are measured, by label: from when to when (s), and what was done."""
+    return {
+        window.label: {"t_s": window.start, "end_s": window.end, "what": compared.by_hand[window.label]}
+        for window in compared.opened.measured
+        if window.label in compared.by_hand
+    }
+
+
+def _few(lines: Sequence[str]) -> str:
+    """The first of some lines, and how many there are more."""
+    more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
+    return f"{'; '.join(lines[:_SHOWN])}{more}"
 
 
 def _lines(compared: Compared, end: float = inf) -> list[str]:

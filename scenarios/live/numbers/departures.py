@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -12,13 +12,12 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.network import Network
+from scenarios.live.numbers.opened import NEAR, Opened, events_by_hand, opened
 from scenarios.results.metrics import Window, windows
+from scenarios.results.moves import as_they_came
 from scenarios.spec import Scenario
 from scenarios.spec.netem import netem_of
 from wire.messages import PlantEvent
-
-_NEAR = 1e-9
-"""Times (s) that differ by less are the same: they are multiples of the plant's step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,13 +27,18 @@ class Compared:
     ended: float
     """When it ended (s)."""
     measured: Scenario
-    """The scenario as far as windows of events were reached to their end, which is where it ends."""
-    not_reached: tuple[Window, ...]
-    """The windows that were not."""
+    """The scenario as far as the last of its windows that is measured; its end is that one's, as it is meant."""
+    happened: Scenario
+    """The scenario with the events that came, those among them that people made by operating switches."""
+    opened: Opened
+    """The windows of measurement of these events."""
+    by_hand: Mapping[str, str]
+    """What people did at each event of theirs, by its label."""
     departures: tuple[PlantEvent, ...]
     """What the scenario does not tell, in the order of time."""
     disturbed: tuple[str, ...]
-    """Events before the end of whose window there was a departure: the plant remembers whatever happened to it."""
+    """Events of the scenario before the end of whose window, as it is meant, there was a departure: the plant
+    remembers whatever happened to it."""
 
 
 class _Due(NamedTuple):
@@ -67,22 +71,29 @@ def compare(scenario: Scenario, feeder: Feeder, events: Sequence[PlantEvent], en
         Time (s) of the last row.
     """
     every = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
-    whole = [window for window in every if window.end <= ended + _NEAR]
-    found = (*_switched(scenario, feeder, events), *_moved(scenario, feeder, events, every, ended))
+    switched = tuple(_switched(scenario, feeder, events))
+    by_hand = events_by_hand(switched)
+    found = (*switched, *_moved(scenario, feeder, events, every, ended))
     found += tuple(event for event in events if event.kind == "link")
     departures = tuple(sorted(found, key=lambda event: event.t))
     first = min((event.t for event in departures), default=ended)
-    end = whole[-1].end if whole else scenario.time.end_s
+    all_opened = opened(scenario, as_they_came(scenario, events), by_hand, ended)
+    known = {window.label for window in all_opened.measured}
+    whole = max((number for number, window in enumerate(every, start=1) if window.label in known), default=0)
+    # at the same moment, what people did comes first: the scenario's event is what was left behind
+    came = sorted((*by_hand, *(event for event in scenario.events if event.t_s < ended)), key=lambda event: event.t_s)
     return Compared(
         ended=ended,
         measured=msgspec.structs.replace(
             scenario,
-            events=scenario.events[: len(whole)],
-            time=msgspec.structs.replace(scenario.time, end_s=end),
+            events=scenario.events[:whole],
+            time=msgspec.structs.replace(scenario.time, end_s=every[whole - 1].end if whole else scenario.time.end_s),
         ),
-        not_reached=every[len(whole) :],
+        happened=msgspec.structs.replace(scenario, events=tuple(came)),
+        opened=all_opened,
+        by_hand={event.label: "; ".join(one.text for one in switched if one.t == event.t_s) for event in by_hand},
         departures=departures,
-        disturbed=tuple(window.label for window in whole if first < window.end - _NEAR),
+        disturbed=tuple(window.label for window in every if window.label in known and first < window.end - NEAR),
     )
 
 
@@ -95,7 +106,7 @@ def _switched(scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent]) 
     for event in events:
         if event.kind != "switch" or event.text.endswith(" already"):
             continue
-        if not any(abs(event.t - t) < _NEAR and event.subject == name for t, name in planned):
+        if not any(abs(event.t - t) < NEAR and event.subject == name for t, name in planned):
             yield event
 
 
@@ -115,14 +126,14 @@ def _moved(
         met = [
             one
             for one in due
-            if (one.verb, one.name) == (verb, event.subject) and one.since - _NEAR <= event.t < one.until
+            if (one.verb, one.name) == (verb, event.subject) and one.since - NEAR <= event.t < one.until
         ]
         if not met:
             yield event
         elif met[0].told:
             due.remove(met[0])
     for one in due:
-        if one.told and one.missed <= ended + _NEAR:
+        if one.told and one.missed <= ended + NEAR:
             yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=one.told)
 
 

@@ -23,6 +23,7 @@ from scenarios.results.record import Recorded, Tape
 from scenarios.results.report import plain
 from scenarios.spec import Scenario, load_scenario
 from scenarios.spec.configs import configs
+from scenarios.spec.model import Event
 from scenarios.spec.netem import netem_of, setup_of
 from wire.messages import PlantEvent
 
@@ -98,13 +99,85 @@ def test_a_death_that_the_scenario_tells_of_is_none_of_the_people() -> None:
     [(0.5, 0, 7.0), (3.99, 0, 7.0), (4.0, 1, 4.0), (6.99, 1, 4.0), (7.0, 2, 7.0), (60.0, 2, 7.0)],
 )
 def test_windows_count_once_they_are_reached_to_their_end(ended: float, whole: int, end: float) -> None:
-    """What is measured ends with the last whole window, wherever the run does; the others are named."""
+    """What is measured of a scenario ends with its last whole window, wherever the run does; the others are named."""
     scenario, feeder = one_case("islanding")
     compared = compare(scenario, feeder, [], ended)
 
     assert compared.measured.events == scenario.events[:whole]
     assert compared.measured.time.end_s == end
-    assert [window.label for window in compared.not_reached] == ["event1", "event2"][whole:]
+    assert [window.label for window in compared.opened.measured] == ["event1", "event2"][:whole]
+    assert [window.label for window in compared.opened.not_reached] == ["event1", "event2"][whole:]
+
+
+def switch(t: float, what: str = "opened", name: str = "sw1_2 (67s-67)") -> PlantEvent:
+    """A switch that somebody operated."""
+    return told("switch", t, "67s-67", f"switch {name} {what}")
+
+
+@pytest.mark.parametrize(
+    ("events", "ended", "measured", "too_short", "not_reached"),
+    [
+        # in the middle of a window, which ends there; its own ends with the scenario's next event
+        ([switch(2.5)], 7.0, "event1 1-2.5, by hand at 2.5 s 2.5-4, event2 4-7", "", ""),
+        # before all events, and after the scenario's end: the last one of the scenario is not the longer for it
+        ([switch(0.4), switch(9)], 12.0, "by hand at 0.4 s 0.4-1, event1 1-4, event2 4-7, by hand at 9 s 9-12", "", ""),
+        # two within one window, and two within one step, which are one event
+        (
+            [switch(2.0), switch(3.0, "closed"), switch(3.0)],
+            7.0,
+            "event1 1-2, by hand at 2 s 2-3, by hand at 3 s 3-4, event2 4-7",
+            "",
+            "",
+        ),
+        # whatever the scenario's end is, a window by hand goes on to the end of the run
+        ([switch(6.0)], 12.0, "event1 1-4, event2 4-6, by hand at 6 s 6-12", "", ""),
+        # a run that ends early: what people ended was reached, and theirs ends with the run
+        ([switch(2.5)], 3.0, "event1 1-2.5, by hand at 2.5 s 2.5-3", "", "event2"),
+        # too little time to measure anything that is steady
+        ([switch(1.1), switch(6.9)], 7.0, "by hand at 1.1 s 1.1-4, event2 4-6.9", "event1, by hand at 6.9 s", ""),
+        # at the moment of an event of the scenario, a switch is part of that; one that was open already is nothing
+        ([switch(1.0), switch(2.0, "was open already")], 7.0, "event1 1-4, event2 4-7", "", ""),
+    ],
+)
+def test_a_switch_by_hand_opens_a_window_as_the_scenarios_events_do(
+    events: list[PlantEvent], ended: float, measured: str, too_short: str, not_reached: str
+) -> None:
+    """Each window lasts to the next event, whoever made it; its label says by whom."""
+    opened = compare(*one_case("islanding"), events, ended).opened
+
+    assert ", ".join(f"{one.label} {one.start:g}-{one.end:g}" for one in opened.measured) == measured
+    assert ", ".join(one.label for one in opened.too_short) == too_short
+    assert ", ".join(one.label for one in opened.not_reached) == not_reached
+
+
+def test_what_people_did_is_an_event_of_what_happened() -> None:
+    """Islands after each event are those of the switches as they stood, and each event by hand says what it was."""
+    compared = compare(
+        *one_case("islanding"), [switch(2.5), switch(2.5, name="sw9 (18-135)"), switch(5, "closed")], 7.0
+    )
+
+    assert [(event.label, event.open, event.close) for event in compared.happened.events] == [
+        ("event1", ("13-152",), ()),
+        ("by hand at 2.5 s", ("67s-67",), ()),
+        ("event2", *(getattr(one_case("islanding")[0].events[1], key) for key in ("open", "close"))),
+        ("by hand at 5 s", (), ("67s-67",)),
+    ]
+    assert compared.by_hand == {
+        "by hand at 2.5 s": "switch sw1_2 (67s-67) opened; switch sw9 (18-135) opened",
+        "by hand at 5 s": "switch sw1_2 (67s-67) closed",
+    }
+
+
+def test_a_late_agent_and_a_switch_by_hand_do_not_meet() -> None:
+    """A window begins when its last agent has moved, though somebody operated a switch between that and its time."""
+    left = told("roster", 2.56, "inv2", "inv2 left; its inverter is off the network, at t = 2.56 s")
+    off = told("inverter", 2.56, "inv2", "inv2 disconnected")
+    opened = compare(*one_case("plug-n-play"), [switch(2.3), left, off, BACK], 5.0).opened
+
+    assert [(one.label, one.start, one.end) for one in opened.measured][1:3] == [
+        ("by hand at 2.3 s", 2.3, 2.56),
+        ("leave", 2.56, 3.0),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +219,9 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
 
     for event in ("event1", "event2"):
         assert metrics["cases"]["IV"][event] == pytest.approx(expected[event], rel=1e-6)
-    assert metrics["by_hand"] == {"ended_s": 8.0, "not_reached": [], "disturbed": [], "departures": []}
+    assert metrics["by_hand"] == {
+        **{"ended_s": 8.0, "windows": {}, "too_short": [], "not_reached": [], "disturbed": [], "departures": []}
+    }
     assert "ours | paper's Table I\n" in report
     assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8 s\n" in report
     assert len(list((tmp_path / "plots").glob("*.png"))) == 7
@@ -169,3 +244,57 @@ def test_a_run_ended_early_says_what_it_did_not_reach(
     assert [name for name in case if name.startswith("event")] == measured
     assert metrics["by_hand"]["not_reached"] == ["event1", "event2"][len(measured) :]
     assert f"NOTE  case IV: {said}\n" in report
+
+
+@pytest.fixture(scope="module")
+def switched() -> Recorded:
+    """Case IV for 8.5 s, in which somebody opened the tie of microgrids 1 and 2 at 2.5 s and closed it at 7.5 s."""
+    scenario, feeder = one_case("islanding")
+    mine = [Event(label="a", t_s=2.5, open=("sw1_2",)), Event(label="b", t_s=7.5, close=("sw1_2",))]
+    events = tuple(sorted((*scenario.events, *mine), key=lambda event: event.t_s))
+    longer = msgspec.structs.replace(scenario.time, end_s=8.5)
+    plant, agents = configs(msgspec.structs.replace(scenario, events=events, time=longer), feeder, "IV")
+    tape = Tape()
+    run_inprocess(plant, agents, tape)
+    return tape.finish(8.5, plant.record_step)
+
+
+def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
+    tmp_path: Path, switched: Recorded
+) -> None:
+    """The same numbers as if the scenario had had their events, of each island too; the report says whose they are."""
+    scenario, feeder = one_case("islanding")
+    mine = [
+        Event(label="by hand at 2.5 s", t_s=2.5, open=("sw1_2",)),
+        Event(label="by hand at 7.5 s", t_s=7.5, close=("sw1_2",)),
+    ]
+    events = tuple(sorted((*scenario.events, *mine), key=lambda event: event.t_s))
+    whole = msgspec.structs.replace(
+        scenario, events=events, time=msgspec.structs.replace(scenario.time, end_s=8.5), paper=""
+    )
+    history = History.of(switched.inverters, switched.rows)
+    came = {"IV": [(event.label, event.t_s) for event in events]}
+    found = find(whole, feeder, Plates.of(feeder.inverters), {"IV": history}, came)
+    ran = Ran(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
+    expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
+    metrics, report = account(tmp_path, switched, 8.5)
+    case = metrics["cases"]["IV"]
+
+    assert list(case)[:4] == ["event1", "by hand at 2.5 s", "event2", "by hand at 7.5 s"]
+    for label in ("event1", "by hand at 2.5 s", "by hand at 7.5 s"):
+        islands, theirs = (of[label].pop("islands", {}) for of in (case, expected))
+        assert list(islands) == list(theirs) == (["inv1", "inv4"] if label == "by hand at 2.5 s" else [])
+        for ours, other in ((case[label], expected[label]), *((islands[name], theirs[name]) for name in islands)):
+            never = {name for name in other if other[name] is None}
+            assert {name for name in ours if ours[name] is None} == never
+            assert [ours[name] for name in other if name not in never] == pytest.approx(
+                [other[name] for name in other if name not in never], rel=1e-6
+            )
+    assert metrics["by_hand"]["windows"] == {
+        "by hand at 2.5 s": {"t_s": 2.5, "end_s": 4.0, "what": "switch sw1_2 (67s-67) opened"},
+        "by hand at 7.5 s": {"t_s": 7.5, "end_s": 8.5, "what": "switch sw1_2 (67s-67) closed"},
+    }
+    assert metrics["by_hand"]["disturbed"] == ["event1", "event2"]
+    assert "by hand at 2.5 s" in report.splitlines()[1]
+    assert "by hand at 2.5 s: switch sw1_2 (67s-67) opened; by hand at 7.5 s: switch sw1_2 (67s-67) closed" in report
+    assert "paper's Table" not in report
