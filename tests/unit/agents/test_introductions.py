@@ -122,6 +122,19 @@ def test_a_death_after_being_ready_leaves_it_so() -> None:
     assert made.living(("inv2", "inv3")) == {"inv3": "c"}
 
 
+def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
+    """A link that was cut may have lost the subscription; the process is among the living again at once."""
+    made = met(B)
+    made.prepare(prepare(0, B))
+    made.vanished(B)
+    made.appeared(B)
+
+    assert made.living(("inv2",)) == {"inv2": "b"}
+    assert made.prepare(prepare(1, B)) == []
+    assert made.answered(B, plate("inv2")) == [Ask(B)]
+    assert made.answered(B, plate("inv2")) == [Confirm(1)]
+
+
 def test_an_earlier_life_is_a_ghost() -> None:
     """A nameplate older than the one that is known is refused."""
     made, ghost = met(B), Peer("inv2", "old")

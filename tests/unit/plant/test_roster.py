@@ -109,6 +109,7 @@ def test_who_leaves_is_told_before_its_inverter_goes_off() -> None:
     assert joining == ("inv4",)
     assert made.changed
     assert made.prepare(incarnation=1, t=0.1).roster == ("inv3",)
+    assert not made.changed
 
 
 def test_a_tick_without_moves_changes_nothing() -> None:

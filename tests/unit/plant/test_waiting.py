@@ -114,7 +114,7 @@ def test_each_wait_has_its_own_deadline() -> None:
     until.append(made.until)
     made.to_close(until=7.5)
     until.append(made.until)
-    assert made.missing(()) == ()
+    assert (made.missing(()), made.for_messages) == ((), False)
     made.be_over()
 
     assert [*until, made.until] == [11.0, 15.0, 7.5, None]
