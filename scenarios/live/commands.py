@@ -148,6 +148,10 @@ def watch(
 
     Example:  gridpeers watch --connect tcp/192.168.1.10:7447
     """
+    with told():
+        from scenarios.live.place import check_duration
+
+        check_duration(duration)
     with visit_to(run, connect, wait, meet_agents=True) as visit:
         from rich.console import Console
 

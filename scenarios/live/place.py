@@ -14,6 +14,9 @@ RUN = "gridpeers"
 ENDPOINT = "tcp/127.0.0.1:7447"
 """Where the plant listens and the others connect, unless told otherwise; 7447 is Zenoh's own port."""
 
+LONGEST = 1e9
+"""Longest time (s) that anything is told to take, some 30 years: clocks cannot tell much more."""
+
 _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
 )
@@ -89,6 +92,12 @@ def check_wait(wait: float) -> float:
     if not wait >= 0.0:
         raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
     return wait
+
+
+def check_duration(seconds: float | None) -> None:
+    """Raise UsageError if a duration (s) cannot be one; None has no end."""
+    if seconds is not None and not 0.0 < seconds <= LONGEST:
+        raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST:g} s, got {seconds:g} s")
 
 
 def check_inverter(name: str) -> None:

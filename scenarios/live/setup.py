@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import msgspec
@@ -10,7 +9,7 @@ import msgspec
 from agents.config import AgentConfig
 from plant.config import PlantConfig
 from plant.equipment import Feeder
-from scenarios.live.place import UsageError, check_wait
+from scenarios.live.place import LONGEST, UsageError, check_duration, check_wait
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
 from scenarios.spec.netem import netem_of, setup_of
@@ -98,7 +97,7 @@ def set_up(
         moves=(),  # by hand, people let agents leave and join
         end=end,
         connect=beyond,
-        wait_for_agents=wishes.wait,
+        wait_for_agents=min(wishes.wait, LONGEST),  # JSON has no infinity
         strict=wishes.strict,
         handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
     )
@@ -141,5 +140,4 @@ def _check(wishes: Wishes) -> None:
     if not least <= wishes.speed <= greatest:
         raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {wishes.speed:g}")
     check_wait(wishes.wait)
-    if wishes.duration is not None and not (math.isfinite(wishes.duration) and wishes.duration > 0.0):
-        raise UsageError(f"--for: must be a time of more than 0 s, got {wishes.duration:g} s")
+    check_duration(wishes.duration)

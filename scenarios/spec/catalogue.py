@@ -40,7 +40,7 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     Raises
     ------
     ScenarioError
-        If there is neither.
+        If there is neither, or the system does not let one look.
 
     Examples
     --------
@@ -55,10 +55,14 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     if name in names:
         return folder / f"{name}.toml"
     path = Path(name)
-    if path.is_file():
-        return path
     listed = ", ".join(names)
-    if path.is_dir():
+    try:
+        is_file, is_dir = path.is_file(), path.is_dir()
+    except OSError as error:  # a name too long, a folder that is closed to us
+        raise ScenarioError([f"{name}: cannot be read: {error.strerror}"]) from None
+    if is_file:
+        return path
+    if is_dir:
         raise ScenarioError([f"{name}: this is a folder; give a {what} file (.toml) or a name: {listed}"])
     if path.suffix == ".toml" or len(path.parts) > 1:
         raise ScenarioError([f"{name}: there is no such file; give the path of a {what} file, or a name: {listed}"])

@@ -75,6 +75,7 @@ def test_doc_prints_a_page(topic: str) -> None:
         (["run"], "Missing argument 'SCENARIO'"),
         (["run", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
         (["run", "nowhere.toml"], "nowhere.toml: there is no such file"),
+        (["check", "a" * 300], "cannot be read: File name too long"),
         (["run", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"? The cases are I, II, III, IV'),
         (["run", "islanding", "--case", ","], '--case: no case ","; the cases are I, II, III, IV'),
         (["run", "islanding", "--driver", "threads"], "Invalid value for '--driver'"),

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from agents.config import AgentConfig
+from plant.config import PlantConfig
 from scenarios.live import commands, place
 from scenarios.live.setup import Wishes, set_up
 from scenarios.spec import load_scenario
@@ -47,7 +48,10 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["plant", "islanding", "--speed", "0"], "--speed: must be from 0.1 to 50 (1 is real time), got 0"),
         (["plant", "islanding", "--wait", "-1"], "--wait: must be a time of at least 0 s, got -1 s"),
         (["plant", "islanding", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
-        (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s, got 0 s"),
+        (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s and at most 1e+09 s, got 0 s"),
+        (["up", "islanding", "--for", "1e308"], "at most 1e+09 s, got 1e+308 s"),
+        (["watch", "--for", "nan"], "--for: must be a time of more than 0 s and at most 1e+09 s, got nan s"),
+        (["watch", "--for", "-1"], "--for: must be a time of more than 0 s and at most 1e+09 s, got -1 s"),
         (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
         (["up", "islanding", "--record", "nowhere/it.toml"], "there is no folder nowhere; make it first"),
         (["up", "islanding", "--record", "full"], "--record full: is there already"),
@@ -125,3 +129,10 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
     assert {agent.control.graph for agent in agents} == {"GFM-only"}
     assert (handed["inv10"].microgrid, handed["inv10"].P_rated) == ("MG3", 350e3)
     assert handed["inv10"].name == "inv10"
+
+
+def test_a_plant_can_wait_for_its_agents_for_ever() -> None:
+    """An infinite --wait reaches the plant as a time that JSON can say."""
+    plant, _ = set_up(*load_scenario("islanding"), Wishes(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
+
+    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == place.LONGEST
