@@ -31,7 +31,7 @@ from agents.side import REPORT_TICKS, Side
 from agents.tally import Phase, Tally
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
-from wire.links import Links
+from wire.links import Links, arrived, is_taken
 from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop
 from wire.timer import Timer
 
@@ -272,7 +272,7 @@ class FreeAgent(Side):
         self.heard.came(message, now)
         self._cadence.measured(now)
         self._run_time = message.t
-        if not self._is_offered(message, payload, now * self._config.speed):
+        if not is_taken(self._links, message, payload, now * self._config.speed):
             self.heard.keep(message, now)
 
     def _check_life(self, message: AnyMessage) -> None:
@@ -297,7 +297,7 @@ class FreeAgent(Side):
 
     def _take_arrived(self, now: float) -> None:
         """Use what the emulated links have let through by now; what was overtaken is of no use."""
-        for message in self._arrived(now * self._config.speed):
+        for message in arrived(self._links, now * self._config.speed, self.rejects):
             if isinstance(message, Measurement):
                 if message.incarnation == self._plant_incarnation:
                     self.heard.keep(message, now)
@@ -319,7 +319,7 @@ class FreeAgent(Side):
         self.heard.came(message, now)
         if self._links is not None and not self.heard.has(PLANT):
             return  # the plant tells what was ordered before it sends a measurement: till then no link is known
-        if not self._is_offered(message, payload, now * self._config.speed):
+        if not is_taken(self._links, message, payload, now * self._config.speed):
             self._agent.hear(message)
             self.heard.keep(message, now)
 

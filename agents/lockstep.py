@@ -32,7 +32,7 @@ from agents.turn import Turn
 from wire.actions import Fetch, Listen
 from wire.clock import time_of
 from wire.codec import RejectedError, encode
-from wire.links import Links
+from wire.links import Links, arrived, is_taken
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
 
@@ -224,7 +224,7 @@ class AgentSide(Side):
         if not self._introductions.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         self._turn.grant(message)
-        if not self._is_offered(message, payload, message.t):
+        if not is_taken(self._links, message, payload, message.t):
             self._sensed = message
         self._patience.renew(now)
         self._compute(now)
@@ -240,12 +240,12 @@ class AgentSide(Side):
             self._compute(now)
 
     def _hear(self, state: State, payload: bytes) -> None:
-        if not self._is_offered(state, payload, state.t):
+        if not is_taken(self._links, state, payload, state.t):
             self._agent.hear(state)
 
     def _take_arrived(self, t: float) -> None:
         """Use what the emulated links have let through by t (s); what was overtaken is of no use."""
-        for message in self._arrived(t):
+        for message in arrived(self._links, t, self.rejects):
             if isinstance(message, State):
                 self._agent.hear(message)
             elif isinstance(message, Measurement) and (self._sensed is None or message.seq > self._sensed.seq):

@@ -118,26 +118,6 @@ class Side:
     def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
         raise NotImplementedError
 
-    def _is_offered(self, message: AnyMessage, payload: bytes, at: float) -> bool:
-        """Give a message to the link that it came over, if that is an emulated one; whether it was."""
-        links, src = self._links, message.sender
-        if links is None or src in links.clear or not links.touched(src):
-            return False
-        links.offer(src, message.seq, message.t, at, payload)
-        return True
-
-    def _arrived(self, now: float) -> list[AnyMessage]:
-        """What the emulated links have let through by now (s of run time), but for what they have garbled."""
-        messages: list[AnyMessage] = []
-        if self._links is None:
-            return messages
-        for arrival in self._links.due(now):
-            try:
-                messages.append(decode(arrival.payload))
-            except RejectedError as rejected:
-                self.rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
-        return messages
-
     def _report_links(self, *, final: bool = False) -> None:
         """Send what the emulated links did of late."""
         parts = () if self._links is None else self._links.report(last=final)

@@ -15,6 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, befor
 
 import platform
 import statistics
+import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
@@ -25,8 +26,7 @@ from typing import Any
 
 import floor
 
-import agents.lockstep
-import plant.lockstep
+import wire.codec
 from agents.agent import Agent
 from plant.build import build_plant
 from scenarios.drivers.fleet import run_processes
@@ -142,9 +142,10 @@ def breakdown(plant_config: Any, agent_configs: Any) -> dict[str, float]:
 
     kept = Agent.tick
     codecs = [
-        (module, name, getattr(module, name))
-        for module in (agents.lockstep, plant.lockstep)
-        for name in ("encode", "decode")
+        (module, name, function)
+        for name, function in (("encode", wire.codec.encode), ("decode", wire.codec.decode))
+        for module in list(sys.modules.values())
+        if getattr(module, name, None) is function
     ]
     try:
         Agent.tick = timed("agents: the law", kept)  # type: ignore[method-assign]

@@ -31,7 +31,7 @@ from wire.actions import Fetch, Say
 from wire.clock import time_of
 from wire.codec import RejectedError, decode, encode
 from wire.keys import check_name
-from wire.links import Links
+from wire.links import Links, is_taken
 from wire.messages import PLANT, Command, Leave, LinkAnswer, LinkOrder, LinkReport, Nameplate, PlantEvent, State
 
 Phase = Literal["gathering", "running", "closing", "over"]
@@ -200,7 +200,7 @@ class FreePlant(Side):
             if key in self._state_keys and isinstance(message, State):
                 self._check_sender(self._state_keys[key], message)
                 self._heard.came(message, now)
-                if not self._is_offered(message, payload, now * self.config.speed):
+                if not is_taken(self._links, message, payload, now * self.config.speed):
                     self._heard.keep(message)
             elif key in self._report_keys and isinstance(message, LinkReport):
                 self._publish(self.keys.telemetry, payload)
@@ -361,7 +361,7 @@ class FreePlant(Side):
         if not self._step_due:
             return False
         self._step_due = False
-        for state in self._arrived(now * self.config.speed):
+        for state in self._news(now * self.config.speed):
             if state.sender in self.plates:
                 self._heard.keep(state)
         for state in self._heard.take():

@@ -25,7 +25,7 @@ from plant.side import CLOSING, LINK_TICKS, Side
 from plant.waiting import Phase, Waiting
 from wire.actions import Fetch
 from wire.codec import RejectedError, decode, encode
-from wire.links import Links
+from wire.links import Links, is_taken
 from wire.messages import LinkReport, Nameplate, PlantEvent, Ready, State
 from wire.patience import Awaited
 
@@ -162,7 +162,7 @@ class PlantSide(Side):
             if key in self._state_keys and isinstance(message, State):
                 self._check_sender(self._state_keys[key], message)
                 self._waiting.state(message, self.tick)
-                if not self._is_offered(message, payload, message.t):
+                if not is_taken(self._links, message, payload, message.t):
                     self._states[name] = message
             elif key in self._ready_keys and isinstance(message, Ready):
                 self._check_sender(self._ready_keys[key], message)
@@ -261,7 +261,7 @@ class PlantSide(Side):
             self._report(final=False)
 
     def _finish_tick(self, now: float) -> None:
-        self._states.update((state.sender, state) for state in self._arrived(self.t))
+        self._states.update((state.sender, state) for state in self._news(self.t))
         for name in self._roster.names:
             if (state := self._states.get(name)) is not None:
                 self._plant.hold(name, state.P_set, state.V_set)

@@ -10,9 +10,9 @@ from plant.reporting import Reporter
 from plant.schedule import Schedule
 from wire.actions import Action, Publish, Say
 from wire.clock import ticks_until, time_of
-from wire.codec import RejectedError, Rejects, decode, encode
+from wire.codec import RejectedError, Rejects, encode
 from wire.keys import Keys, check_name
-from wire.links import Links
+from wire.links import Links, arrived
 from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Pacing, State, Stop
 
 CLOSING = 2.0
@@ -103,27 +103,11 @@ class Side:
         if plate is None or life != plate.incarnation:
             raise RejectedError("ghost", f"life {life} of {name} does not take part")
 
-    def _is_offered(self, state: State, payload: bytes, at: float) -> bool:
-        """Give a state to the link that it came over, if that is an emulated one; whether it was."""
-        links, src = self._links, state.sender
-        if links is None or src in links.clear or not links.touched(src):
-            return False
-        links.offer(src, state.seq, state.t, at, payload)
-        return True
-
-    def _arrived(self, now: float) -> Iterable[State]:
+    def _news(self, now: float) -> Iterable[State]:
         """States that the emulated links have let through by now (s of run time) and that are news."""
-        if self._links is None:
-            return
-        for arrival in self._links.due(now):
-            src = arrival.src
-            try:
-                state = decode(arrival.payload)
-            except RejectedError as rejected:
-                self.rejects.add(rejected.kind, f"the link from {src}", rejected.text)
-                continue
-            if isinstance(state, State) and state.seq > self._set_by.get(src, -1):
-                self._set_by[src] = state.seq
+        for state in arrived(self._links, now, self.rejects):
+            if isinstance(state, State) and state.seq > self._set_by.get(state.sender, -1):
+                self._set_by[state.sender] = state.seq
                 yield state
 
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from typing import Protocol
+
+from wire.codec import RejectedError, Rejects, decode
+from wire.messages import AnyMessage
 
 
 class Arrival(Protocol):
@@ -28,15 +31,11 @@ class Links(Protocol):
 
     @property
     def clear(self) -> Set[str]:
-        """Senders to whose messages nothing ever happens, as far as is known: asked of every message, so no call."""
+        """Senders whose messages `offer` is known not to take: asked of every message, so no call."""
         ...
 
-    def touched(self, src: str) -> bool:
-        """Whether anything might ever happen to messages from there; else they need not be offered."""
-        ...
-
-    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
-        """Take a message off the wire.
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> bool:
+        """Take a message off the wire, unless nothing ever happens to messages from there; whether it was taken.
 
         Parameters
         ----------
@@ -96,3 +95,36 @@ class Links(Protocol):
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out what the links did since last asked, for the record; the last time, something in any case."""
         ...
+
+
+def is_taken(links: Links | None, message: AnyMessage, payload: bytes, at: float) -> bool:
+    """Give a message to the link that it came over, if that is an emulated one: it then comes out of `arrived`.
+
+    Parameters
+    ----------
+    links : Links or None
+        All links into the receiver.
+    message, payload : AnyMessage, bytes
+        What came off the wire.
+    at : float
+        Now (s of run time, on the receiver's clock).
+
+    Returns
+    -------
+    bool
+        Whether the link has it. Else nothing stands between, and it counts at once.
+    """
+    if links is None or message.sender in links.clear:
+        return False
+    return links.offer(message.sender, message.seq, message.t, at, payload)
+
+
+def arrived(links: Links | None, now: float, rejects: Rejects) -> Iterator[AnyMessage]:
+    """What the links have let through by now (s of run time); what they have garbled is counted and dropped."""
+    if links is None:
+        return
+    for arrival in links.due(now):
+        try:
+            yield decode(arrival.payload)
+        except RejectedError as rejected:
+            rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)

@@ -42,7 +42,7 @@ class EmulatedLinks:
         self._name, self._microgrids, self._setup = name, setup.microgrids, setup
         self._senders = tuple(src for src in (*setup.microgrids, PLANT) if src != name)
         self.clear: set[str] = set()
-        """Senders to whose messages nothing ever happens, as far as is known."""
+        """Senders whose messages `offer` is known not to take."""
         self.restart()
         self._spells: dict[str, list[_Spell]] = {}
         self._paused: Counter[str] = Counter()
@@ -51,25 +51,22 @@ class EmulatedLinks:
             if node.slow_s or (node.pause and not setup.real_nodes):
                 self._spells.setdefault(node.name, []).append(_spell(node))
 
-    def touched(self, src: str) -> bool:
-        """Whether anything might ever happen to messages from there."""
-        if src in self._spells or self._name in self._spells or self._receiver.touched(src):
-            return True
-        self.clear.add(src)
-        return False
-
-    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
-        """Take a message off the wire; see `netem.receiver.Receiver.offer`."""
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> bool:
+        """Take a message off the wire, unless nothing ever happens to those from there; see `Receiver.offer`."""
+        if not (src in self._spells or self._name in self._spells or self._receiver.touched(src)):
+            self.clear.add(src)
+            return False
         for spell in self._spells.get(src, ()):
             if spell.since <= t < spell.until:
                 if math.isinf(spell.slow):
                     self._paused[src] += 1
-                    return
+                    return True
                 at += spell.slow
         for spell in self._spells.get(self._name, ()):
             if spell.since <= t < spell.until and math.isinf(spell.slow):
                 at += spell.until - t
         self._receiver.offer(src, seq, t, at, payload)
+        return True
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out what has arrived by now (s of run time)."""
