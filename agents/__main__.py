@@ -1,4 +1,4 @@
-"""One agent: ``python -m agents < agent.json``. Exit statuses: see `wire.process`."""
+"""One agent: ``python -m agents < agent.json``. Exit statuses: see `wire.driver.process`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 from agents.config import AgentConfig
 from agents.runtime import run_agent
-from wire.process import main
+from wire.driver.process import main
 
 if __name__ == "__main__":
     sys.exit(main("agents", "the agent of one inverter", AgentConfig, run_agent))

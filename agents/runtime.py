@@ -10,10 +10,10 @@ from msgspec.structs import replace
 from agents.config import AgentConfig
 from agents.freerun import FreeAgent
 from agents.lockstep import AgentSide
-from wire.drive import StoppedError, drive, serve
+from wire.driver.drive import StoppedError, drive, serve
+from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.session import Session
 from wire.keys import check_name
-from wire.process import ConfigurationError, MakeLinks, no_links
-from wire.session import Session
 
 
 def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:

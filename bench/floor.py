@@ -14,7 +14,7 @@ from collections import Counter
 from time import monotonic, perf_counter
 
 from scenarios.drivers.rendezvous import rendezvous
-from wire.session import Session
+from wire.driver.session import Session
 
 ROOT = "gridpeers/floor"
 HELLO_PERIOD = 0.02

@@ -13,8 +13,8 @@ from contextlib import suppress
 from struct import pack, unpack_from
 from time import monotonic_ns
 
-from wire.inbox import Event, Inbox
-from wire.session import Session
+from wire.driver.inbox import Event, Inbox
+from wire.driver.session import Session
 
 STAMP = 8
 """Bytes of a time (ns)."""

@@ -20,9 +20,9 @@ from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import F_NOM
 from wire.codec import decode, encode
+from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import PLANT, AgentStatus, Command, Measurement, PlantEvent, State, Telemetry
-from wire.session import Session
 
 RUN = "latency"
 OBSERVER = "observer"

@@ -1,4 +1,4 @@
-"""The plant: ``python -m plant < plant.json``. Exit statuses: see `wire.process`."""
+"""The plant: ``python -m plant < plant.json``. Exit statuses: see `wire.driver.process`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 from plant.config import PlantConfig
 from plant.runtime import run_plant
-from wire.process import main
+from wire.driver.process import main
 
 if __name__ == "__main__":
     sys.exit(main("plant", "the feeder and its inverters", PlantConfig, run_plant))

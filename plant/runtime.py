@@ -14,10 +14,10 @@ from plant.config import PlantConfig
 from plant.freerun import FreePlant
 from plant.interface import LivePlant
 from plant.lockstep import PlantSide
-from wire.drive import StoppedError, drive, perform
+from wire.driver.drive import StoppedError, drive, perform
+from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.session import Session
 from wire.messages import PLANT
-from wire.process import ConfigurationError, MakeLinks, no_links
-from wire.session import Session
 
 LISTENING, COMPILING, READY = "listening", "compiling", "ready"
 """Words on standard output, one a line: the rendezvous is there; the step is being compiled, which takes up to a minute

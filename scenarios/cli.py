@@ -30,7 +30,7 @@ from scenarios.usage import (
     load,
     require,
 )
-from wire.output import speaking
+from wire.driver.output import speaking
 
 app = typer.Typer(
     add_completion=False,

@@ -17,7 +17,7 @@ import msgspec
 
 from agents.config import AgentConfig
 from plant.config import PlantConfig
-from plant.pacing import sentence
+from plant.freerun.pacing import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.emulation.setup import Setup
@@ -34,8 +34,8 @@ from scenarios.results.report import Report, plain
 from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.writing import to_toml
+from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
-from wire.output import OutputLostError
 
 Driver = Literal["processes", "inprocess"]
 """How a case is run: as one process per agent over Zenoh, or all in this process."""

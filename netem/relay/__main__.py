@@ -9,7 +9,7 @@ import sys
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
 from netem.relay.faults import UNITS
 from netem.relay.words import HELP
-from wire.output import speaking
+from wire.driver.output import speaking
 
 OK, USAGE = 0, 2
 

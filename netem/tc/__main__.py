@@ -8,7 +8,7 @@ import sys
 
 from netem.relay.faults import UNITS, Faults, FaultsError
 from netem.tc import Impaired, TcError, netem_steps, steps_without_netem, why_no_netem
-from wire.output import speaking
+from wire.driver.output import speaking
 
 OK, NO, USAGE = 0, 1, 2
 

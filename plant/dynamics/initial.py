@@ -15,9 +15,9 @@ from scipy.optimize import root
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.phasors import PHASES, aligned_sum
 from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
-from plant.dynamics.solve import solve_network
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.config import GflParameters, GfmParameters
-from plant.dynamics import gfl as gfl_model
-from plant.dynamics import gfm as gfm_model
+from plant.dynamics.kernel import gfl as gfl_model
+from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.reduction import Real
 
 
@@ -49,9 +49,9 @@ class Inverters:
     forming : bool[n]
         Which are GFM.
     gfm, gfm_at, gfm_state
-        Records of `plant.dynamics.gfm.PARAMETERS`, the inverter each belongs to, and their states.
+        Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
     gfl, gfl_at, gfl_state
-        The same for `plant.dynamics.gfl`.
+        The same for `plant.dynamics.kernel.gfl`.
     S_b, V_b, m_p, m_q : float64[n]
         Ratings (VA), nominal voltages (V) and droops (pu per pu).
     S_max : float64[n]

@@ -7,8 +7,8 @@ import numpy as np
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
-from plant.dynamics.solve import solve_network
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in a network solution's last iteration (pu of the highest nominal)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics.arithmetic import A120
+from plant.dynamics.kernel.arithmetic import A120
 from plant.dynamics.reduction import Complex
 
 PHASES = np.array([1.0, A120.conjugate(), A120])

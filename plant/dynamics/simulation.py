@@ -11,10 +11,10 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
+from plant.dynamics.kernel.step import READING, run_steps
 from plant.dynamics.live import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduction import Complex, Real
-from plant.dynamics.step import READING, run_steps
 
 
 class Dynamics:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics import gfl as gfl_model
-from plant.dynamics.arithmetic import OMEGA_0
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.kernel import gfl as gfl_model
+from plant.dynamics.kernel.arithmetic import OMEGA_0
 from plant.dynamics.live import LiveNetwork
 from plant.dynamics.phasors import PHASES, aligned_sum
 

@@ -1,6 +1,6 @@
 """The three-phase network of a feeder: nodes, switches, admittance matrix, islands, and a plain power flow."""
 
-from plant.merging import Merge
+from plant.network.merging import Merge
 from plant.network.network import Network
 from plant.network.powerflow import PowerFlow, solve_power_flow
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
-from plant.loads import LoadBranches
-from plant.merging import Merge, merge_nodes
+from plant.network.loads import LoadBranches
+from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
 from wire.nearest import suggestion
 

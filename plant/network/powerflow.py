@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
-from plant.loads import LoadBranches
+from plant.network.loads import LoadBranches
 from plant.network.network import Network
 
 Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]

@@ -1,7 +1,7 @@
 """Child processes: started with a configuration on standard input, watched, and always ended.
 
 Each child is its own process group, so Ctrl-C reaches the parent only, which then ends them in order. If the parent
-dies without a chance to do that, their standard input ends, and they leave (`wire.process`).
+dies without a chance to do that, their standard input ends, and they leave (`wire.driver.process`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from types import TracebackType
 
 import msgspec
 
-from wire.process import LEASH
+from wire.driver.process import LEASH
 
 LAST_LINES = 12
 """Lines of a log that are shown when its process died."""

@@ -19,9 +19,9 @@ from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
 from wire.codec import RejectedError, Rejects, decode
+from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
-from wire.session import Session
 
 RECORDER = "fleet"
 """Name of the fleet's recorder in its run."""

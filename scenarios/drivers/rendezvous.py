@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import socket
 
-from wire.session import SessionError
+from wire.driver.session import SessionError
 
 _OWN = range(20_000, 32_000)
 """Ports that no system gives to whoever asks for any (Linux begins at 32768). One of those the agents, who start with

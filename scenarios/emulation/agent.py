@@ -7,7 +7,7 @@ import sys
 from agents.config import AgentConfig
 from agents.runtime import run_agent
 from scenarios.emulation.links import links_of
-from wire.process import main
+from wire.driver.process import main
 
 
 def run(config: AgentConfig) -> str:

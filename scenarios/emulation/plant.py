@@ -7,7 +7,7 @@ import sys
 from plant.config import PlantConfig
 from plant.runtime import run_plant
 from scenarios.emulation.links import links_of
-from wire.process import main
+from wire.driver.process import main
 
 
 def run(config: PlantConfig) -> str:

@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 
 from agents.config import AgentConfig
-from agents.hearing import Hearing
+from agents.freerun.hearing import Hearing
 from scenarios.live.show.look import Look, in_order
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit

@@ -11,9 +11,9 @@ from scenarios.live.book import Book
 from scenarios.live.show.events import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.codec import RejectedError, decode
+from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import LinkOrder, LinkReport, Pacing, Telemetry
-from wire.session import Session
 
 _STOP = "stop"
 

@@ -10,7 +10,7 @@ import typer
 from scenarios.live.link_commands import link
 from scenarios.live.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
 from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
-from wire.output import watch_readers
+from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
     from scenarios.live.hand import Ended

@@ -18,7 +18,7 @@ import msgspec
 from agents.config import AgentConfig
 from agents.runtime import run_agent
 from plant.config import PlantConfig
-from plant.pacing import sentence
+from plant.freerun.pacing import sentence
 from plant.runtime import COMPILING, READY, run_plant
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.misfortunes import Misfortunes
@@ -30,7 +30,7 @@ from scenarios.live.place import Place, near
 from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
 from scenarios.results.record import Recorded
-from wire.drive import StoppedError
+from wire.driver.drive import StoppedError
 from wire.messages import PLANT, Pacing
 
 LOGGED = ("roster", "warning")

@@ -45,8 +45,8 @@ def told() -> Iterator[None]:
     from scenarios.live.place import UsageError
     from scenarios.live.visit import NobodyError
     from scenarios.results.folder import FolderError
-    from wire.process import ConfigurationError
-    from wire.session import SessionError
+    from wire.driver.process import ConfigurationError
+    from wire.driver.session import SessionError
 
     try:
         yield

@@ -25,7 +25,7 @@ ACKNOWLEDGED = 4.0
 
 
 class _Taken(msgspec.Struct, frozen=True):
-    """The plant's answer; see `plant.service`."""
+    """The plant's answer; see `plant.freerun.service`."""
 
     number: int
     t: float

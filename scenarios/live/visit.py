@@ -7,8 +7,8 @@ from time import monotonic
 from types import TracebackType
 
 from scenarios.live.place import Place, UsageError, return_path
+from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
-from wire.session import Session
 
 VISITOR = "visitor"
 

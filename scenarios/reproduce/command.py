@@ -68,7 +68,7 @@ def _reproduce(
     from scenarios.reproduce.writing import write
     from scenarios.results.folder import FolderError, new_folder, refusal, set_broken, shown
     from scenarios.run import BrokenRunError
-    from wire.output import OutputLostError
+    from wire.driver.output import OutputLostError
 
     now = datetime.now().astimezone()
     try:

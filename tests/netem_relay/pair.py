@@ -15,8 +15,8 @@ from types import TracebackType
 
 from netem.relay.faults import Faults
 from netem.tc import Impaired, steps_without_netem
-from wire.inbox import Event, Inbox
-from wire.session import Session
+from wire.driver.inbox import Event, Inbox
+from wire.driver.session import Session
 
 KEY = "gridpeers/pair/probe"
 HELLO = -1

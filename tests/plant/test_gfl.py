@@ -8,7 +8,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from plant.config import GflParameters
-from plant.dynamics import Dynamics, gfl
+from plant.dynamics import Dynamics
+from plant.dynamics.kernel import gfl
 from tests.plant.circuits import BALANCED, GFL_D, S_B, V_B, on_stiff_bus
 from tests.plant.test_gfm import crossing
 

@@ -10,7 +10,7 @@ import numpy as np
 from agents.agent import Agent
 from plant.build import build_plant
 from plant.equipment import Feeder
-from plant.lockstep import measurement_of
+from plant.reporting import measurement_of
 from scenarios.predict.fleet import Fleet, fleet_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index

@@ -21,7 +21,7 @@ from scenarios.drivers.rendezvous import rendezvous
 from tests.toy import toy_plant
 from tests.toy.runs import FleetRun
 from tests.toy.toy_configs import agent_config, toy_configs
-from wire.session import SessionError
+from wire.driver.session import SessionError
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -221,7 +221,7 @@ def test_an_agent_alone_gives_up() -> None:
 def test_an_agent_imports_nothing_heavy() -> None:
     """Nine agents start in the time of one: neither numpy nor numba are in them."""
     heavy = ("numpy", "scipy", "numba", "matplotlib", "asyncio")
-    code = f"import sys, agents.runtime, wire.process; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, agents.runtime, wire.driver.process; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
 
     assert done.stdout == "[]\n"

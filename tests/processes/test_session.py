@@ -6,7 +6,7 @@ from time import monotonic
 import pytest
 
 from scenarios.drivers.rendezvous import rendezvous
-from wire.session import Session, SessionError
+from wire.driver.session import Session, SessionError
 
 
 def test_a_port_in_use_is_explained() -> None:

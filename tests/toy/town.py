@@ -16,6 +16,7 @@ from scenarios.results.links import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
 from wire.codec import decode, encode
+from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import (
     AgentStatus,
@@ -28,7 +29,6 @@ from wire.messages import (
     State,
     Telemetry,
 )
-from wire.session import Session
 
 PATIENCE = 20.0
 """Longest wait (s) for anything; a busy machine is slow, and nothing here should take a tenth of it."""

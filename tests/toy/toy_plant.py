@@ -12,8 +12,8 @@ from typing import NamedTuple
 from plant.config import PlantConfig
 from plant.runtime import run_plant
 from scenarios.emulation.links import links_of
+from wire.driver.process import main
 from wire.messages import PlantEvent
-from wire.process import main
 
 M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
 """Droop (pu), nominal frequency (Hz) and voltage (V), rating (W), load per inverter in the island (pu)."""

@@ -10,7 +10,7 @@ from scenarios.live.folders import Folders
 from scenarios.live.hand import Ended
 from scenarios.live.numbers.account import Account
 from scenarios.results.report import show
-from wire.drive import StoppedError
+from wire.driver.drive import StoppedError
 
 
 def conclude(ended: Ended, account: Account, kept: Folders) -> Ended:

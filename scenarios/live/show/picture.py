@@ -26,7 +26,7 @@ _KEPT = 100
 
 
 class Standing(msgspec.Struct, frozen=True, kw_only=True):
-    """What the plant answers to "status", as far as it is shown; see `plant.service`."""
+    """What the plant answers to "status", as far as it is shown; see `plant.freerun.service`."""
 
     phase: str
     """gathering, running or closing."""

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from agents.cadence import CONVINCED, EARLIEST, LATEST, Cadence
+from agents.freerun.cadence import CONVINCED, EARLIEST, LATEST, Cadence
 
 T = 0.020
 

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import Control, GraphRule
-from agents.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
+from agents.lockstep.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
 from tests.toy.toy_configs import agent_config
 from wire.codec import RejectedError
 from wire.messages import Nameplate, Prepare

@@ -6,7 +6,7 @@ from itertools import permutations
 
 import pytest
 
-from agents.turn import Turn
+from agents.lockstep.turn import Turn
 from wire.codec import RejectedError
 from wire.messages import PLANT, Measurement, State
 from wire.patience import Awaited

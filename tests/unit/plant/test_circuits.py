@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from plant.circuits import Circuits
 from plant.dynamics import PlantError
 from plant.equipment import InverterRow, Load, Regulator, Switch
+from plant.feeder.circuits import Circuits
 from plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.dynamics import compiled
+from plant.dynamics.kernel import compiled
 
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
 

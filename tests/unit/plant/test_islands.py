@@ -1,8 +1,8 @@
 import numpy as np
 
-from plant.circuits import Circuits
 from plant.dynamics.reduction import Reduction
-from plant.islands import Islands
+from plant.feeder.circuits import Circuits
+from plant.feeder.islands import Islands
 from plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, opened
 

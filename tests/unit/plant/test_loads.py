@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from plant.equipment import Bus, Feeder, Load
-from plant.merging import Merge
 from plant.network import Network
+from plant.network.merging import Merge
 from plant.tables import read_feeder
 
 V_NOM = 2400.0

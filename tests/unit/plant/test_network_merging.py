@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from plant.equipment import Line, LineConfig
-from plant.merging import merge_nodes
 from plant.network import Network, solve_power_flow
+from plant.network.merging import merge_nodes
 from tests.unit.plant.networks import PAPER_ISLANDS, diagonal, opened
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from plant.pacing import FIRST, Pacer, sentence
+from plant.freerun.pacing import FIRST, Pacer, sentence
 
 
 def test_percentiles_are_those_of_the_delays() -> None:

@@ -7,7 +7,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from plant.config import Move
-from plant.roster import Ask, Break, Connect, Dismiss, Note, Refuse, Roster
+from plant.lockstep.roster import Ask, Break, Connect, Dismiss, Note, Refuse, Roster
 from plant.schedule import Schedule
 from tests.toy.toy_configs import agent_config, toy_configs
 from wire.messages import Nameplate

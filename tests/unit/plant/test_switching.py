@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 
 from plant.dynamics import Circuit, Dynamics, PlantError
-from plant.dynamics.arithmetic import OMEGA_0
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.kernel.arithmetic import OMEGA_0
 from tests.plant.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, at_rest, loaded, lone, on_stiff_bus, pair
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from plant.roster import Roster
+from plant.lockstep.roster import Roster
+from plant.lockstep.waiting import Waiting
 from plant.schedule import Schedule
-from plant.waiting import Waiting
 from tests.toy.toy_configs import toy_configs
 from wire.codec import RejectedError
 from wire.messages import Ready, State

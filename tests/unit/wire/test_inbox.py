@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from wire.inbox import Inbox
+from wire.driver.inbox import Inbox
 
 
 def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from agents.freerun import FreeAgent
-from agents.orders import Orders as AgentOrders
+from agents.freerun.orders import Orders as AgentOrders
 from netem.spec.change import Heal, schedule_of
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.pattern import Link, links_among
 from plant.freerun import FreePlant
-from plant.orders import Orders as PlantOrders
+from plant.freerun.orders import Orders as PlantOrders
 from scenarios.drivers import misfortunes
 from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.emulation.links import EmulatedLinks

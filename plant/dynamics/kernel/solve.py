@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.arithmetic import multiply_add
-from plant.dynamics.compiled import compiled
+from plant.dynamics.kernel.arithmetic import multiply_add
+from plant.dynamics.kernel.compiled import compiled
 
 MAX_ITERATIONS = 60
 

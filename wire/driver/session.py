@@ -13,10 +13,10 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from wire.foreign import keep_thread_state
-from wire.inbox import Inbox, Kind, Stamped
+from wire.driver.foreign import keep_thread_state
+from wire.driver.inbox import Inbox, Kind, Stamped
+from wire.driver.lingering import do_not_linger
 from wire.keys import LATEST_ONLY
-from wire.lingering import do_not_linger
 
 if TYPE_CHECKING:
     import zenoh

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant.circuits import Circuits
 from plant.config import PlantSettings, PowerLimit
 from plant.dynamics import Dynamics, Inverter, PlantError
-from plant.islands import GRID, Islands
+from plant.feeder.circuits import Circuits
+from plant.feeder.islands import GRID, Islands
+from plant.feeder.switchboard import Switchboard
 from plant.network import Network
-from plant.switchboard import Switchboard
 from wire.messages import PlantEvent
 
 __all__ = ["GRID", "Plant", "Reading"]

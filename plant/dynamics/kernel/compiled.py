@@ -2,7 +2,7 @@
 
 Numba's cache looks only at the file of the function that is called, not at the files of the functions which
 that one calls: after an edit in `gfm.py` the old `step.py` kernel would still be loaded. So the cache
-folder carries a hash of all of the plant's compiled sources.
+folder carries a hash of all files of this package.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _HERE = Path(__file__).parent
 def _cache_folder() -> str:
     """Folder of this source's kernels: beside the source, or the user's cache where that is read-only."""
     digest = hashlib.sha256()
-    for name in ("compiled.py", "gfm.py", "gfl.py", "arithmetic.py", "solve.py", "step.py"):
-        digest.update((_HERE / name).read_bytes())
+    for source in sorted(_HERE.glob("*.py")):
+        digest.update(source.read_bytes())
     beside = _HERE / "__pycache__"
     if os.access(beside if beside.exists() else _HERE, os.W_OK):
         base = beside

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Literal
 
-from plant.roster import Roster
+from plant.lockstep.roster import Roster
 from wire.codec import RejectedError
 from wire.messages import PLANT, Ready, State
 from wire.patience import Awaited, Patience

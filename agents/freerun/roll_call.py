@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agents.heard import Heard
-from agents.hearing import Hearing
-from agents.peers import Peers
+from agents.freerun.heard import Heard
+from agents.freerun.hearing import Hearing
+from agents.freerun.peers import Peers
 from wire.messages import PLANT
 
 SILENT = 1.0

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.arithmetic import A120
-from plant.dynamics.compiled import compiled
-from plant.dynamics.gfl import F_NOM, advance_gfl
-from plant.dynamics.gfm import advance_gfm
-from plant.dynamics.solve import solve_network
+from plant.dynamics.kernel.arithmetic import A120
+from plant.dynamics.kernel.compiled import compiled
+from plant.dynamics.kernel.gfl import F_NOM, advance_gfl
+from plant.dynamics.kernel.gfm import advance_gfm
+from plant.dynamics.kernel.solve import solve_network
 
 READING = 4
 """Numbers recorded per inverter and step: f (Hz), P (W), Q (var), V (V)."""
@@ -66,9 +66,9 @@ def run_steps(
     net
         A `plant.dynamics.reduction.Reduced`.
     gfm, gfm_at, gfm_state
-        Records of `plant.dynamics.gfm.PARAMETERS`, the inverter each belongs to, and their states.
+        Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
     gfl, gfl_at, gfl_state
-        The same for `plant.dynamics.gfl`.
+        The same for `plant.dynamics.kernel.gfl`.
     online
         Inverters that are connected and in a live island.
     set_points

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from plant.dynamics import Circuit, PlantError
-from plant.loads import LoadBranches
 from plant.network import Network
+from plant.network.loads import LoadBranches
 
 
 class Circuits:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from agents.config import AgentConfig
-from agents.heard import Heard
+from agents.freerun.heard import Heard
 from wire.messages import AgentStatus
 
 Phase = Literal["seeking", "waiting", "running"]

@@ -20,12 +20,12 @@ from __future__ import annotations
 from typing import Literal
 
 from plant.config import PlantConfig
-from plant.heard import Heard
+from plant.freerun.heard import Heard
+from plant.freerun.ordering import Ordering
+from plant.freerun.pacing import Pacer
+from plant.freerun.service import Service
 from plant.interface import LivePlant
-from plant.ordering import Ordering
-from plant.pacing import Pacer
 from plant.reporting import measurement_of
-from plant.service import Service
 from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Fetch, Say
 from wire.clock import time_of

@@ -10,8 +10,8 @@ A driver (`agents.runtime` over Zenoh, `scenarios.drivers.inprocess` on a bus) d
 until `side.over`, the last actions included. `now` is the driver's clock (s) and serves deadlines only: nothing that is
 computed depends on it.
 
-How it finds the others, and when it is ready to tick with them, is written in `agents.introductions`; what it waits for
-at each tick, in `agents.turn`.
+How it finds the others, and when it is ready to tick with them, is written in `introductions`; what it waits for at
+each tick, in `turn`.
 
 **No deadlock.** State(k) waits for Measurement(k) and States(k-1) only, Measurement(k) for States(k-1) only: every
 wait is for something earlier, so the earliest thing not yet sent always can be, if its sender lives. The token of a
@@ -26,9 +26,9 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import AgentConfig
-from agents.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
+from agents.lockstep.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
+from agents.lockstep.turn import Turn
 from agents.side import REPORT_TICKS, Side
-from agents.turn import Turn
 from wire.actions import Fetch, Listen
 from wire.clock import time_of
 from wire.codec import RejectedError, encode

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.config import GfmParameters
-from plant.dynamics.arithmetic import OMEGA_0, heun, sat
-from plant.dynamics.compiled import compiled
+from plant.dynamics.kernel.arithmetic import OMEGA_0, heun, sat
+from plant.dynamics.kernel.compiled import compiled
 
 PARAMETERS = np.dtype(
     [

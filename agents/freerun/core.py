@@ -21,14 +21,14 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from agents.cadence import Cadence
 from agents.config import AgentConfig
-from agents.heard import Heard
-from agents.orders import Orders
-from agents.peers import Peers
-from agents.roll_call import RollCall
+from agents.freerun.cadence import Cadence
+from agents.freerun.heard import Heard
+from agents.freerun.orders import Orders
+from agents.freerun.peers import Peers
+from agents.freerun.roll_call import RollCall
+from agents.freerun.tally import Phase, Tally
 from agents.side import REPORT_TICKS, Side
-from agents.tally import Phase, Tally
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
 from wire.links import Links, arrived, is_taken

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from plant.orders import Orders
+from plant.freerun.orders import Orders
 from wire.codec import RejectedError, encode
 from wire.keys import Keys, check_name
 from wire.links import Links

@@ -12,17 +12,17 @@ until `side.over`, the last actions included. `now` is the driver's clock (s) an
 
 With everybody there it sends `Prepare` with the roster; with everybody ready, Measurement(0). When the whole roster has
 sent State(k), the set-points are held, the plant goes on to k+1, and sends Measurement(k+1), and so on. The phases of
-this are written in `plant.waiting`, who takes part in `plant.roster`; why there is no deadlock, in `agents.lockstep`.
+this are written in `waiting`, who takes part in `roster`; why there is no deadlock, in `agents.lockstep.core`.
 """
 
 from __future__ import annotations
 
 from plant.config import PlantConfig
 from plant.interface import PlantLike
+from plant.lockstep.roster import Ask, Break, Connect, Dismiss, Note, Refuse, Roster, Step
+from plant.lockstep.waiting import Phase, Waiting
 from plant.reporting import measurement_of
-from plant.roster import Ask, Break, Connect, Dismiss, Note, Refuse, Roster, Step
 from plant.side import CLOSING, LINK_TICKS, Side
-from plant.waiting import Phase, Waiting
 from wire.actions import Fetch
 from wire.codec import RejectedError, decode, encode
 from wire.links import Links, is_taken

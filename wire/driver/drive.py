@@ -9,7 +9,7 @@ from typing import Protocol
 
 from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import Rejects
-from wire.session import Session
+from wire.driver.session import Session
 
 
 class Core(Protocol):

@@ -17,10 +17,10 @@ from typing import TypeVar
 
 import msgspec
 
-from wire.drive import StoppedError
+from wire.driver.drive import StoppedError
+from wire.driver.output import watch_readers
+from wire.driver.session import SessionError
 from wire.links import Links
-from wire.output import watch_readers
-from wire.session import SessionError
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from agents.agent import Agent
-from agents.claims import Claims
+from agents.freerun.claims import Claims
 from wire.codec import RejectedError
 from wire.messages import Nameplate
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.config import GflParameters
-from plant.dynamics.arithmetic import A120, OMEGA_0, heun, sat
-from plant.dynamics.compiled import compiled
+from plant.dynamics.kernel.arithmetic import A120, OMEGA_0, heun, sat
+from plant.dynamics.kernel.compiled import compiled
 
 F_NOM = 60.0
 """Nominal frequency (Hz)."""
@@ -76,7 +76,7 @@ STATE = np.dtype(
 
 
 def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> NDArray[np.void]:
-    """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.gfm.pack`.
+    """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.kernel.gfm.pack`.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.merging import Merge
+from plant.network.merging import Merge
 
 
 @dataclass(frozen=True, kw_only=True)

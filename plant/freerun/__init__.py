@@ -1,0 +1,5 @@
+"""The plant in wall-clock time: it keeps its pace, whoever comes and goes. Pure."""
+
+from plant.freerun.core import LEAD, FreePlant
+
+__all__ = ["LEAD", "FreePlant"]
