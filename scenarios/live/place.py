@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import socket
 from dataclasses import dataclass
@@ -16,6 +17,9 @@ ENDPOINT = "tcp/127.0.0.1:7447"
 
 LONGEST = 1e9
 """Longest time (s) that anything is told to take, some 30 years: clocks cannot tell much more."""
+
+PROBE = 1.0
+"""Longest wait (s) for a TCP connection, to see whether anybody listens."""
 
 _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
@@ -163,11 +167,42 @@ def claim(option: str, text: str) -> str:
             probe.listen()
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise UsageError(
-                f"{option}: {text} cannot be listened on: {reason}; end what uses it (gridpeers down "
-                "ends a run there), or choose another port, here by --listen and for the others by --connect"
-            ) from None
+            raise UsageError(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
         return f"{match['protocol']}/{host}:{probe.getsockname()[1]}{match['rest'] or ''}"
+
+
+def _way_out(host: str, error: OSError) -> str:
+    """What to do when an address cannot be listened on."""
+    if isinstance(error, socket.gaierror):
+        return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
+    if error.errno == errno.EADDRINUSE:
+        return (
+            "end what uses it (gridpeers down ends a run there; a frozen plant goes on with kill -CONT, or ends by its "
+            "process id), or choose another port, here by --listen and for the others by --connect"
+        )
+    if error.errno == errno.EADDRNOTAVAIL:
+        return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
+    return "choose another address or port, here by --listen and for the others by --connect"
+
+
+def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of some endpoints that accept a TCP connection, whether or not anything is said on it.
+
+    Of a stopped process the system accepts connections in its stead.
+    """
+    return tuple(text for text in connect if _accepts(text))
+
+
+def _accepts(text: str) -> bool:
+    match = _FORM.fullmatch(text)
+    assert match is not None
+    if match["protocol"] not in ("tcp", "tls"):
+        return False
+    try:
+        with socket.create_connection((match["host"].strip("[]"), int(match["port"])), PROBE):
+            return True
+    except OSError:
+        return False
 
 
 def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:

@@ -6,14 +6,17 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.live.place import Place, UsageError, return_path
+from scenarios.live.place import Place, UsageError, accepting, return_path
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
 
 VISITOR = "visitor"
 
 REMINDER = 2.0
-"""A wait is said again after so long (s)."""
+"""A wait is said again after so long (s), then after twice as long, and so on."""
+
+RENEWAL = 2.0
+"""Time (s) between two looks at whether the session has gone astray."""
 
 LOOKING = 1.5
 """Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
@@ -124,30 +127,55 @@ class Visit:
         wait : float
             Longest wait (s).
         tell : Callable[[str], None], optional
-            Told, every few seconds, for what one waits.
+            Told for what one waits: now and then, ever more rarely, and at once if plants of other runs are there.
 
         Raises
         ------
         NobodyError
             If there is none in time.
         """
-        began = monotonic()
-        while not self.until(lambda: self.plant, min(REMINDER, began + wait - monotonic())):
-            waited = monotonic() - began
-            if waited >= wait:
+        began = looked = monotonic()
+        reminder = REMINDER
+        strangers: set[str] = set()
+        while True:
+            pause = min(looked + RENEWAL, began + reminder, began + wait) - monotonic()
+            self.until(lambda: self.plant or not self._others <= strangers, pause)
+            now = monotonic()
+            if self.plant:
+                return
+            if not self._others <= strangers:
+                strangers.update(self._others)
+                if tell is not None:
+                    tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
+            if now - began >= wait:
                 raise NobodyError(self._nobody(wait))
-            if self._session.misplaced:
-                self.renew()
-            if tell is not None:
-                tell(f"no plant yet of {self.where}; {waited:.0f} of {wait:g} s waited")
+            if now - looked >= RENEWAL:
+                looked = now
+                if self._session.misplaced:
+                    self.renew()
+            if now - began >= reminder:
+                reminder *= 2.0
+                if tell is not None:
+                    tell(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+
+    @property
+    def _others(self) -> set[str]:
+        """Other runs whose plants are there."""
+        return self._runs - {self.where.run}
 
     def _nobody(self, wait: float) -> str:
         if not self._session.peers():
+            if mute := accepting(self.where.connect):
+                return (
+                    f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
+                    "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
+                    "--connect where the plant is"
+                )
             return (
                 f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
                 "(gridpeers plant SCENARIO), or say by --connect where it is"
             )
-        others = sorted(self._runs - {self.where.run})
+        others = sorted(self._others)
         there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
         return (
             f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "

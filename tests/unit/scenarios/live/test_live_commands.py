@@ -102,6 +102,21 @@ def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
     ]
 
 
+def test_something_that_listens_in_silence_is_told() -> None:
+    """To start a plant there would not work: the port is in use, e.g. by a plant that is frozen."""
+    with socket.socket() as mute:
+        mute.bind(("127.0.0.1", 0))
+        mute.listen()
+        endpoint = f"tcp/127.0.0.1:{mute.getsockname()[1]}"
+
+        code, text = invoke("down", "--connect", endpoint, "--wait", "0.2")
+
+    assert code == 2
+    assert f"gridpeers: something listens at {endpoint} but has said nothing within 0.2 s" in text
+    assert "kill -CONT" in text
+    assert "start a plant" not in text
+
+
 def test_a_port_in_use_is_told(elsewhere: Path) -> None:
     """The plant is not built for nothing."""
     with socket.socket() as taken:

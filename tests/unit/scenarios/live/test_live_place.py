@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from scenarios.live.place import UsageError, check_endpoint, claim, place, return_path
+from scenarios.live.place import UsageError, accepting, check_endpoint, claim, place, return_path
 
 
 def test_without_options_there_is_one_run_on_this_machine() -> None:
@@ -58,9 +58,22 @@ def test_a_port_in_use_is_told_before_anything_starts() -> None:
         text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
 
         with pytest.raises(
-            UsageError, match=f"--listen: {text} cannot be listened on: address already in use; end what"
+            UsageError, match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT"
         ):
             claim("--listen", text)
+
+
+def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
+    """As of a frozen process; a port that is only taken is none, nor is one of a protocol without connections."""
+    with socket.socket() as mute, socket.socket() as taken:
+        mute.bind(("127.0.0.1", 0))
+        mute.listen()
+        taken.bind(("127.0.0.1", 0))
+        listening, deaf = (f"127.0.0.1:{end.getsockname()[1]}" for end in (mute, taken))
+
+        found = accepting((f"tcp/{deaf}", f"udp/{listening}", f"tcp/{listening}"))
+
+    assert found == (f"tcp/{listening}",)
 
 
 def test_port_0_becomes_a_free_port() -> None:
@@ -69,9 +82,17 @@ def test_port_0_becomes_a_free_port() -> None:
 
 
 def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
-    """192.0.2.0/24 belongs to nobody."""
-    with pytest.raises(UsageError, match="cannot be listened on"):
+    """192.0.2.0/24 belongs to nobody: there is nothing to end there, and the line does not say so."""
+    with pytest.raises(UsageError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host") as told:
         claim("--listen", "tcp/192.0.2.1:7447")
+
+    assert "end what" not in str(told.value)
+
+
+def test_a_name_without_an_address_cannot_be_listened_on() -> None:
+    """The names under .invalid never have one."""
+    with pytest.raises(UsageError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
+        claim("--listen", "tcp/lab.invalid:7447")
 
 
 @pytest.mark.parametrize(
