@@ -65,6 +65,9 @@ class PlantLike(Protocol):
 class LivePlant(PlantLike, Protocol):
     """What wall-clock time needs of a plant on top: switches operated by hand."""
 
-    def switch(self, name: str, action: str) -> None:
-        """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown."""
+    def switch(self, name: str, action: str) -> bool:
+        """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown.
+
+        Tells whether it stood so already.
+        """
         ...

@@ -121,15 +121,24 @@ class Plant:
         self._dynamics.inverters.set_points[i, 0] = P_set / self._P_rated[i]
         self._dynamics.inverters.set_points[i, 1] = V_set / self._V_nom[i]
 
-    def switch(self, name: str, action: str) -> None:
+    def switch(self, name: str, action: str) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias; it acts from the next step on.
+
+        Returns
+        -------
+        bool
+            Whether it stood so already, then or by what else was told since the last step.
 
         Raises
         ------
         ValueError
             If there is no such switch; the message lists those there are.
         """
-        self._switches.put(self.tick * self._steps, name, action)
+        step, closed = self.tick * self._steps, self._switches.closed
+        for at, then in zip(sorted(self._switches.steps), self._switches.foreseen(), strict=True):
+            closed = then if at <= step else closed
+        self._switches.put(step, name, action)
+        return (self.network.switch_name(name) in closed) == (action == "close")
 
     def connect(self, name: str, on: bool) -> None:
         """Put an inverter on the network, at zero current and in step with it, or take it off.

@@ -43,16 +43,17 @@ class Service:
         if verb == "status":
             return msgspec.json.encode(self.status()).decode()
         if verb == "down":
-            return f"run {side.config.run} ends at t = {side.t:g} s"
+            return f"run {side.config.run} ends at t = {side.t:.2f} s"
         if verb == "stop":
             instance = side.instances.get(argument)
             if instance is None:
                 running = ", ".join(name for name in side.plant.inverters if name in side.instances) or "none"
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
-            side.stop(side.keys.dismissal(argument, instance), f"{argument} was stopped by command")
-            return f"{argument} was asked to leave at t = {side.t:g} s"
-        side.plant.switch(argument, verb)
-        return f"switch {argument}: {verb} at t = {side.t:g} s"
+            side.stop(side.keys.dismissal(argument, instance), "stopped by command")
+            return f"{argument} was asked to leave at t = {side.t:.2f} s"
+        if side.plant.switch(argument, verb):
+            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already at t = {side.t:.2f} s"
+        return f"switch {argument}: {verb} at t = {side.t:.2f} s"
 
     def _ordered(self, command: Command, now: float) -> dict[str, Any]:
         """Number of an order and when it begins to hold (s), and who will answer: the agents that are there."""

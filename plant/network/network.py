@@ -107,7 +107,8 @@ class Network:
         """
         known = {name: switch.name for switch in self.switches.values() for name in switch.names}
         if text not in known:
-            hint = suggestion(text, self.switches, "switches", also=known)
+            shown = [switch.alias or switch.name for switch in self.switches.values()]
+            hint = suggestion(text, shown, "switches", also=known)
             raise ValueError(f'switch "{text}": no such switch in feeder "{self.feeder.name}"; {hint}')
         return known[text]
 

@@ -217,13 +217,15 @@ def test_an_inverter_leaves_and_comes_back_without_a_bump(name: str) -> None:
 
 
 def test_a_switch_can_be_operated_by_hand() -> None:
-    """Without any schedule a switch opens when it is told to, by its alias as well."""
+    """Without any schedule a switch opens when told to, by its alias as well, and it is told if it was open already."""
     p = plant(*opened(0.1, "13-152"))
     run(p, 1.0)
 
-    p.switch("sw1_2", "open")
+    already = [p.switch("67-67s", "close"), p.switch("sw1_2", "open"), p.switch("67s-67", "open")]
     p.advance()
+    already.append(p.switch("sw1_2", "open"))
 
+    assert already == [True, False, True, True], "what was told for the same step counts too"
     assert p.measure()["inv1"].island == "inv1"
     assert p.measure()["inv4"].island == "inv4"
 

@@ -45,7 +45,7 @@ class ToyPlant:
         self._P_set = dict.fromkeys(self.inverters, config.settings.P_set0)
         self._V_set = {name: 1.0 + 0.001 * i for i, name in enumerate(self.inverters)}
         self._off = set(config.settings.spares)
-        self._tick = 0
+        self._tick, self._stands = 0, "close"
         self._rows: list[tuple[float, ...]] = [self._row()]
         self._events: list[PlantEvent] = []
 
@@ -84,11 +84,13 @@ class ToyPlant:
             self._events.append(PlantEvent(t=self._t, kind="switch", subject="toy", text="the grid is lost"))
         self._rows.append(self._row())
 
-    def switch(self, name: str, action: str) -> None:
-        """Operate the only switch there is; it does nothing but tell."""
+    def switch(self, name: str, action: str) -> bool:
+        """Operate the only switch there is; it does nothing but tell, and stands as it was told last."""
         if name != "sw1":
             raise ValueError(f'no switch "{name}"; switches are sw1')
         self._events.append(PlantEvent(t=self._t, kind="switch", subject=name, text=f"{name}: {action}"))
+        self._stands, before = action, self._stands
+        return action == before
 
     def connect(self, name: str, on: bool) -> None:
         """Put an inverter on the bus or take it off; off, it takes no part in the droops."""

@@ -260,17 +260,18 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
 def test_commands_are_done_and_answered() -> None:
     """Switches are operated, agents asked to leave, the run's state told as JSON."""
     lab = running()
-    opened, stopped = lab.ask("open", "sw1"), lab.ask("stop", "inv2")
+    opened, again, stopped = lab.ask("open", "sw1"), lab.ask("open", "sw1"), lab.ask("stop", "inv2")
     lab.step()
     status = json.loads(lab.ask("status").text)
 
     assert opened.ok
-    assert opened.text == "switch sw1: open at t = 0 s"
+    assert opened.text == "switch sw1: open at t = 0.00 s"
+    assert (again.ok, again.text) == (True, "switch sw1 was open already at t = 0.00 s")
     assert stopped.ok
-    assert [(stop.reason, stop.refused) for stop in lab.take(Stop)] == [("inv2 was stopped by command", False)]
+    assert [(stop.reason, stop.refused) for stop in lab.take(Stop)] == [("stopped by command", False)]
     assert (status["run"], status["phase"], status["tick"], status["pacing"]["late"]) == ("toy", "running", 1, 0)
     assert (status["agents"], status["absent"]) == (["inv1", "inv2", "inv3"], [])
-    assert [event.text for event in lab.events("switch")] == ["sw1: open"]
+    assert [event.text for event in lab.events("switch")] == ["sw1: open", "sw1: open"]
 
 
 @pytest.mark.parametrize(("verb", "argument", "text"), [

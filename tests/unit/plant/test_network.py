@@ -36,8 +36,13 @@ def test_unknown_switch_is_told_with_the_nearest(network: Network) -> None:
     """An unknown switch is told with the one that was probably meant."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch in .*; did you mean "13-152"'):
         network.switch_name("13-125")
-    with pytest.raises(ValueError, match=r'switch "zebra": no such switch in .*; the switches are 13-152, 60-160'):
+    with pytest.raises(
+        ValueError, match=r'switch "zebra": no such switch in .*; the switches are 13-152, 60-160'
+    ) as told:
         network.switch_name("zebra")
+
+    assert " sw1_2, sw2_3" in str(told.value), "where there is an alias, it is what people know the switch by"
+    assert "67s-67" not in str(told.value)
 
 
 def test_aliases_are_not_names(network: Network) -> None:
