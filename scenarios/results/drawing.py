@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from plant.equipment import Feeder
 from scenarios.results.history import History, Plates
-from scenarios.results.islands import islands_of
+from scenarios.results.islands import Spell, islands_of, spells_of
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM
 from scenarios.spec.limits import limits_of
@@ -36,6 +36,8 @@ class Drawing:
     """Inverters of each island where there come to be several, by the first of them; they have a figure as well."""
     island_titles: Mapping[str, str] = field(default_factory=dict)
     """A few words on each island."""
+    spells: Sequence[Spell] = ()
+    """When there are several islands; figures of all cases then show the worst."""
 
 
 def drawing_of(
@@ -60,4 +62,5 @@ def drawing_of(
         limited=tuple(limited),
         islands=most if len(most) > 1 else {},
         island_titles={name: f"microgrid {of.pop().removeprefix('MG')}" for name, of in whole.items() if len(of) == 1},
+        spells=spells_of(scenario, feeder),
     )

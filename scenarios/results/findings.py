@@ -20,6 +20,10 @@ Results = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""
 
 
+SHARED = ("MPSI", "MQSI", "t_restore_s")
+"""Measures that mean nothing over several islands at once."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class GraphRun:
     """One run of the experiment with random communication graphs."""
@@ -48,6 +52,10 @@ class Findings:
     """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
     graphs: tuple[GraphRun, ...] = ()
     """Runs over random graphs."""
+
+    def apart(self, case: str, event: str) -> bool:
+        """Whether an event left several islands: each shares for itself, and what the whole shares means nothing."""
+        return bool(self.islands.get(case, {}).get(event))
 
     def value(self, cell: Cell) -> float:
         """Our number at the place of one of the paper's."""

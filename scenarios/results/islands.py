@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
 from plant.equipment import Feeder
 from plant.network import Network
-from scenarios.results.history import History, Plates
+from scenarios.results.history import Floats, History, Plates
 from scenarios.spec import Scenario
 from scenarios.spec.moves import inverters_of
 
 Islands = dict[str, tuple[str, ...]]
 """Inverters of each island; an island is known by its first inverter."""
+
+
+class Spell(NamedTuple):
+    """A time during which there are several islands."""
+
+    start: float
+    """From the event that made them (s)."""
+    end: float
+    """To the next event, or for good (s)."""
+    islands: Islands
+
+
+Quantity = Callable[[History, Plates], Floats]
+"""A measure of each row."""
 
 
 def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
@@ -50,3 +67,29 @@ def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[H
     }
     mine = {field.name: getattr(plates, field.name)[at] for field in fields(plates) if field.name != "names"}
     return replace(history, inverters=names, **columns), replace(plates, names=names, **mine)
+
+
+def spells_of(scenario: Scenario, feeder: Feeder) -> tuple[Spell, ...]:
+    """When there are several islands, and which."""
+    starts = [event.t_s for event in scenario.events]
+    found = islands_of(scenario, feeder).values()
+    times = zip(starts, [*starts[1:], inf], found, strict=True)
+    return tuple(Spell(start, end, islands) for start, end, islands in times if len(islands) > 1)
+
+
+def worst(quantity: Quantity, nominal: float, spells: Sequence[Spell]) -> Quantity:
+    """The measure of the island in which it is farthest from its nominal value, while there are several.
+
+    A mean over islands hides what is wrong in them: one is too fast, another too slow.
+    """
+
+    def measure(history: History, plates: Plates) -> Floats:
+        found = quantity(history, plates)
+        for spell in spells:
+            rows = (history.t > spell.start) & (history.t <= spell.end)
+            each = np.stack([quantity(*part_of(history, plates, names))[rows] for names in spell.islands.values()])
+            far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
+            found[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
+        return found
+
+    return measure

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import msgspec
 
 from plant.equipment import Feeder
-from scenarios.results.findings import Findings
+from scenarios.results.findings import SHARED, Findings
 from scenarios.spec import Scenario
 from wire.messages import Pacing
 
@@ -46,7 +46,9 @@ def metrics_json(
     links_sha256: Mapping[str, str] = MappingProxyType({}),
     by_hand: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
-    """Text of metrics.json; what is not a number (nothing to share) is null. Pacing in s of wall time.
+    """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) is null.
+
+    Pacing is in s of wall time.
 
     Parameters
     ----------
@@ -63,6 +65,7 @@ def metrics_json(
     for case, steady in found.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
         for label, islands in found.islands.get(case, {}).items():
+            cases[case][label] |= dict.fromkeys(SHARED)
             cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
         cases[case]["history_sha256"] = sha256[case]
         if case in links_sha256:

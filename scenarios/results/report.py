@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from scenarios.results.claims import Verdict
-from scenarios.results.findings import Findings
+from scenarios.results.findings import SHARED, Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.paper_tables import DIGITS, HEADINGS, paper_cell, tables_of
 from scenarios.results.tolerances import Quantity
@@ -45,6 +45,8 @@ class Grid:
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    legend: str = ""
+    """What stands below it; may be empty."""
 
 
 _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
@@ -88,6 +90,8 @@ def show(report: Report, console: Console) -> None:
         for row in grid.rows:
             table.add_row(*(f"[red]{escape(cell)}[/red]" if cell.endswith("!") else escape(cell) for cell in row))
         console.print(table)
+        if grid.legend:
+            console.print(grid.legend, style="dim", highlight=False)
         console.print()
     width = max((len(verdict.claim.text) for verdict in report.verdicts), default=0)
     for verdict in report.verdicts:
@@ -124,7 +128,13 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
         if any(cell.quantity in quantities and report.found.has(cell) for cell in table.cells)
     ]
     against = f", ours | paper's Table {' and '.join(numbers)}" if numbers else ""
-    return Grid(title=f"{title} after each event{against}", header=tuple(header), rows=tuple(rows))
+    apart = any(report.found.apart(case, event) for case, steady in results.items() for event in steady)
+    return Grid(
+        title=f"{title} after each event{against}",
+        header=tuple(header),
+        rows=tuple(rows),
+        legend="-: where there are several islands, each shares for itself; see its own row" if apart else "",
+    )
 
 
 def _row(
@@ -141,10 +151,16 @@ def _row(
         if event not in steady:
             row += [""] * (len(quantities) + (quantities[0] == "f_error_Hz"))
             continue
-        values = steady[event]
-        row += [_cell(report.experiment, case, event, name, getattr(values, name), island) for name in quantities]
+        values, mixed = steady[event], not island and report.found.apart(case, event)
+        row += [
+            "-"
+            if mixed and name in SHARED
+            else _cell(report.experiment, case, event, name, getattr(values, name), island)
+            for name in quantities
+        ]
         if quantities[0] == "f_error_Hz":
-            row.append("never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s")
+            restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
+            row.append("-" if mixed else restored)
     return tuple(row)
 
 
@@ -168,7 +184,7 @@ def _plain_grid(grid: Grid) -> str:
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
         lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
+    return "\n".join([*lines, *([grid.legend] if grid.legend else [])])
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
-from scenarios.results.history import Floats, History, Plates
+from scenarios.results.islands import Quantity, worst
 from scenarios.results.plots.style import PAGE, case_style, columns, from_zero, mark_events, time_axis, words
 
 
@@ -42,39 +42,46 @@ def single(drawing: Drawing, draw: Callable[[Axes, Drawing], None]) -> Figure:
 
 def frequency(axes: Axes, drawing: Drawing) -> None:
     """Frequency over time."""
-    curves(axes, drawing, metrics.mean_frequency)
+    curves(axes, drawing, worst(metrics.mean_frequency, drawing.f_nom, drawing.spells))
     axes.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
     axes.set_title("Frequency", loc="left")
-    axes.set_ylabel("mean of the GFM, f (Hz)")
+    axes.set_ylabel(_of(drawing, "mean of the GFM, f (Hz)", "f (Hz)"))
     axes.ticklabel_format(axis="y", useOffset=False)
 
 
 def MPSI(axes: Axes, drawing: Drawing) -> None:
     """Mean power sharing index over time, (16)."""
-    curves(axes, drawing, metrics.MPSI)
+    quantity = worst(metrics.MPSI, 0.0, drawing.spells)
+    curves(axes, drawing, quantity)
     axes.set_title("Mean power sharing index, MPSI", loc="left")
-    axes.set_ylabel("MPSI")
-    from_zero(axes, drawing, metrics.MPSI)
+    axes.set_ylabel(_of(drawing, "MPSI", "MPSI"))
+    from_zero(axes, drawing, quantity)
 
 
 def voltage(axes: Axes, drawing: Drawing) -> None:
     """Mean voltage over time."""
-    curves(axes, drawing, metrics.mean_voltage)
+    curves(axes, drawing, worst(metrics.mean_voltage, 1.0, drawing.spells))
     axes.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
     axes.set_title("Voltage", loc="left")
-    axes.set_ylabel("mean of all inverters, V (pu)")
+    axes.set_ylabel(_of(drawing, "mean of all inverters, V (pu)", "mean V (pu)"))
     axes.ticklabel_format(axis="y", useOffset=False)
 
 
 def MQSI(axes: Axes, drawing: Drawing) -> None:
     """Mean var sharing index over time, (17)."""
-    curves(axes, drawing, metrics.MQSI)
+    quantity = worst(metrics.MQSI, 0.0, drawing.spells)
+    curves(axes, drawing, quantity)
     axes.set_title("Mean var sharing index, MQSI", loc="left")
-    axes.set_ylabel("MQSI")
-    from_zero(axes, drawing, metrics.MQSI)
+    axes.set_ylabel(_of(drawing, "MQSI", "MQSI"))
+    from_zero(axes, drawing, quantity)
 
 
-def curves(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:
+def _of(drawing: Drawing, whole: str, each: str) -> str:
+    """Label of an axis: of the whole, or of the worst island where there come to be several."""
+    return f"{each}, worst island" if drawing.spells else whole
+
+
+def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> None:
     """One curve per case; the later ones lie on top."""
     for number, (case, history) in enumerate(drawing.histories.items()):
         colour, dashes, width = case_style(case, number)

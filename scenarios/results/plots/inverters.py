@@ -77,8 +77,11 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
         panel.set_visible(False)
     for panel in grid[:, 0]:
         panel.set_ylabel("P (pu of rating)")
-    for panel in grid[:-1].flat:
-        panel.set_xlabel("")
+    for above, below in zip(grid[:-1].flat, grid[1:].flat, strict=True):
+        if below.get_visible():
+            above.set_xlabel("")
+        else:
+            above.tick_params(labelbottom=True)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.suptitle(f"Real power of the {'grid-forming' if GFM else 'grid-following'} inverters", fontsize=10)
     figure.legend(handles, labels, loc="outside lower center", ncols=max(len(labels), 1))

@@ -1,5 +1,6 @@
 """Figures: that they are made, that a case looks the same in all of them, that nothing warns."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ from matplotlib.image import imread
 
 from plant.tables import read_feeder
 from scenarios.results.history import History, Plates
+from scenarios.results.islands import Spell
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, overview
+from scenarios.results.plots.inverters import powers
 
 
 def drawing(*cases: str) -> Drawing:
@@ -83,3 +86,35 @@ def test_values_that_are_no_numbers_do_not_stop_a_figure(tmp_path: Path) -> None
     empty.histories["I"].Q[:] = 0.0
 
     assert all(path.exists() for path in draw_all(empty, tmp_path))
+
+
+def test_where_there_are_islands_the_worst_is_drawn() -> None:
+    """Their mean hides what is wrong: here one is 0.03 Hz too fast, and the other two 0.015 Hz too slow."""
+    it = drawing("IV")
+    islands: dict[str, tuple[str, ...]] = {
+        "inv1": ("inv1", "inv2", "inv3"),
+        "inv4": ("inv4", "inv5", "inv6"),
+        "inv7": ("inv7", "inv8", "inv9"),
+    }
+    history = it.histories["IV"]
+    history.f[history.t > 4.0] = 60.0 + np.repeat([-0.015, 0.03, -0.015], 3)
+    page = overview(replace(it, spells=[Spell(4.0, 7.0, islands)]))
+
+    line = next(line for line in page.axes[0].get_lines() if line.get_label() == "IV: made up")
+    drawn = np.asarray(line.get_ydata())
+    assert drawn[history.t <= 4.0] == pytest.approx(60.0)
+    assert drawn[history.t > 4.0] == pytest.approx(60.03)
+    assert [axes.get_ylabel() for axes in page.axes] == [
+        "f (Hz), worst island",
+        "MPSI, worst island",
+        "mean V (pu), worst island",
+        "MQSI, worst island",
+    ]
+
+
+def test_the_lowest_panel_of_every_column_has_its_times() -> None:
+    """With three cases there is nothing below the second, so its own axis tells the time."""
+    panels = powers(drawing("ring", "path", "star"), GFM=False).axes
+
+    assert [axes.get_xlabel() for axes in panels if axes.get_visible()] == ["", "time (s)", "time (s)"]
+    assert [axes.xaxis.get_tick_params()["labelbottom"] for axes in panels if axes.get_visible()] == [False, True, True]

@@ -1,6 +1,8 @@
 """The report at the end of a run: plain text for files and pipes, colours on a terminal only."""
 
 import io
+import json
+from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -8,8 +10,10 @@ from rich.console import Console
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
+from scenarios.results.numbers import Ran, metrics_json
 from scenarios.results.paper_tables import tables_of
 from scenarios.results.report import Report, plain, show
+from scenarios.spec import load_scenario
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
@@ -79,3 +83,34 @@ def test_colours_are_for_terminals_only(terminal: bool) -> None:
     assert "inv3 [died] at t = 2 s" in out.getvalue()
     if not terminal:
         assert out.getvalue() == plain(report())
+
+
+def test_what_several_islands_share_together_is_not_told() -> None:
+    """Each shares for itself: the whole has a dash for it, the islands their numbers, and a line says why."""
+    whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=None, p={})
+    part = Steady(f_error_Hz=0.041, MPSI=0.019, V_error=0.09, MQSI=0.135, t_restore_s=0.37, p={})
+    found = Findings(results={"IV": {"e": whole}}, islands={"IV": {"e": {"inv1": part}}})
+    text = plain(Report(scenario="own", titles={}, found=found, verdicts=(), notes=(), folder="here/"))
+
+    rows = [line.split() for line in text.splitlines()]
+    assert [row[1:] for row in rows if row[:1] == ["IV"]] == [["0.027", "-", "-"], ["0.0100", "-"]]
+    assert [row[3:] for row in rows if row[:1] == ["island"]] == [["0.041", "0.019", "0.37", "s"], ["0.0900", "0.135"]]
+    assert text.count("-: where there are several islands, each shares for itself") == 2
+    assert "-:" not in plain(report())
+
+
+def test_metrics_of_several_islands_together_are_null() -> None:
+    """metrics.json has no number either that means nothing; what the islands share is beside it."""
+    whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=2.0, p={})
+    scenario, feeder = load_scenario("microgrid-switching")
+    ran = Ran(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
+    found = Findings(
+        results={"IV": {"event1": whole, "event2": whole}}, islands={"IV": {"event2": {"inv1": whole, "inv4": whole}}}
+    )
+    case = json.loads(metrics_json(ran, found, {"IV": "f00"}, {}))["cases"]["IV"]
+
+    shared = ("MPSI", "MQSI", "t_restore_s")
+    assert [case["event1"][name] for name in shared] == [0.093, 0.492, 2.0]
+    assert [case["event2"][name] for name in shared] == [None, None, None]
+    assert case["event2"]["f_error_Hz"] == 0.027
+    assert [case["event2"]["islands"]["inv4"][name] for name in shared] == [0.093, 0.492, 2.0]
