@@ -122,12 +122,17 @@ class Agent:
         return in_neighbours(self.config.control, name, members) if name in members else ()
 
     def judge(self, state: State) -> str:
-        """Why a neighbour's state cannot be used: "ghost", "stale", "foreign"; empty if it can."""
-        known = self._known.get(state.sender)
-        if known is None or state.sender == self.config.name:
+        """Why a neighbour's state cannot be used: "foreign", "unexpected", "ghost", "stale"; empty if it can.
+
+        Unexpected is one whose nameplate is not known, or not yet: after a cut states can come before it.
+        """
+        if state.sender == self.config.name:
             return "foreign"
-        if state.incarnation != known.incarnation:
-            return "ghost" if state.incarnation < known.incarnation else "foreign"
+        known = self._known.get(state.sender)
+        if known is None or state.incarnation > known.incarnation:
+            return "unexpected"
+        if state.incarnation < known.incarnation:
+            return "ghost"
         last = self._heard.get(state.sender)
         return "stale" if last is not None and state.seq <= last.seq else ""
 

@@ -187,7 +187,7 @@ def describe() -> tuple[KeySpec, ...]:
             keys.nameplate(agent, instance), "queryable", "Nameplate", "agent", "plant, other agents",
             "asked when a token appears; by a neighbour once more, as proof that its subscription has arrived",
         ),
-        row(keys.control, "publication", "Prepare, Stop", "plant", "agents", "before the first tick; at the end"),
+        row(keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end"),
         row(
             keys.dismissal(agent, instance), "publication", "Stop", "plant", "the one instance",
             "when its name is taken or is no inverter of the feeder; wall-clock: when somebody stops it",

@@ -118,6 +118,13 @@ class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     """Of each agent on the roster the instance that is meant: two processes may claim one name."""
 
 
+class Waiting(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """The plant is there, but not yet at t = 0; now and then until it is (plant -> agents, wall-clock time)."""
+
+    waits_for: tuple[Name, ...]
+    """Agents that have not come."""
+
+
 class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """An agent hears all its in-neighbours of roster number `seq` (agent -> plant)."""
 
@@ -285,6 +292,7 @@ AnyMessage = (
     | Measurement
     | State
     | Prepare
+    | Waiting
     | Ready
     | Stop
     | Leave
@@ -299,7 +307,7 @@ AnyMessage = (
 """Everything that can arrive."""
 
 MESSAGES = (
-    Nameplate, Measurement, State, Prepare, Ready, Stop, Leave, LinkReport, LinkOrder, LinkAnswer, Command, Answer,
-    AgentStatus, Telemetry,
+    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, LinkOrder, LinkAnswer, Command,
+    Answer, AgentStatus, Telemetry,
 )  # fmt: skip
 """The types of `AnyMessage`, for documentation that is made from the code."""

@@ -32,7 +32,7 @@ from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
 from wire.codec import RejectedError, encode
 from wire.links import Links, arrived, is_taken
-from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop
+from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
 from wire.timer import Timer
 
 STATUS_PERIOD = 0.5
@@ -90,6 +90,8 @@ class FreeAgent(Side):
         self.phase = "seeking"
         self._routes = dict(self._first_routes)
         self._plant_there = False
+        self._awaited: tuple[str, ...] = ()
+        """For whom the plant said last that it waits."""
         self._run_time = 0.0
         """That of the last measurement that came off the wire (s)."""
         self._peers.forget_all()
@@ -195,6 +197,7 @@ class FreeAgent(Side):
         match self.keys.parts(key):
             case ("alive", "plant"):
                 self._plant_there = self.plant_seen = True
+                self._roll_call.plant_seen(now)
                 if self.phase == "seeking":
                     self.phase = "waiting"
                     self._say("the plant is there; waits for its measurement")
@@ -254,6 +257,11 @@ class FreeAgent(Side):
             self._go_astray(f"messages of {sender} come under the key of {expected}")
 
     def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
+        if isinstance(message, Waiting):
+            self._check_life(message)
+            self._roll_call.plant_seen(now)
+            self._awaited = message.waits_for
+            return
         if not isinstance(message, Stop):
             raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
         if message.refused:
@@ -271,7 +279,7 @@ class FreeAgent(Side):
         self._check_life(message)
         self.heard.came(message, now)
         self._cadence.measured(now)
-        self._run_time = message.t
+        self._run_time, self._awaited = message.t, ()
         if not is_taken(self._links, message, payload, now * self._config.speed):
             self.heard.keep(message, now)
 
@@ -355,6 +363,7 @@ class FreeAgent(Side):
             self.phase,
             self.heard,
             now,
+            awaited=self._awaited,
             neighbours=self._peers.neighbours,
             in_sums=self._in_sums,
             rejected=sum(self.rejects.counts.values()),

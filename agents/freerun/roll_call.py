@@ -31,10 +31,16 @@ class RollCall:
         self._ran = False
         """Whether it has ever been in touch with a plant; before that, silence proves nothing."""
         self._hearing = Hearing()
+        self._seen = float("-inf")
+        """When the plant was last known to be there, though it measures nothing yet (s)."""
 
     def next_session(self) -> None:
         """Begin anew, with the patience of the session that follows."""
         self._hearing = self._hearing.next()
+
+    def plant_seen(self, now: float) -> None:
+        """Note that the plant is there (s): it has appeared, or says that it waits for agents."""
+        self._seen = now
 
     def complaint(self, roster: Sequence[str] | None, now: float) -> str:
         """Note who is silent now; why a new session is needed, else nothing.
@@ -61,7 +67,7 @@ class RollCall:
 
     def _silent(self, roster: Sequence[str] | None, now: float) -> tuple[str, ...]:
         """The plant, a neighbour that the plant hears, or oneself, by the plant."""
-        if self._ran and self._heard.silence(PLANT, now) > SILENT:
+        if self._ran and min(self._heard.silence(PLANT, now), now - self._seen) > SILENT:
             return (PLANT,)
         if roster is None:
             return ()

@@ -39,15 +39,17 @@ class Tally:
         heard: Heard,
         now: float,
         *,
+        awaited: tuple[str, ...],
         neighbours: tuple[str, ...],
         in_sums: tuple[str, ...],
         rejected: int,
         impaired: tuple[str, ...],
     ) -> AgentStatus:
         """How the agent fares now (s on its clock); see `AgentStatus`."""
-        awaited = {
+        others = f", which waits for {', '.join(awaited)}" if awaited else ""
+        waits_for = {
             "seeking": f"the plant of run {config.run}",
-            "waiting": f"a measurement of {config.name} from the plant",
+            "waiting": f"a measurement of {config.name} from the plant{others}",
             "running": "",
         }
         ages = [heard.age(name, now) for name in neighbours]
@@ -58,7 +60,7 @@ class Tally:
             seq=self.sent,
             t=heard.t,
             phase=phase,
-            waits_for=awaited[phase],
+            waits_for=waits_for[phase],
             island="" if heard.measurement is None else heard.measurement.island,
             neighbours=neighbours,
             ages=tuple(age if age < float("inf") else -1.0 for age in ages),

@@ -54,7 +54,8 @@ class Switchboard:
         ValueError
             If there is no such switch; the message lists those there are.
         """
-        self._at.setdefault(step, []).append((self._network.switch_name(name), action))
+        known = self._network.switch_name(name)  # before anything is noted of the step
+        self._at.setdefault(step, []).append((known, action))
 
     def foreseen(self) -> Iterator[frozenset[str]]:
         """Switches that will be closed after each step with operations, in order of time, those now past included."""

@@ -32,7 +32,19 @@ from wire.clock import time_of
 from wire.codec import RejectedError, decode, encode
 from wire.keys import check_name
 from wire.links import Links, is_taken
-from wire.messages import PLANT, Command, Leave, LinkAnswer, LinkOrder, LinkReport, Nameplate, PlantEvent, State
+from wire.messages import (
+    PLANT,
+    Command,
+    Leave,
+    LinkAnswer,
+    LinkOrder,
+    LinkReport,
+    Nameplate,
+    PlantEvent,
+    State,
+    Waiting,
+)
+from wire.timer import Timer
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
@@ -44,6 +56,9 @@ LEAD = 0.25
 
 AGAIN = 1.0
 """Time (s, wall) after which a nameplate that has not come is asked for again: a question dies with its link."""
+
+WAITING = 0.5
+"""Time (s, wall) between two words of a plant that waits for agents to those that are there."""
 
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
@@ -75,6 +90,7 @@ class FreePlant(Side):
         self._heard = Heard()
         self._step_due = False
         self._deadline = 0.0
+        self._word = Timer(WAITING, 0.0)
         self._service = Service(self)
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         self._obeyed_keys = {self.keys.obeyed(name): name for name in plant.inverters}
@@ -109,11 +125,14 @@ class FreePlant(Side):
     @property
     def until(self) -> float:
         """When the next step is due, or the present wait is over (s on the driver's clock)."""
-        return self.pacer.due if self.phase == "running" else self._deadline
+        if self.phase == "running":
+            return self.pacer.due
+        return min(self._deadline, self._word.due) if self.phase == "gathering" else self._deadline
 
     def start(self, now: float) -> None:
         """Begin to wait for the agents."""
         self._deadline = now + max(0.0, self.config.wait_for_agents)
+        self._word = Timer(WAITING, now)
         self._reporter.collect()
         names = ", ".join(self.config.agents) or "nobody"
         self._say(f"run {self.config.run}: waits up to {self.config.wait_for_agents:g} s for {names}")
@@ -165,6 +184,12 @@ class FreePlant(Side):
     def _ask(self, name: str, now: float) -> None:
         self._asked[name] = now
         self._actions.append(Fetch(self.keys.nameplate(name, self.instances[name])))
+
+    def _ask_again(self, now: float) -> None:
+        """Ask for the nameplates that have not come."""
+        for name in sorted(self.instances.keys() - self.plates.keys()):
+            if now - self._asked[name] >= AGAIN:
+                self._ask(name, now)
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
         self._say(f"refused {reason}")
@@ -302,8 +327,12 @@ class FreePlant(Side):
         """Make the step that is due, or end the wait that is over."""
         if now < self.until:
             return
-        if self.phase == "gathering":
+        if self.phase == "gathering" and now >= self._deadline:
             self._begin(now)
+        elif self.phase == "gathering":
+            self._word.take(now)
+            self._tell_waiting()
+            self._ask_again(now)
         elif self.phase == "closing":
             self._send_the_last()
             self.phase = "over"
@@ -315,9 +344,13 @@ class FreePlant(Side):
                 self._move()
                 self.ordering.send(self.plates, now)
                 self._measure(now)
-                for name in sorted(self.instances.keys() - self.plates.keys()):
-                    if now - self._asked[name] >= AGAIN:
-                        self._ask(name, now)
+                self._ask_again(now)
+
+    def _tell_waiting(self) -> None:
+        """Tell the agents that the plant is there, and for whom they wait with it."""
+        absent = tuple(name for name in self.config.agents if name not in self.plates)
+        waiting = Waiting(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, waits_for=absent)
+        self._publish(self.keys.control, encode(waiting))
 
     def _move(self) -> None:
         """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""

@@ -114,13 +114,13 @@ def agent(
     require({"zenoh": "an agent"})
     with told():
         from scenarios.live.hand import agent_here
-        from scenarios.live.place import check_inverter, check_wait, claim, place, return_path
+        from scenarios.live.place import check_inverter, check_wait, claim, place
 
         where = place(run, connect)
         check_inverter(inverter)
         check_wait(wait)
         watch_readers(quits=False)
-        listening = tuple(claim("--listen", text) for text in listen) if listen else return_path(where.connect)
+        listening = tuple(claim("--listen", text) for text in listen) if listen else None
         _finish(agent_here(where, inverter, listening, wait))
 
 

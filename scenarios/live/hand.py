@@ -26,7 +26,7 @@ from scenarios.emulation.links import links_of
 from scenarios.live.asking import configuration
 from scenarios.live.book import Book
 from scenarios.live.chronicle import Chronicle
-from scenarios.live.place import Place, near
+from scenarios.live.place import Place, near, return_path
 from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
 from scenarios.results.record import Recorded
@@ -127,7 +127,7 @@ def plant_here(config: PlantConfig, folder: Path | None, book: Book, on_whole: O
     return Ended(broke=broke or chronicle.lost)
 
 
-def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) -> Ended:
+def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: float) -> Ended:
     """Run an agent in this process, as the plant tells it to, until it leaves.
 
     Parameters
@@ -136,8 +136,8 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) ->
         The run, and where to look for it.
     name : str
         Name of its inverter.
-    listen : tuple[str, ...]
-        Where other agents can connect.
+    listen : tuple[str, ...] or None
+        Where other agents can connect; None is for any free port, of all addresses if others can reach the plant.
     wait : float
         Longest wait (s) for a plant.
 
@@ -153,6 +153,7 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...], wait: float) ->
         with Visit(where) as visit:
             visit.find_plant(wait, lambda line: say(f"{name}: {line}"))
             config = configuration(visit, name)
+        listen = listen or return_path((*where.connect, *config.connect))
         config = msgspec.structs.replace(config, connect=where.connect, listen=listen)
         return Ended(broke=run_agent(config, links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
@@ -210,7 +211,7 @@ def all_here(
             )
             for agent in agents:
                 if agent.name in config.agents:
-                    agent = msgspec.structs.replace(agent, connect=(endpoint,))
+                    agent = msgspec.structs.replace(agent, connect=(endpoint,), listen=return_path(config.listen))
                     children.add(
                         Child(
                             agent.name, ["-m", "scenarios.emulation.agent"], agent, logs / f"{agent.name}.log", on_exit

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.live.place import Place, UsageError, accepting, return_path
+from scenarios.live.place import Place, UsageError, accepting
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
 
@@ -39,7 +39,7 @@ class Visit:
 
     def __init__(self, where: Place, *, meet_agents: bool = False) -> None:
         self.where, self.keys = where, Keys(where.run)
-        self._listen = return_path(where.connect) if meet_agents else ()
+        self._meet_agents = meet_agents
         self._heard: list[str] = []
         """Keys that are listened to."""
         self._runs: set[str] = set()
@@ -51,7 +51,7 @@ class Visit:
         self.agents: dict[str, set[str]] = {}
         """Tokens of agents: inverter -> its instances."""
         self._runs.clear()
-        self._session = Session(VISITOR, listen=self._listen, connect=self.where.connect, clock="wall")
+        self._session = Session(VISITOR, connect=self.where.connect, clock="wall", meets_all=self._meet_agents)
         for key in (self.keys.answer(self._session.id), *self._heard):
             self._session.subscribe(key)
         self._session.watch(self.keys.any_alive)

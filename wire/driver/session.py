@@ -83,6 +83,8 @@ class Session:
         Whether others are told to connect to this one. In wall-clock time whoever is not becomes the client of a router
         that answers: between two peers that know each other both directly and through a router, Zenoh changes the way
         of their declarations while these are on it, and loses some.
+    meets_all : bool, optional
+        Whether to connect to every peer, instead of the one with the greater id of each pair: for who does not listen.
 
     Raises
     ------
@@ -99,6 +101,7 @@ class Session:
         gossip: bool = True,
         clock: Clock = "simulated",
         rendezvous: bool = False,
+        meets_all: bool = False,
     ) -> None:
         os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
         try:
@@ -115,7 +118,7 @@ class Session:
         self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
-        config = _config(listen, connect, gossip, profile)
+        config = _config(listen, connect, gossip, meets_all, profile)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
         if self._changeable and self._meets_router():
@@ -249,7 +252,9 @@ class Session:
         return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
 
 
-def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, profile: _Profile) -> dict[str, Any]:
+def _config(
+    listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, meets_all: bool, profile: _Profile
+) -> dict[str, Any]:
     first, longest, growth = profile.retry
     return {
         "mode": "peer",
@@ -263,10 +268,13 @@ def _config(listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, pro
         },
         "scouting": {
             "multicast": {"enabled": False},
-            # of two peers that hear of each other the one with the greater id connects: no double links
+            # Of two peers that hear of each other the one with the greater id connects: no double links. Who cannot be
+            # connected to, as it does not listen, connects to all itself.
             "gossip": {
                 "enabled": gossip,
-                "autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
+                "autoconnect_strategy": {
+                    "peer": {"to_router": "always", "to_peer": "always" if meets_all else "greater-zid"}
+                },
             },
         },
         "transport": {

@@ -140,7 +140,7 @@ def test_ghosts_and_stale_states_are_ignored() -> None:
     other.hear(state("inv2", 5))
     other.tick(measurement(6), ("inv2", "inv3"))
 
-    assert verdicts == ["ghost", "stale", "stale", "foreign", "foreign", "foreign"]
+    assert verdicts == ["ghost", "stale", "stale", "unexpected", "foreign", "unexpected"]
     assert before.P_set > 0.0
     assert agent.tick(measurement(7), ("inv2",)) == other.tick(measurement(7), ("inv2",))
 

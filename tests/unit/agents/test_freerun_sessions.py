@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.unit.agents.free_lab import KEYS, T_C, Lab, running
-from wire.messages import Measurement
+from wire.messages import Measurement, Waiting
 
 
 def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:
@@ -128,3 +128,39 @@ def test_an_agent_that_has_never_had_a_plant_keeps_its_session() -> None:
         lab.go(0.5)
 
     assert not lab.side.astray
+
+
+def test_a_plant_that_says_it_waits_is_not_silent() -> None:
+    """A new plant measures nothing until all are there: agents keep their sessions and tell for whom it waits."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    lab.go(2.0)
+    lab.token("plant")
+    for _ in range(40):
+        lab.hear(KEYS.control, Waiting(sender="plant", incarnation=2, seq=0, t=0.0, waits_for=("inv3", "inv4")))
+        lab.go(0.5)
+    assert not lab.side.over
+    assert lab.status().waits_for == "a measurement of inv1 from the plant, which waits for inv3, inv4"
+
+    for _ in range(9):
+        lab.go(0.5)
+    assert lab.side.astray
+
+
+def test_a_plant_that_has_appeared_has_time_to_speak() -> None:
+    """Of a session that is closed just as a new plant has come it would say that its agent died."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    for _ in range(8):
+        lab.go(0.5)
+    lab.token("plant")
+    for _ in range(8):
+        lab.go(0.5)
+
+    assert not lab.side.over

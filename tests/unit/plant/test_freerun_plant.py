@@ -14,7 +14,7 @@ from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode, encode
 from wire.keys import Keys
-from wire.messages import Answer, Command, Leave, Measurement, Message, PlantEvent, State, Stop, Telemetry
+from wire.messages import Answer, Command, Leave, Measurement, Message, PlantEvent, State, Stop, Telemetry, Waiting
 
 KEYS = Keys("toy")
 T_C = 0.02
@@ -126,11 +126,16 @@ def test_it_begins_when_all_are_there() -> None:
 
 
 def test_it_waits_only_as_long_as_told() -> None:
-    """Then it begins without who is missing, says so, and takes them in when they come."""
+    """Then it begins without who is missing, says so, and takes them in when they come; till then it says it waits."""
     lab = Lab(wait_for_agents=4.0)
     lab.join("inv1", "inv3")
-    assert lab.side.until == 54.0
-    lab.step(2)
+    words = []
+    while lab.side.phase == "gathering":
+        lab.step()
+        words.append([m.waits_for for m in lab.take(Waiting)])
+    assert lab.now == pytest.approx(54.0)
+    assert words == [[("inv2",)]] * 8 + [[]]
+    lab.step()
     before = [m.to for m in lab.take(Measurement)]
     lab.join("inv2")
     lab.step()

@@ -53,3 +53,12 @@ def test_an_unknown_switch_is_refused_when_it_is_put_down(network: Network) -> N
     """A misspelled switch is an error at the start of a run, not at its time."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch'):
         Switchboard(network, (event(1.0, "13-125", "open"),), H)
+
+
+def test_a_switch_that_was_refused_leaves_nothing_to_be_done(network: Network) -> None:
+    """Nothing happens at that step, so nothing is told of it."""
+    board = Switchboard(network, (), H)
+    with pytest.raises(ValueError, match="no such switch"):
+        board.put(5, "sw9", "open")
+
+    assert not board.steps

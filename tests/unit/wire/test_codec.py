@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wire.codec import CRC, KINDS, LIMIT, RejectedError, Rejects, decode, encode
-from wire.messages import MESSAGES, Angle, AnyMessage, PlantEvent, State, Telemetry
+from wire.messages import MESSAGES, Angle, AnyMessage, PlantEvent, State, Telemetry, Waiting
 
 STATE = State(sender="inv1", incarnation=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
 
@@ -39,7 +39,13 @@ def test_every_message_survives_the_wire(kind: type[msgspec.Struct]) -> None:
         words = {"sender": "inv1", "to": "inv1", "island": "grid", "microgrid": "mg1", "reason": "end", "outcome": ""}
         flags |= {"refused": True, "ok": False}
         words |= {"verb": "open", "argument": "sw1_2", "reply_to": "a1", "text": "done", "phase": "running"}
-        words |= {"waits_for": "", "pacing": None, "data": b"book", "instance": "a1", "angle": Angle(0.3, 1.5)}
+        words |= {
+            "waits_for": ("inv2",) if kind is Waiting else "",
+            "pacing": None,
+            "data": b"book",
+            "instance": "a1",
+            "angle": Angle(0.3, 1.5),
+        }
         lists = {
             "impaired": ("inv2",),
             "neighbours": ("inv2", "inv3"),
