@@ -73,7 +73,7 @@ def spells_of(scenario: Scenario, feeder: Feeder) -> tuple[Spell, ...]:
     """When there are several islands, and which."""
     starts = [event.t_s for event in scenario.events]
     found = islands_of(scenario, feeder).values()
-    times = zip(starts, [*starts[1:], inf], found, strict=True)
+    times = zip(starts, [*starts, inf][1:], found, strict=True)
     return tuple(Spell(start, end, islands) for start, end, islands in times if len(islands) > 1)
 
 
