@@ -15,6 +15,7 @@ import typer
 
 from scenarios.experiments.command import experiment
 from scenarios.live.commands import register
+from scenarios.mistyped import Commands
 from scenarios.predict.command import predict
 from scenarios.reproduce.command import reproduce
 from scenarios.sweep.command import sweep
@@ -33,6 +34,7 @@ from scenarios.usage import (
 from wire.driver.output import speaking
 
 app = typer.Typer(
+    cls=Commands,
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -183,16 +185,20 @@ def list_() -> None:
     """
     from scenarios.spec import catalogue
 
-    for name in catalogue():
+    names = catalogue()
+    width = max(map(len, names), default=0)
+    for name in names:
         spec, _ = load(name)
-        typer.echo(f"{name:16} {spec.title}. Cases: {', '.join(spec.cases)}")
+        typer.echo(f"{name:{width}}  {spec.title}. Cases: {', '.join(spec.cases)}")
 
 
 @app.command()
 def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a scenario file, or a name from the catalogue.")],
 ) -> None:
-    """Check a scenario file and its feeder, and tell every mistake at once.
+    """Check a scenario file and its feeder for mistakes.
+
+    All mistakes are told at once.
 
     Exit code: 0 it can be run, 2 it has mistakes.
 
@@ -207,7 +213,9 @@ def check(
 
 @app.command()
 def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario", help="What to print.")]) -> None:
-    """Print a reference page, made from the code: keys, messages, or the scenario file with units and defaults.
+    """Print a reference page that is made from the code.
+
+    keys and messages are those of the wire; scenario is the scenario file, with units and defaults.
 
     Example:  gridpeers doc scenario
     """

@@ -26,8 +26,9 @@ def experiment(
         int | None, typer.Option(min=1, metavar="N", help="Processes of a sweep; one per core when left out.")
     ] = None,
 ) -> None:
-    """Run an experiment on late, lossy or broken links, and write its figure and table, with theory beside.
+    """Run an experiment on late, lossy or broken links.
 
+    It writes its figure and table, with theory beside.
     A sweep that was interrupted goes on by the same command. docs/experiments.md tells what was found.
 
     Exit code: 0 done, 2 bad usage or a bad file, 3 a run broke, 130 interrupted by Ctrl-C.

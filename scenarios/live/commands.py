@@ -84,7 +84,9 @@ def up(
     out: _Out = None,
     record: _Record = None,
 ) -> None:
-    """Run the plant and all its agents at once, in real time, until `gridpeers down` or Ctrl-C.
+    """Run the plant and all its agents at once, in real time.
+
+    It runs until `gridpeers down` or Ctrl-C.
 
     Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
@@ -125,7 +127,7 @@ def agent(
 
 
 def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
-    """Look once at a run: time, pacing, a line per agent, latest events.
+    """Look once at a run: time, pacing, agents, latest events.
 
     Example:  gridpeers status
     """
@@ -166,7 +168,9 @@ def stop(
     connect: Connect = None,
     wait: Wait = 5.0,
 ) -> None:
-    """Have an agent leave properly: its inverter is switched off, the others take over.
+    """Have an agent leave properly: its inverter is switched off.
+
+    The others take over.
 
     Exit code: 0 it has left, 2 there is no such agent, 3 it has not left.
 

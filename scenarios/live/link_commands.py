@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.live.options import RUN, Connect, Run, Wait, told, visit_to
+from scenarios.mistyped import Commands
 from scenarios.usage import BROKEN, fail
 
 if TYPE_CHECKING:
@@ -14,9 +15,11 @@ if TYPE_CHECKING:
     from scenarios.emulation.orders import Order
 
 link = typer.Typer(
+    cls=Commands,
     no_args_is_help=True,
-    help="Hurt and heal links between agents, and between plant and agents, while a run goes on.\n\n"
-    'A link is named by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
+    help="Hurt and heal links while a run goes on.\n\n"
+    "Links are those between agents, and between plant and agents. "
+    'One is named by sender and receiver, "inv1 -> inv4" or inv1 inv4; "inv4 <-> inv7" is both ways, "MG1 -> MG2" '
     'and "* -> inv2" are several, plant is a name too. Times in seconds, probabilities from 0 to 1.\n\n'
     'Example:  gridpeers link set "inv1 -> inv4" --delay 0.1 --jitter 0.02 --loss 0.2',
 )
@@ -55,8 +58,13 @@ def set_(
     """
     with told():
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
-        fault = {"profile": profile} | {key: value for key, value in given.items() if value is not None}
-        _give(links, "->", fault | _delay(delay, jitter), duration, run, connect, wait)
+        fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
+        if not fault and not profile:
+            from scenarios.live.place import UsageError
+
+            options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
+            raise UsageError(f"nothing is to be set; give one of {options}")
+        _give(links, "->", fault | {"profile": profile}, duration, run, connect, wait)
 
 
 @link.command()
@@ -93,7 +101,9 @@ def heal(
     connect: Connect = None,
     wait: Wait = 5.0,
 ) -> None:
-    """End what holds on links; what the scenario has for later still comes.
+    """End what holds on links.
+
+    What the scenario has for later still comes.
 
     Exit code: 0 every receiver concerned has taken it, 2 bad usage or nobody there, 3 somebody has not answered.
 
@@ -105,7 +115,7 @@ def heal(
 
 @link.command()
 def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
-    """Show every impaired link: what it does now, and how its messages have fared.
+    """Show every impaired link, and how its messages have fared.
 
     Exit code: 0 all have answered, 2 nobody there, 3 somebody has not answered.
 
@@ -188,7 +198,7 @@ def _give(
         setup, agent = links_of_run(visit)
         check(order, setup)
         outcome = give(visit, order, setup)
-    typer.echo(f"{order}; from t = {outcome.t:g} s on")
+    typer.echo(f"{order}; from t = {outcome.t:.2f} s on")
     if outcome.acknowledged:
         typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
     if outcome.absent:

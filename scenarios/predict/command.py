@@ -20,8 +20,9 @@ def predict(
         bool, typer.Option("--vars/--no-vars", help="Modes of voltage and vars, which take a second or two.")
     ] = True,
 ) -> None:
-    """Predict modes, settling times, limits of step and delay, and times to restore after each event, from theory.
+    """Predict from theory how a scenario will go.
 
+    That is modes, settling times, limits of step and delay, and times to restore after each event.
     Nothing is run but the plant on droop alone, to learn the load of each event and how vars answer to V_set.
     docs/theory.md has the equations, and how far they met the plant.
 

@@ -35,7 +35,9 @@ def reproduce(
         typer.Option(metavar="DIR", help="Folder for the report, new or empty; runs/reproduce/TIME when left out."),
     ] = None,
 ) -> None:
-    """Run all of the paper's experiments and write one report with every table, figure and claim beside the paper's.
+    """Run all experiments of the paper, and write one report.
+
+    Every table, figure and claim of ours stands beside the paper's.
 
     Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
     2 bad usage, 3 a run broke.

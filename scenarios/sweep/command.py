@@ -30,7 +30,9 @@ def sweep(
         bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
     ] = False,
 ) -> None:
-    """Run a scenario many times over values of its keys, into one table with plots. The same command resumes it.
+    """Run a scenario many times over values of its keys.
+
+    What comes of it is one table with plots. The same command resumes it.
 
     Exit code: 0 done (runs that broke are rows of the table), 2 bad usage or a bad file, 3 every run broke or the
     workers went, 130 interrupted by Ctrl-C: what is done is kept.
@@ -38,14 +40,13 @@ def sweep(
     Example:  gridpeers sweep topology --jobs 2
     """
     from scenarios.spec import ScenarioError
-
-    check_packages(dask=bool(dask))
     from scenarios.sweep.file import read_sweep
 
     try:
         plan = read_sweep(file)
     except ScenarioError as error:
         refuse(error)
+    check_packages(dask=bool(dask))
     if dry_run:
         typer.echo(_size(file, plan))
         return

@@ -55,7 +55,7 @@ def test_who_leaves_and_returns_is_predicted_too() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["predict"], "Missing argument 'SCENARIO'"),
+        (["predict"], "SCENARIO is missing"),
         (["predict", "islandin"], 'did you mean "islanding"?'),
         (["predict", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
         (["predict", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),

@@ -65,6 +65,7 @@ def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.Monkey
         "gridpeers: pyarrow is not installed; the table cannot do without\n"
         "gridpeers: install what sweeps need: pip install 'gridpeers[sweep]'\n",
     )
+    assert invoke("topologi")[1].startswith('gridpeers: no sweep "topologi"; '), "nothing to install for a wrong name"
 
 
 def test_no_scheduler_at_the_address_is_told(sweep_file: Write, monkeypatch: pytest.MonkeyPatch) -> None:

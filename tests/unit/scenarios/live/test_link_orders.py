@@ -192,7 +192,7 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["set", "inv1", "inv4"], "does nothing; give it one of profile, cut"),
+        (["set", "inv1", "inv4"], "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
         (["set", "inv1 -> inv4", "--loss", "20"], "--loss: a loss is a probability from 0 to 1, got 20; did you"),
         (["set", "inv1", "inv4", "--delay", "100"], "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
         (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: 0.2 s is more than the delay"),

@@ -39,7 +39,7 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["plant"], "Missing argument 'SCENARIO'"),
+        (["plant"], "SCENARIO is missing"),
         (["plant", "islandin"], 'no scenario "islandin"; did you mean "islanding"?'),
         (["plant", "islanding", "--run", "a/b"], '--run: "a/b" cannot be part of a Zenoh key'),
         (["plant", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
@@ -56,7 +56,7 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["up", "islanding", "--record", "nowhere/it.toml"], "there is no folder nowhere; make it first"),
         (["up", "islanding", "--record", "full"], "--record full: is there already"),
         (["up", "islanding", "--record", "a" * 300], "cannot be written: File name too long; give another name"),
-        (["agent"], "Missing argument 'INVERTER'"),
+        (["agent"], "INVERTER is missing"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--run", "*"], '--run: "*" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),
@@ -64,8 +64,8 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["down", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
         (["status", "--run", "$x"], '--run: "$x" cannot be part of a Zenoh key'),
         (["event", "toggle", "sw1_2"], '"toggle" cannot be done to a switch; write open or close'),
-        (["event", "open"], "Missing argument 'SWITCH'"),
-        (["stop"], "Missing argument 'INVERTER'"),
+        (["event", "open"], "SWITCH is missing"),
+        (["stop"], "INVERTER is missing"),
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_starts(elsewhere: Path, words: list[str], said: str) -> None:
