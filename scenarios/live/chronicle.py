@@ -108,7 +108,9 @@ class Chronicle:
             if len(rows) < 2:
                 self._trouble = self._trouble or "nothing was recorded, so there are no numbers"
             elif not self.ended:
-                self._trouble = self._trouble or f"the record ends at {rows[-1][0]:g} s: then no word came of the plant"
+                self._trouble = (
+                    self._trouble or f"the record ends at {rows[-1][0]:.2f} s: then no word came of the plant"
+                )
             else:
                 recorded = recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
                 if self._on_whole is not None:
@@ -150,7 +152,7 @@ class Chronicle:
             if self._recorder is not None:
                 self._recorder(message)
         except (RecordError, OSError) as error:
-            self._lose(f"the record ends at {self.t:g} s: {getattr(error, 'strerror', None) or error}")
+            self._lose(f"the record ends at {self.t:.2f} s: {getattr(error, 'strerror', None) or error}")
             return False
         return True
 
@@ -160,6 +162,6 @@ class Chronicle:
         try:
             self._book(message)
         except OSError as error:
-            self._lose(f"the record of links ends at {self.t:g} s: {error.strerror}")
+            self._lose(f"the record of links ends at {self.t:.2f} s: {error.strerror}")
             return False
         return True

@@ -118,7 +118,7 @@ class Account:
     def _notes(self, compared: Compared) -> Iterable[str]:
         """What a reader must know of these numbers."""
         assert self._recorded is not None
-        ended, scenario, windows = f"{compared.ended:g} s", self._ran.scenario, compared.opened
+        ended, scenario, windows = f"{compared.ended:.2f} s", self._ran.scenario, compared.opened
         if not scenario.events and not compared.by_hand:
             yield "the scenario has no event, and nobody made one, so there is no window to measure in"
         elif windows.not_reached:

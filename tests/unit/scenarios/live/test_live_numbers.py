@@ -223,14 +223,14 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
         **{"ended_s": 8.0, "windows": {}, "too_short": [], "not_reached": [], "disturbed": [], "departures": []}
     }
     assert "ours | paper's Table I\n" in report
-    assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8 s\n" in report
+    assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8.00 s\n" in report
     assert len(list((tmp_path / "plots").glob("*.png"))) == 7
 
 
 @pytest.mark.parametrize(
     ("until", "measured", "said"),
     [
-        (5.0, ["event1"], "ended at 5 s, before the end of event2 (4 to 7 s): they have no numbers"),
+        (5.0, ["event1"], "ended at 5.00 s, before the end of event2 (4 to 7 s): they have no numbers"),
         (0.01, [], "ended at 0.01 s, before the end of event1 (1 to 4 s), event2 (4 to 7 s): nothing was measured"),
     ],
 )
