@@ -357,11 +357,11 @@ class FreePlant(Side):
         leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
         for name in leave:
             if name in self.instances:
-                reason = f"{name} leaves at t = {self.t:g} s, as the scenario says"
+                reason = f"{name} leaves at t = {self.t:.2f} s, as the scenario says"
                 self.stop(self.keys.dismissal(name, self.instances[name]), reason)
                 self._say(reason)
         if join:
-            self._say(f"{', '.join(join)} may join from t = {self.t:g} s on, as the scenario says")
+            self._say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
             self._report(final=False, awaited=join)
 
     def _keep_pace(self, now: float) -> None:
@@ -416,8 +416,8 @@ class FreePlant(Side):
     # ---------------------------------------------------------------- what is told
 
     def _note(self, subject: str, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:g} s"))
-        self._say(f"{text}, at t = {self.t:g} s")
+        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:.2f} s"))
+        self._say(f"{text}, at t = {self.t:.2f} s")
 
     def _say(self, text: str) -> None:
         self._actions.append(Say(f"plant: {text}"))

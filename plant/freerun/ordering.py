@@ -50,7 +50,7 @@ class Ordering:
         links.order(text, t)
         order = self._orders.give(text, t, reply_to)
         self._publish(self._keys.telemetry, encode(order))
-        return order, f"order {order.seq} to links: {said}, from t = {t:g} s on"
+        return order, f"order {order.seq} to links: {said}, from t = {t:.2f} s on"
 
     def send(self, names: Iterable[str], now: float) -> None:
         """Send to each of these agents the orders that it has not been sent, or not answered (s, driver's clock)."""
