@@ -346,7 +346,8 @@ class FreeAgent(Side):
             return
         if self.phase != "running":
             self.phase = "running"
-            self._say(f"joins at t = {measurement.t:.2f} s, from {measurement.P_set:.0f} W and {measurement.V_set:.1f} V")
+            m = measurement
+            self._say(f"joins at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
         young = self._young(now)
         ages = {name: self.heard.age(name, now) for name in young}
         state = replace(self._agent.tick(measurement, young, ages), seq=self.tally.sent)
