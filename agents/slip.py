@@ -118,10 +118,11 @@ class Slips:
     def heard(self, name: str, t: float, angle: Angle | None) -> None:
         """Note a neighbour's angle at t (s), if it is news."""
         pair = self._pairs.setdefault(name, _Pair())
-        own = self._own_at(t)
-        if angle is None or own is None or (pair.since is not None and t <= pair.t):
+        if angle is None or (pair.since is not None and t <= pair.t):
             return
-        pair.compare((self._since, angle.since), t, own - angle.cycles)
+        own = self._own_at(t)
+        if own is not None:
+            pair.compare((self._since, angle.since), t, own - angle.cycles)
 
     def apart(self, name: str, t: float) -> bool:
         """Whether a neighbour is taken to stand in another island at t (s of run time)."""

@@ -1,4 +1,4 @@
-"""The rendezvous of a run: a TCP port on the loopback."""
+"""The rendezvous of a run: a TCP port on the loopback, and whether a port can be listened on."""
 
 from __future__ import annotations
 
@@ -22,6 +22,30 @@ def endpoint(port: int) -> str:
     return f"tcp/{HOST}:{port}"
 
 
+def probe(host: str, port: int) -> int:
+    """Listen for a moment at a port of this machine, as the plant will; the port, a free one for 0.
+
+    Parameters
+    ----------
+    host : str
+        Name or address; an IPv6 address in brackets.
+    port : int
+        The port.
+
+    Raises
+    ------
+    OSError
+        If nobody can listen there now.
+    """
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as trial:
+        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        trial.bind((host.strip("[]"), port))
+        trial.listen()
+        return int(trial.getsockname()[1])
+
+
 def check_port(port: int) -> None:
     """Find out whether the plant will be able to listen on a port, before anything is started or written.
 
@@ -35,14 +59,10 @@ def check_port(port: int) -> None:
     PortError
         If the port is in use, or not ours to use.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-            probe.listen()
-        except OSError as error:
-            raise PortError(
-                f"processes.port: port {port} of {HOST} cannot be used: {(error.strerror or str(error)).lower()}; "
-                "end what uses it, choose another, or write 0 to take a free one"
-            ) from None
+    try:
+        probe(HOST, port)
+    except OSError as error:
+        raise PortError(
+            f"processes.port: port {port} of {HOST} cannot be used: {(error.strerror or str(error)).lower()}; "
+            "end what uses it, choose another, or write 0 to take a free one"
+        ) from None

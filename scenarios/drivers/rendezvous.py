@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import random
-import socket
 
+from scenarios.drivers.ports import probe
 from wire.driver.session import SessionError
 
 _OWN = range(20_000, 32_000)
@@ -33,18 +33,9 @@ def rendezvous(listen: tuple[str, ...] = ()) -> str:
     why = ""
     for number in wanted:
         try:
-            _probe(host, number)
+            probe(host, number)
         except OSError as error:
             why = error.strerror or str(error)
         else:
             return f"{protocol}/{host}:{number}"
     raise SessionError(f"listen: cannot use {endpoint}: {why}; choose another port, or 0 for a free one")
-
-
-def _probe(host: str, port: int) -> None:
-    """OSError if nobody can listen there."""
-    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # else a run that just ended is in the way
-        probe.bind((host.strip("[]"), port))
-        probe.listen()

@@ -7,6 +7,7 @@ import re
 import socket
 from dataclasses import dataclass
 
+from scenarios.drivers.ports import probe
 from wire.keys import check_name
 
 RUN = "gridpeers"
@@ -158,17 +159,12 @@ def claim(option: str, text: str) -> str:
     if match["protocol"] not in ("tcp", "tls"):
         return text
     host, port = match["host"], int(match["port"])
-    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host.strip("[]"), port))
-            probe.listen()
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise UsageError(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
-        return f"{match['protocol']}/{host}:{probe.getsockname()[1]}{match['rest'] or ''}"
+    try:
+        port = probe(host, port)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
+    return f"{match['protocol']}/{host}:{port}{match['rest'] or ''}"
 
 
 def _way_out(host: str, error: OSError) -> str:
