@@ -1,0 +1,67 @@
+"""The pinned results of the catalogue: what is pinned, in which numerical environment, and how a case is run."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_info
+
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.ports import endpoint
+from scenarios.results.record import Tape
+from scenarios.spec import load_scenario
+from scenarios.spec.catalogue import CATALOGUE, names_in
+from scenarios.spec.configs import configs
+
+FILE = Path(__file__).parent / "hashes.toml"
+"""The pins."""
+
+QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
+"""What the last row of the first inverter has."""
+
+
+class Pin(NamedTuple):
+    """Result of one case."""
+
+    sha256: str
+    """Of the bytes of its history.csv."""
+    last: tuple[float, ...]
+    """Last row of the first inverter, in the order of `QUANTITIES`."""
+
+
+def cases() -> list[tuple[str, str]]:
+    """Every scenario of the catalogue with each of its cases."""
+    return [(name, case) for name in names_in(CATALOGUE) for case in load_scenario(name)[0].cases]
+
+
+def run_case(name: str, case: str) -> Pin:
+    """Run one case in this process."""
+    scenario, feeder = load_scenario(name)
+    plant, agents = configs(scenario, feeder, case, endpoint(0))
+    tape = Tape()
+    run_inprocess(plant, agents, tape)
+    recorded = tape.finish(scenario.time.end_s, plant.record_step)
+    return Pin(recorded.sha256, recorded.rows[-1][1 : 1 + len(QUANTITIES)])
+
+
+def environment() -> dict[str, str]:
+    """What decides the last digits: the numerical packages, and the processor type that OpenBLAS found."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    kernels = {str(pool.get("architecture", "")) for pool in threadpool_info() if pool["user_api"] == "blas"}
+    versions = {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}
+    return {**versions, "blas": " ".join(sorted(kernels))}
+
+
+def read() -> tuple[dict[tuple[str, str], Pin], dict[str, str], list[dict[str, str]]]:
+    """Read the pins by (scenario, case), their environment, and the reasons for which they moved, oldest first."""
+    whole = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    pins = {
+        (name, case): Pin(pin["sha256"], tuple(pin["last"]))
+        for name, of_cases in whole["pin"].items()
+        for case, pin in of_cases.items()
+    }
+    return pins, whole["environment"], whole["moved"]
