@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
+from io import StringIO
 from pathlib import Path
 
 import msgspec
@@ -60,8 +62,12 @@ class LinkRecord:
 
     def write(self, path: Path) -> None:
         """Write links.csv."""
-        rows = [row for trace in self.by_link().values() for row in _rows(trace)]
-        write_whole(path, "".join(",".join(map(str, row)) + "\n" for row in (COLUMNS, *rows)))
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for trace in self.by_link().values():
+            writer.writerows(_rows(trace))
+        write_whole(path, text.getvalue())
 
 
 def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:

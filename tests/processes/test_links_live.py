@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
@@ -176,7 +177,8 @@ LINK = ("inv1", "inv4")
 
 def set_fates(path: Path, since: float, until: float) -> dict[int, tuple[str, str]]:
     """Delay and fate of the messages of inv1 -> inv4 by number, of those sent from one time to another (s)."""
-    rows = [line.split(",") for line in path.read_text().splitlines()]
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
     return {
         int(n): (delay, fate)
         for src, dst, n, t, delay, fate in rows[1:]
