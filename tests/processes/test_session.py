@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import signal
+import subprocess
 import sys
 from time import monotonic
 
@@ -56,3 +58,63 @@ def take_one(session: Session) -> tuple[str, str, bytes]:
         events = session.inbox.take(1, until - monotonic())
     ((kind, key, payload, _),) = events
     return kind, key, payload
+
+
+HOLDER = """
+import signal
+import subprocess
+import sys
+from wire.driver.session import Session
+session = Session("b", connect=(sys.argv[1],), gossip=False, clock="wall")
+session.subscribe("gridpeers/t/telemetry")
+session.hold_token("gridpeers/t/alive/b")
+sys.stdin.read()
+session.close()
+"""
+
+
+def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_of_a_second_not_five() -> None:
+    """A message that may not be dropped waits so long for a full link; then the link is closed, and made anew."""
+    endpoint = rendezvous()
+    sender = Session("a", listen=(endpoint,), clock="wall", rendezvous=True)
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, endpoint], stdin=subprocess.PIPE)
+    try:
+        sender.watch("gridpeers/t/alive/**")
+        assert take_one(sender) == ("appeared", "gridpeers/t/alive/b", b"")
+        holder.send_signal(signal.SIGSTOP)
+        longest = 0.0
+        for _ in range(1000):  # 60 MB: more than the kernel keeps of a connection
+            began = monotonic()
+            sender.publish("gridpeers/t/telemetry", bytes(60_000))
+            longest = max(longest, monotonic() - began)
+            if longest > 0.1:
+                break
+        assert 0.1 < longest < 2.0
+        holder.send_signal(signal.SIGCONT)
+        assert take_one(sender) == ("vanished", "gridpeers/t/alive/b", b"")
+        assert take_one(sender) == ("appeared", "gridpeers/t/alive/b", b"")
+    finally:
+        holder.kill()
+        holder.communicate()
+        sender.close()
+
+
+def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_dropped() -> None:
+    """Lock-step drops nothing and waits Zenoh's 5 s; wall-clock time drops stale values and waits 200 ms."""
+    found = {}
+    for clock in ("simulated", "wall"):
+        session = Session("a", listen=("tcp/127.0.0.1:0",), clock=clock)
+        try:
+            keys = ("gridpeers/t/state/inv1", "gridpeers/t/telemetry")
+            control = []
+            for key in keys:
+                session.prepare(key)
+                control.append(str(session._publishers[key].congestion_control).rpartition(".")[2])
+            found[clock] = (
+                session.setting("transport/link/tx/queue/congestion_control/block/wait_before_close"),
+                control,
+            )
+        finally:
+            session.close()
+
+    assert found == {"simulated": (5_000_000, ["BLOCK", "BLOCK"]), "wall": (200_000, ["DROP", "BLOCK"])}

@@ -33,6 +33,14 @@ WALL_LEASE = 2_000
 """The same in wall-clock time: after a cut the link must be made anew soon. Control does not wait for it."""
 
 
+WAIT_BEFORE_CLOSE = 5_000_000
+"""How long (us) a message that may not be dropped waits for who does not read, in lock-step: Zenoh's default."""
+
+WALL_WAIT_BEFORE_CLOSE = 200_000
+"""The same in wall-clock time, where a plant that waits holds up the control of all others. A link that was closed is
+made anew when its other end reads again."""
+
+
 class _Profile(NamedTuple):
     """What differs between the two kinds of time."""
 
@@ -42,6 +50,8 @@ class _Profile(NamedTuple):
     """Between tries to connect: first (ms), longest (ms), growth."""
     timeout: int
     """For a link to open (ms)."""
+    wait_before_close: int
+    """How long (us) a message that may not be dropped waits for a link that is full; then the link is closed."""
     may_drop: bool
     """Whether messages of which only the newest matters are dropped when a link is full."""
 
@@ -49,8 +59,8 @@ class _Profile(NamedTuple):
 Clock = Literal["simulated", "wall"]
 
 _PROFILES: dict[Clock, _Profile] = {
-    "simulated": _Profile(LEASE, (20, 200, 1.5), 10_000, may_drop=False),
-    "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, may_drop=True),
+    "simulated": _Profile(LEASE, (20, 200, 1.5), 10_000, WAIT_BEFORE_CLOSE, may_drop=False),
+    "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, WALL_WAIT_BEFORE_CLOSE, may_drop=True),
 }
 
 FIRST_LINK = 0.5
@@ -134,7 +144,8 @@ class Session:
 
     def _open(self, who: str, config: dict[str, Any]) -> zenoh.Session:
         try:
-            return self._zenoh.open(self._zenoh.Config.from_json5(json.dumps(config)))
+            self._config = self._zenoh.Config.from_json5(json.dumps(config))
+            return self._zenoh.open(self._config)
         except self._zenoh.ZError as error:
             raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
 
@@ -149,6 +160,10 @@ class Session:
         linked.wait(FIRST_LINK)
         listener.undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
         return bool(self._session.info.routers_zid())
+
+    def setting(self, path: str) -> Any:
+        """Return a setting of Zenoh in force, by its path in Zenoh's configuration, e.g. "transport/link/tx/lease"."""
+        return json.loads(self._config.get_json(path))
 
     @property
     def misplaced(self) -> bool:
@@ -287,7 +302,13 @@ def _config(
                 "open_timeout": profile.timeout,
                 "accept_timeout": profile.timeout,
             },
-            "link": {"tx": {"lease": profile.lease, "keep_alive": 4}},
+            "link": {
+                "tx": {
+                    "lease": profile.lease,
+                    "keep_alive": 4,
+                    "queue": {"congestion_control": {"block": {"wait_before_close": profile.wait_before_close}}},
+                }
+            },
             # Else the first message of more than 3 kB makes pools of it, 65 ms in which the plant misses its steps.
             "shared_memory": {"enabled": False},
         },
