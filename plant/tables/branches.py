@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal, cast
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
 from plant.tables.buses import BusTable
+from plant.tables.plausible import (
+    LENGTH,
+    MUTUAL,
+    R_PERCENT,
+    RATED_CURRENT,
+    RATIO,
+    SELF_R,
+    SELF_X,
+    SHUNT,
+    X_PERCENT,
+    positive_definite,
+    power_of,
+)
 from plant.tables.table import Row, Table
 from wire.nearest import suggestion
 
@@ -16,6 +30,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
     columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
     last_row: dict[str, Row] = {}
+    mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
     table = Table(folder, "line_configs.csv", columns, mistakes, required=True)
     for row in table:
@@ -23,9 +38,10 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
         first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
         misplaced = row.mistaken
         diagonal = first == second and not misplaced
-        R = row.number("R_ohm_per_km", **({"above": 0.0} if diagonal else {}))
-        X = row.number("X_ohm_per_km", **({"above": 0.0} if diagonal else {}))
-        B = row.number("B_uS_per_km", **({"at_least": 0.0} if diagonal else {})) * 1e-6
+        above = 0.0 if diagonal else None
+        R = row.number("R_ohm_per_km", above=above, plausible=SELF_R if diagonal else MUTUAL)
+        X = row.number("X_ohm_per_km", above=above, plausible=SELF_X if diagonal else MUTUAL)
+        B = row.number("B_uS_per_km", at_least=above, plausible=SHUNT) * 1e-6
         matrix = elements.setdefault(name, {})
         if misplaced:
             spoiled.add(name)
@@ -34,6 +50,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
             row.mistake(f'config "{name}" element {first}-{second}: given already; give each element once')
         matrix[first, second] = matrix[second, first] = (complex(R, X), B)
         last_row[name] = row
+        mistaken[name] = mistaken.get(name, False) or row.mistaken
     configs: dict[str, LineConfig] = {}
     for name, matrix in elements.items():
         phases = "".join(phase for phase in PHASES if any(phase in pair for pair in matrix))
@@ -41,12 +58,17 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
         if missing and name not in spoiled:
             last_row[name].mistake(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
         blank = (0j, 0.0)
-        configs[name] = LineConfig(
-            name=name,
-            phases=phases,
-            Z=tuple(tuple(matrix.get((a, b), blank)[0] for b in phases) for a in phases),
-            B=tuple(tuple(matrix.get((a, b), blank)[1] for b in phases) for a in phases),
-        )
+        Z = tuple(tuple(matrix.get((a, b), blank)[0] for b in phases) for a in phases)
+        B_matrix = tuple(tuple(matrix.get((a, b), blank)[1] for b in phases) for a in phases)
+        configs[name] = LineConfig(name=name, phases=phases, Z=Z, B=B_matrix)
+        if missing or name in spoiled or mistaken[name]:
+            continue
+        for what, part in (("an R", lambda z: z.real), ("an X", lambda z: z.imag)):
+            if not positive_definite(tuple(tuple(map(part, row)) for row in Z)):
+                last_row[name].mistake(
+                    f'config "{name}" has {what} matrix that no line has (not positive definite); the elements off '
+                    "the diagonal must be smaller than those on it"
+                )
     return configs if table.readable else None
 
 
@@ -58,7 +80,7 @@ def read_lines(
     lines: dict[str, Line] = {}
     for row in Table(folder, "lines.csv", columns, mistakes, required=True):
         name, config, phases = row.text("line"), row.text("config"), row.phases()
-        length = row.number("length_m", above=0.0)
+        length = row.number("length_m", above=0.0, plausible=LENGTH)
         ends = buses.find_ends(row, phases)
         if configs is None or not config:
             pass
@@ -116,6 +138,11 @@ def read_regulators(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple
         ratio = 1.0 + row.number("tap") * row.number("tap_step_pu", above=0.0)
         if ratio <= 0.0:
             row.mistake(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
+        elif not math.isnan(ratio) and not RATIO.low <= ratio <= RATIO.high:
+            row.mistake(
+                f"tap and tap_step_pu give a ratio of {ratio:g}; {RATIO.low:g} to {RATIO.high:g} makes sense "
+                "(tap is a number of steps, as in 5 or -3, each of 0.00625 pu as a rule)"
+            )
         for phase in [phase for phase in phases if (name, phase) in seen]:
             row.mistake(f'regulator "{name}" phase {phase}: given already; give each phase once')
         seen |= {(name, phase) for phase in phases}
@@ -135,8 +162,10 @@ def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tup
         name = row.text("transformer")
         ends = buses.find_ends(row, "ABC")
         connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))
-        S_rated = row.number("S_rated_kVA", above=0.0) * 1000.0
-        z = complex(row.number("R_percent", at_least=0.0), row.number("X_percent", above=0.0)) / 100.0
+        most = power_of("a transformer", min(end.V_nom for end in ends), RATED_CURRENT, 3) if ends else None
+        S_rated = row.number("S_rated_kVA", above=0.0, plausible=most and most._replace(low=1.0)) * 1000.0
+        R = row.number("R_percent", at_least=0.0, plausible=R_PERCENT)
+        z = complex(R, row.number("X_percent", above=0.0, plausible=X_PERCENT)) / 100.0
         if name in transformers:
             row.mistake(f'transformer "{name}": there is one of this name already; names must differ')
         elif ends:

@@ -6,9 +6,14 @@ from collections.abc import Iterable
 from math import sqrt
 from pathlib import Path
 
-from plant.equipment import PHASES, Bus, Feeder, Line, Regulator, Switch
+from plant.connectivity import Connectivity, Node
+from plant.equipment import PHASES, Bus, Feeder
+from plant.tables.plausible import BUS_VOLTAGE
 from plant.tables.table import Row, Table
 from wire.nearest import suggestion
+
+_SHOWN = 24
+"""So many buses that are cut off are named."""
 
 
 class BusTable:
@@ -30,7 +35,7 @@ class BusTable:
             bus = Bus(
                 name=name,
                 phases=row.phases(stand_in="ABC"),
-                V_nom=row.number("V_nom_kV_LL", above=0.0) * 1000.0 / sqrt(3.0),
+                V_nom=row.number("V_nom_kV_LL", above=0.0, plausible=BUS_VOLTAGE) * 1000.0 / sqrt(3.0),
                 zone=row.text("zone", default=""),
                 x=row.number("x") if row.text("x", default="") else 0.0,
                 y=row.number("y") if row.text("y", default="") else 0.0,
@@ -84,13 +89,14 @@ class BusTable:
         """Note that a bus stands behind a delta winding, where no current can return through ground."""
         self._floating.add(bus.name)
 
-    def require_ground(self, row: Row, bus: Bus, what: str) -> None:
-        """Note a mistake if something connected to ground stands behind a delta winding."""
+    def require_ground(self, row: Row, bus: Bus, what: str) -> bool:
+        """Note a mistake if something connected to ground stands behind a delta winding; tell whether all is well."""
         if bus.name in self._floating:
             row.mistake(
                 f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; '
                 f"use delta loads there, or a Yg-Yg transformer"
             )
+        return bus.name not in self._floating
 
     def row_of(self, name: str) -> Row:
         """Give the table's row of a bus, to note a mistake there."""
@@ -98,20 +104,44 @@ class BusTable:
 
 
 def report_unconnected(feeder: Feeder, buses: BusTable, mistakes: list[str]) -> None:
-    """Note every phase of a bus that no branch, switch or source touches: an inverter there would feed nothing."""
-    branches: list[Line | Switch | Regulator] = [*feeder.lines, *feeder.switches, *feeder.regulators]
-    touched = {
-        (end, phase) for branch in branches for end in (branch.from_bus, branch.to_bus) for phase in branch.phases
-    }
-    whole = [end for transformer in feeder.transformers for end in (transformer.from_bus, transformer.to_bus)]
-    if len(feeder.buses) == 1:  # what feeds the only bus is enough
-        whole += [inverter.bus for inverter in feeder.inverters]
-    whole += [feeder.source.bus] if feeder.source else []
-    touched |= {(bus, phase) for bus in whole for phase in PHASES}
-    for bus in feeder.buses:
-        alone = [phase for phase in bus.phases if (bus.name, phase) not in touched]
-        if alone:
-            buses.row_of(bus.name).mistake(
-                f'bus "{bus.name}" phase {", ".join(alone)}: nothing connects it; '
+    """Note every node that is cut off even with all switches closed: a feeder is one network, in each phase."""
+    inverters = (*feeder.inverters, *feeder.spares)
+    whole = [*([feeder.source.bus] if feeder.source else []), *(row.bus for row in inverters)][:1]
+    parts = Connectivity(feeder).parts(whole=whole)
+    main = next((part for part in parts if whole and (whole[0], "A") in part), max(parts, key=len))
+    order = {bus.name: bus.phases for bus in feeder.buses}
+    for part in _by_bus(part for part in parts if part is not main):
+        names = [name for name in order if any((name, phase) in part for phase in PHASES)]
+        shown = [_named(name, order[name], part) for name in names]
+        if len(names) == 1:
+            phases = ", ".join(phase for phase in order[names[0]] if (names[0], phase) in part)
+            buses.row_of(names[0]).mistake(
+                f'bus "{names[0]}" phase {phases}: nothing connects it; '
                 f"end a line, switch, regulator or transformer there, or remove it"
             )
+            continue
+        there = [row.name for row in inverters if row.bus in names]
+        rest = f"the substation at bus {whole[0]}" if feeder.source else "the rest"
+        mistakes.append(
+            f"buses.csv: {len(names)} buses are not connected with {rest}: {', '.join(shown[:_SHOWN])}"
+            + (f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else "")
+            + (f" (with {', '.join(there)})" if there else "")
+            + "; "
+            "a line, switch, regulator or transformer is missing, or lacks a phase"
+        )
+
+
+def _by_bus(parts: Iterable[frozenset[Node]]) -> list[frozenset[Node]]:
+    """Parts, those together that are phases of the same buses: what cuts off one phase cut off the others."""
+    found: list[frozenset[Node]] = []
+    for part in parts:
+        buses = {bus for bus, _ in part}
+        same = [other for other in found if buses & {bus for bus, _ in other}]
+        found = [*(other for other in found if other not in same), part.union(*same)]
+    return found
+
+
+def _named(bus: str, phases: str, part: frozenset[Node]) -> str:
+    """A bus, with its phases if not all of them are in a part."""
+    there = [phase for phase in phases if (bus, phase) in part]
+    return bus if len(there) == len(phases) else f"{bus} phase {', '.join(there)}"

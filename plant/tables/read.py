@@ -104,7 +104,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
             else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {', '.join(LOAD_COLUMNS)}"
         )
     capacitors = read_capacitors(folder, buses, mistakes)
-    inverters = read_inverters(folder, buses, mistakes)
+    inverters = read_inverters(folder, buses, loads, mistakes)
     source = read_source(folder, buses, mistakes)
     found = Feeder(
         name=folder.name,
@@ -121,7 +121,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         spares=tuple(row for row in inverters if row.spare),
         source=source,
     )
-    if not mistakes:
+    if not mistakes and found.buses:
         # After other mistakes this would only repeat them: a misnamed end leaves the right bus unconnected.
         report_unconnected(found, buses, mistakes)
     if mistakes:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from plant.equipment import PHASES
+from plant.tables.plausible import Plausible, objection
 from wire.nearest import suggestion
 
 
@@ -38,10 +39,22 @@ class Row:
             if default is not None:
                 return default
             self.mistake(f"{column} is empty; give a name")
+        if not value.isprintable():
+            self.mistake(f"{column} {value!a}: has characters that cannot be printed; use letters and digits")
         return value
 
-    def number(self, column: str, *, at_least: float | None = None, above: float | None = None) -> float:
-        """Read a finite number within bounds; NaN stands in, which no later comparison complains about."""
+    def number(
+        self,
+        column: str,
+        *,
+        at_least: float | None = None,
+        above: float | None = None,
+        plausible: Plausible | None = None,
+    ) -> float:
+        """Read a finite number within bounds; NaN stands in, which no later comparison complains about.
+
+        An implausible number is a mistake, but stands: what it relates to can still be checked.
+        """
         value = self._cells.get(column, "")
         try:
             number = float(value)
@@ -57,6 +70,8 @@ class Row:
         if at_least is not None and number < at_least:
             self.mistake(f"{column} must not be less than {at_least:g}{unit}, got {number:g}{unit}")
             return math.nan
+        if plausible is not None and (wrong := objection(number, unit.strip(), plausible)):
+            self.mistake(f"{column}: {wrong}")
         return number
 
     def choice(self, column: str, what: str, choices: Collection[str]) -> str:

@@ -1,0 +1,82 @@
+"""Which parts of a feeder hang together, phase by phase, and which of them something feeds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from plant.equipment import PHASES, Feeder, Line, Regulator
+
+Node = tuple[str, str]
+"""A bus and one of its phases."""
+
+
+class Connectivity:
+    """The graph of a feeder's nodes.
+
+    Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and an
+    inverter that forms the grid join all three phases of theirs. What is connected to ground, or feeds nothing by
+    itself (loads, capacitors, grid-following inverters), joins none.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        Its tables.
+    """
+
+    def __init__(self, feeder: Feeder) -> None:
+        self._feeder = feeder
+        self.nodes: tuple[Node, ...] = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
+        self._fixed: list[tuple[Node, Node]] = []
+        branches: list[Line | Regulator] = [*feeder.lines, *feeder.regulators]
+        for branch in branches:
+            self._fixed += [((branch.from_bus, p), (branch.to_bus, p)) for p in branch.phases]
+        for transformer in feeder.transformers:
+            ends = (transformer.from_bus, transformer.to_bus)
+            self._fixed += [((ends[0], "A"), (bus, phase)) for bus in ends for phase in PHASES]
+
+    def closed_at_start(self) -> frozenset[str]:
+        """Switches that are closed before anything is operated."""
+        return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
+
+    def parts(self, closed: Collection[str] | None = None, whole: Iterable[str] = ()) -> tuple[frozenset[Node], ...]:
+        """Nodes that hang together, each part in the order of its first bus.
+
+        Parameters
+        ----------
+        closed : Collection[str], optional
+            Names of the closed switches; all of them if left out.
+        whole : Iterable[str], optional
+            Buses whose three phases count as one, for what stands there feeds all of them.
+        """
+        above = {node: node for node in self.nodes}
+
+        def root(node: Node) -> Node:
+            while above[node] != node:
+                above[node] = above[above[node]]
+                node = above[node]
+            return node
+
+        joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES)]
+        for switch in self._feeder.switches:
+            if closed is None or switch.name in closed:
+                joined += [((switch.from_bus, p), (switch.to_bus, p)) for p in switch.phases]
+        for one, other in joined:
+            above[root(one)] = root(other)
+        found: dict[Node, list[Node]] = {}
+        for node in self.nodes:
+            found.setdefault(root(node), []).append(node)
+        return tuple(frozenset(nodes) for nodes in found.values())
+
+    def dead(self, closed: Collection[str], forming: Iterable[str]) -> tuple[frozenset[Node], ...]:
+        """Parts that nothing feeds.
+
+        Parameters
+        ----------
+        closed : Collection[str]
+            Names of the closed switches.
+        forming : Iterable[str]
+            Buses of the grid-forming inverters that are on the network.
+        """
+        feeding = [*forming, *([self._feeder.source.bus] if self._feeder.source else [])]
+        fed = {(bus, "A") for bus in feeding}
+        return tuple(part for part in self.parts(closed, feeding) if not part & fed)
