@@ -6,6 +6,9 @@ from typing import Literal
 
 import msgspec
 
+MAX_AGE = 0.25
+"""Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
+
 
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Gains and limits of the secondary law (12)-(15), per unit of own rating, w in pu."""
@@ -132,5 +135,5 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     takes a period for so much longer."""
     links: str = ""
     """What the links to this agent do to its messages, as text for whoever puts them before it; empty: nothing."""
-    max_age: float = 0.25
+    max_age: float = MAX_AGE
     """Wall-clock: a neighbour's state, or a measurement, older than this (s of run time) is not used."""

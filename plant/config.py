@@ -188,6 +188,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Lock-step with the agents, or real time."""
     speed: float = 1.0
     """Wall-clock: run time per wall time (s/s), > 0."""
+    max_age: float = 0.25
+    """Wall-clock: age (s of run time) beyond which agents do not use a neighbour's state."""
     wait_for_agents: float = 10.0
     """Wall-clock: how long (s) the plant waits for its agents before it starts without those that are missing."""
     strict: bool = False

@@ -223,7 +223,7 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: when it leaves properly; the plant then takes its inverter off the network",
         ),
         row(
-            keys.status(agent), "publication", "AgentStatus", "agent", "watchers",
+            keys.status(agent), "publication", "AgentStatus", "agent", "plant, watchers",
             "wall-clock: every 0.5 s of wall time, and when its phase or its neighbours in use change",
         ),
         row(

@@ -24,6 +24,7 @@ from plant.freerun.heard import Heard
 from plant.freerun.ordering import Ordering
 from plant.freerun.pacing import Pacer
 from plant.freerun.service import Service
+from plant.freerun.silence import Silence
 from plant.interface import LivePlant
 from plant.reporting import measurement_of
 from plant.side import CLOSING, LINK_TICKS, Side
@@ -34,6 +35,7 @@ from wire.keys import check_name
 from wire.links import Links, is_taken
 from wire.messages import (
     PLANT,
+    AgentStatus,
     Command,
     Leave,
     LinkAnswer,
@@ -88,6 +90,7 @@ class FreePlant(Side):
         self._asked: dict[str, float] = {}
         """When each was last asked for its nameplate."""
         self._heard = Heard()
+        self._silence = Silence(config.max_age, config.T_c, self.pacer.period)
         self._step_due = False
         self._deadline = 0.0
         self._word = Timer(WAITING, 0.0)
@@ -95,6 +98,7 @@ class FreePlant(Side):
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         self._obeyed_keys = {self.keys.obeyed(name): name for name in plant.inverters}
         self._state_keys = {self.keys.state(name): name for name in plant.inverters}
+        self._status_keys = {self.keys.status(name): name for name in plant.inverters}
         self._report_keys = {self.keys.report(name) for name in plant.inverters}
         self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
 
@@ -103,7 +107,8 @@ class FreePlant(Side):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return *self._state_keys, *self._leave_keys, *self._report_keys, *self._obeyed_keys, self.keys.command
+        each = (*self._state_keys, *self._status_keys, *self._leave_keys, *self._report_keys, *self._obeyed_keys)
+        return *each, self.keys.command
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -212,6 +217,7 @@ class FreePlant(Side):
         del self.instances[name]
         self.ordering.forget(name)
         self._heard.forget(name)
+        self._silence.forget(name)
         for known in (self.plates, self._asked, self._set_by):
             known.pop(name, None)
 
@@ -225,8 +231,13 @@ class FreePlant(Side):
             if key in self._state_keys and isinstance(message, State):
                 self._check_sender(self._state_keys[key], message)
                 self._heard.came(message, now)
+                self._silence.heard(name, self.tick)
                 if not is_taken(self._links, message, payload, now * self.config.speed):
                     self._heard.keep(message)
+            elif key in self._status_keys and isinstance(message, AgentStatus):
+                if name in self.plates:  # one comes earlier now and then
+                    self._check_sender(self._status_keys[key], message)
+                    self._silence.reported(message, self.tick)
             elif key in self._report_keys and isinstance(message, LinkReport):
                 self._publish(self.keys.telemetry, payload)
             elif key in self._obeyed_keys and isinstance(message, LinkAnswer):
@@ -249,6 +260,7 @@ class FreePlant(Side):
         if self.phase not in ("gathering", "running") or name in self.plates:
             return
         self.plates[name] = plate
+        self._silence.joined(name, self.tick)
         self._connect(name, True, now)
         self._note(name, f"{name} joined")
         self.ordering.send(self.plates, now)
@@ -406,6 +418,8 @@ class FreePlant(Side):
             self.abort(str(error), now)
             return True
         self.tick += 1
+        for name, text in self._silence.take(self.tick):
+            self._note(name, text)
         self._reporter.collect()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
             self._report(final=False)

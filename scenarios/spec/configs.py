@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from agents.config import AgentConfig, Control
+from agents.config import MAX_AGE, AgentConfig, Control
 from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
 from scenarios.spec.limits import limits_of
@@ -78,6 +78,7 @@ def configs(
         deadline=scenario.processes.deadline_s,
         listen=endpoints,
         links=links,
+        max_age=rule.handling.max_age or MAX_AGE,
     )
     agents = tuple(
         AgentConfig(

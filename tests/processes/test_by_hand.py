@@ -39,6 +39,11 @@ def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:
     return plant
 
 
+def children_of(pid: int) -> list[int]:
+    """Processes that the main thread of one has started."""
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
 def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     """An agent before the plant, one after, one that is stopped and comes back, a switch, a look, and the end."""
     early = desk.open("agent", "inv2")
@@ -206,6 +211,26 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
+def test_a_window_in_which_an_agent_was_frozen_does_not_pass_as_clean(desk: Desk) -> None:
+    """Frozen for less than Zenoh's lease, inv3 keeps its token; the window is flagged, and both ends are told."""
+    (desk.folder / "events.toml").write_text(EVENTS.replace("t_s = 0.6", "t_s = 3.0").replace("3600.0", "4.0"))
+    words = ("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here", "--for", "3.5")
+    up = desk.open_bare(*words)
+    up.expect("0.20 s  switch 13-152 opened")
+    (inv3,) = [pid for pid in children_of(up.pid) if Path(f"/proc/{pid}/cmdline").read_text().endswith("inv3\0")]
+
+    os.kill(inv3, signal.SIGSTOP)
+    up.expect("inv3 is silent: no state for 0.25 s, nothing comes from it")
+    os.kill(inv3, signal.SIGCONT)
+    up.expect("inv3 is heard again")
+
+    assert up.end() == 0
+    by_hand = json.loads((desk.folder / "here" / "metrics.json").read_text())["by_hand"]
+    assert by_hand["disturbed"] == ["early"]
+    assert "inv3 is silent" in by_hand["departures"][0]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
 @pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGINT", 130), ("SIGTERM", 143)])
 def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, status: int) -> None:
     """The plant and nine agents at once; `down`, Ctrl-C or SIGTERM end them all, with numbers beside the history."""
@@ -213,7 +238,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
     for _ in range(9):
         up.expect("inv[1-9] joined")
-    children = [int(pid) for pid in Path(f"/proc/{up.pid}/task/{up.pid}/children").read_text().split()]
+    children = children_of(up.pid)
     assert len(children) == 10
     desk.open("watch").expect(r"inv1 .* inv2-9 ")
     up.expect("0.60 s  switch 60-160 opened")

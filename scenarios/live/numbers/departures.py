@@ -12,6 +12,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.network import Network
+from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.opened import NEAR, Opened, events_by_hand, opened
 from scenarios.results.metrics import Window, windows
 from scenarios.results.moves import as_they_came
@@ -115,9 +116,12 @@ def _moved(
 ) -> Iterable[PlantEvent]:
     """Agents that came, went or died though the scenario does not say so, and those that should have and did not."""
     due = [*_due(scenario, every)]
+    expected = ExpectedSilence(scenario, feeder)
     first = {row.name for row in feeder.inverters}
     for event in events:
         if event.kind != "roster":
+            continue
+        if expected(event):
             continue
         match = re.match(rf"{re.escape(event.subject)} (joined|left|died)", event.text)
         verb = match[1] if match else ""

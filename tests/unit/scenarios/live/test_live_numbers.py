@@ -9,8 +9,9 @@ from typing import Any
 import msgspec
 import pytest
 
+from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.node import NodeFault
+from netem.spec.node import NodeFault, Skew
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.book import Book
@@ -92,6 +93,40 @@ def test_a_death_that_the_scenario_tells_of_is_none_of_the_people() -> None:
     assert [event.text for event in compare(killed, feeder, [], 9.0).departures] == [
         "inv3 was to be killed, and was not"
     ]
+
+
+SILENT = "inv3 is silent: no state for 0.25 s, nothing comes from it, at t = 5.5 s"
+HOLDS = "inv3 is silent: no state for 0.25 s, it says that it has no measurement, at t = 5.5 s"
+DEAF = "inv1 does not hear inv3, inv4: no state for 0.25 s, though one came here, at t = 5.5 s"
+
+
+@pytest.mark.parametrize(
+    ("netem", "subject", "text", "disturbed"),
+    [
+        (Netem(), "inv3", SILENT, ("event2",)),
+        (Netem(), "inv1", DEAF, ("event2",)),
+        (Netem(nodes=(NodeFault(name="inv3", pause=True, from_s=5.2, to_s=5.7),)), "inv3", SILENT, ()),
+        (Netem(nodes=(NodeFault(name="inv4", pause=True, from_s=5.2, to_s=5.7),)), "inv3", SILENT, ("event2",)),
+        (Netem(nodes=(NodeFault(name="inv3", skew=Skew(factor=1.1)),)), "inv3", SILENT, ("event2",)),
+        (Netem(links=(Fault(on="plant -> inv3", cut=True, from_s=5.0, to_s=5.4),)), "inv3", HOLDS, ()),
+        (Netem(links=(Fault(on="plant -> inv3", cut=True, from_s=5.0, to_s=5.4),)), "inv3", SILENT, ("event2",)),
+        (Netem(links=(Fault(on="plant -> inv3", cut=True, from_s=1.0, to_s=2.0),)), "inv3", HOLDS, ("event2",)),
+        (Netem(links=(Fault(on="plant -> inv3", loss=0.05),)), "inv3", HOLDS, ("event2",)),
+        (Netem(links=(Fault(on="* -> inv1", cut=True, from_s=5.0),)), "inv1", DEAF, ()),
+        (Netem(links=(Fault(on="inv4 -> inv1", cut=True, from_s=5.0),)), "inv1", DEAF, ("event2",)),
+    ],
+)
+def test_a_silence_disturbs_its_window_unless_the_scenario_brings_it_about(
+    netem: Netem, subject: str, text: str, disturbed: tuple[str, ...]
+) -> None:
+    """Frozen by hand or cut off for real: the window is flagged. What a fault of the scenario explains is its own."""
+    scenario, feeder = one_case("islanding")
+    scenario = msgspec.structs.replace(scenario, netem=netem)
+    again = told("roster", 6.0, "inv3", "inv3 is heard again, at t = 6 s")
+    compared = compare(scenario, feeder, [told("roster", 5.5, subject, text), again], 9.0)
+
+    assert compared.disturbed == disturbed
+    assert [event.text for event in compared.departures] == ([text] if disturbed else [])
 
 
 @pytest.mark.parametrize(
