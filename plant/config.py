@@ -48,6 +48,13 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Lower bound of the internal voltage (pu)."""
     E_max: float = 1.25
     """Upper bound of the internal voltage (pu)."""
+    P_set_lim: float = 3.0
+    """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
+    unloaded GFM stays below 62 Hz. GridLAB-D has no such bound."""
+    V_set_min: float = 0.8
+    """Lower bound of V_set (pu)."""
+    V_set_max: float = 1.2
+    """Upper bound of V_set (pu)."""
 
 
 class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -100,6 +107,13 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
     i_max: float = 1.2
     """Bound of each axis of the current reference (pu)."""
+    P_set_lim: float = 1.0
+    """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
+    set-point that was wound up delay the inverter's response."""
+    V_set_min: float = 0.8
+    """Lower bound of V_set (pu)."""
+    V_set_max: float = 1.2
+    """Upper bound of V_set (pu)."""
 
 
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -60,6 +60,8 @@ class Inverters:
         Filter admittances (S per phase); 0 for a current source.
     connected : bool[n]
         Inverters switched on; they deliver only in a live island.
+    P_set_lim, V_set_min, V_set_max : float64[n]
+        Bounds of the set-points that `hold` takes (pu).
     set_points : float64[n, 3]
         P_set, V_set, Q_set (pu); may be written between steps.
     J, V, I : complex128[n, 3]
@@ -81,6 +83,9 @@ class Inverters:
         self.m_q = np.array([unit.m_q for unit in units])
         self.S_max = np.full(n, np.inf)
         self.S_max[self.gfl_at] = self.gfl["S_max"]
+        self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])
+        self.V_set_min = np.array([unit.parameters.V_set_min for unit in units])
+        self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])
         self.y_f = np.zeros(n, complex)
         self.y_f[self.gfm_at], self.y_f[self.gfl_at] = self.gfm["y_f"], self.gfl["y_f"]
         self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
@@ -116,6 +121,17 @@ class Inverters:
         else:
             k = int(np.searchsorted(self.gfl_at, i))
             gfl_model.settle(self.gfl[k], self.gfl_state[k], self.V[i], self.I[i], S, v)
+
+    def hold(self, i: int, P_set: float, V_set: float) -> tuple[float, float]:
+        """Take set-points (pu) from the next step on, within the inverter's bounds; returns those that are held.
+
+        A GFL's P_set is clipped in place, as in GridLAB-D (section 4.4): what exceeds its rating is gone before the
+        droop (7) is added, and cannot hide a later over-frequency.
+        """
+        P_set = float(min(max(P_set, -self.P_set_lim[i]), self.P_set_lim[i]))
+        V_set = float(min(max(V_set, self.V_set_min[i]), self.V_set_max[i]))
+        self.set_points[i, :2] = P_set, V_set
+        return P_set, V_set
 
     def limit_power(self, i: int, P_max: float) -> None:
         """Bound a grid-following inverter's P reference (W) from the next step on.

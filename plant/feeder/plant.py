@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from plant.config import PlantSettings, PowerLimit
 from plant.dynamics import Dynamics, Inverter, PlantError
 from plant.feeder.circuits import Circuits
 from plant.feeder.islands import GRID, Islands
+from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
 from plant.network import Network
 from wire.messages import PlantEvent
@@ -70,6 +72,7 @@ class Plant:
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
         self._switches = Switchboard(network, settings.events, settings.h)
         self._circuits, self._islands = Circuits(network), Islands(network)
+        self._set_points = SetPointLimits()
         self._limits: dict[int, list[PowerLimit]] = {}
         for limit in settings.limits:
             self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
@@ -94,6 +97,7 @@ class Plant:
         )
         n = len(self.inverters)
         self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
+        self._check_start()
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
@@ -116,10 +120,17 @@ class Plant:
         return readings
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Take set-points (W, V), in force from the next step until others come."""
-        i = self._row[name]
-        self._dynamics.inverters.set_points[i, 0] = P_set / self._P_rated[i]
-        self._dynamics.inverters.set_points[i, 1] = V_set / self._V_nom[i]
+        """Take set-points (W, V), in force from the next step until others come, within what the inverter can do.
+
+        What is beyond its bounds is limited, and told once; what is no finite number is left out, and told once.
+        """
+        i, t = self._row[name], round(self.tick * self._T_c, 9)
+        if not (isfinite(P_set) and isfinite(V_set)):
+            self._events += self._set_points.refused(name, t)
+            return
+        P, V = self._dynamics.inverters.hold(i, P_set / self._P_rated[i], V_set / self._V_nom[i])
+        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * self._P_rated[i] / 1e3)
+        self._events += self._set_points.held(name, t, "V_set", V_set, V * self._V_nom[i])
 
     def switch(self, name: str, action: str) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias; it acts from the next step on.
@@ -199,6 +210,19 @@ class Plant:
         """Events since the last call."""
         events, self._events = tuple(self._events), []
         return events
+
+    def _check_start(self) -> None:
+        """Refuse a start that is no equilibrium: a GFM that holds up an island must not be beyond its limits there."""
+        units = self._dynamics.inverters
+        for k, i in enumerate(units.gfm_at.tolist()):
+            p, low, high = units.set_points[i, 0], units.gfm[k]["P_min"], units.gfm[k]["P_max"]
+            if self._dynamics.network.reduction.online[i] and not low - 1e-9 <= p <= high + 1e-9:
+                kW = self._P_rated[i] / 1e3
+                raise PlantError(
+                    f"no equilibrium at t = 0: {self.inverters[i]} would have to give {p * kW:.0f} kW, it can give "
+                    f"{low * kW:.0f} to {high * kW:.0f} kW (P_min_pu, P_max_pu of [plant.gfm]); set another P_set0_pu, "
+                    "or change the load of its island"
+                )
 
     def _as_row(self, step: int, readings: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> tuple[float, ...]:
         set_points = self._dynamics.inverters.set_points[:, :2] * np.column_stack([self._P_rated, self._V_nom])

@@ -82,6 +82,41 @@ def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
     _ordered("plant.gfm", "Q_min_pu", gfm.Q_min, "Q_max_pu", gfm.Q_max, mistakes)
     _ordered("plant.gfm", "E_min_pu", gfm.E_min, "E_max_pu", gfm.E_max, mistakes)
     _ordered("plant.gfl", "P_min_pu", gfl.P_min, "P_max_pu", gfl.P_max, mistakes)
+    _ordered("plant.gfm", "V_set_min_pu", gfm.V_set_min, "V_set_max_pu", gfm.V_set_max, mistakes)
+    _ordered("plant.gfl", "V_set_min_pu", gfl.V_set_min, "V_set_max_pu", gfl.V_set_max, mistakes)
+
+
+def check_start(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
+    """Every inverter can give its first set-point, else the start is no equilibrium and moves without an event."""
+    plant = scenario.plant
+    gfm, gfl, start = plant.gfm, plant.gfl, plant.P_set0_pu
+    limits = {
+        "GFM": [("gfm.P_max_pu", gfm.P_max), ("gfm.P_set_lim_pu", gfm.P_set_lim), ("gfm.P_min_pu", gfm.P_min)],
+        "GFL": [
+            ("gfl.P_max_pu", gfl.P_max),
+            ("gfl.S_max_pu", gfl.S_max),
+            ("gfl.i_max_pu", gfl.i_max),
+            ("gfl.P_set_lim_pu", gfl.P_set_lim),
+            ("gfl.P_min_pu", gfl.P_min),
+        ],
+    }
+    if mistakes.touch("plant.P_set0_pu", "plant.gfm", "plant.gfl"):
+        return
+    for kind, keys in limits.items():
+        units = [row for row in feeder.inverters if row.kind == kind]
+        for key, limit in keys:
+            below = key.endswith("P_min_pu")
+            if not units or mistakes.touch(f"plant.{key}") or (start >= limit if below else start <= limit):
+                continue
+            kW = ", ".join(
+                f"{row.name} {start * row.P_rated / 1e3:g} of {limit * row.P_rated / 1e3:g}" for row in units
+            )
+            mistakes.add(
+                "plant.P_set0_pu",
+                f"{start:g} pu is {'below' if below else 'above'} plant.{key} = {limit:g} pu, so the start is no "
+                f"equilibrium ({kW} kW); {'raise' if below else 'lower'} P_set0_pu, or change {key}",
+            )
+            break
 
 
 def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistakes) -> None:

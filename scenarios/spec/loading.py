@@ -13,7 +13,7 @@ import msgspec
 from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, read_feeder
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
-from scenarios.spec.checks import check_cases, check_names, check_switches, check_times
+from scenarios.spec.checks import check_cases, check_names, check_start, check_switches, check_times
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
@@ -112,6 +112,7 @@ def check_tables(
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
         check_limits(scenario, feeder, mistakes)
+        check_start(scenario, feeder, mistakes)
         check_netem(scenario, feeder, mistakes)
     return scenario, feeder
 

@@ -131,9 +131,11 @@ UNIT_OF_KEY: dict[type, dict[str, str]] = {
     Gains: dict.fromkeys(("V_full", "P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
     Handling: {**dict.fromkeys(("T_age", "max_age", "T_sat"), "s"), "slip_max": "cycles"},
     GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
-    | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu"),
+    | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu")
+    | dict.fromkeys(("P_set_lim", "V_set_min", "V_set_max"), "pu"),
     GflParameters: dict.fromkeys(("T_if", "T_ff", "T_pf", "T_vf", "T_qf"), "s")
     | dict.fromkeys(("R_f", "X_f", "db_UV", "db_OV", "P_max", "P_min", "S_max", "i_max"), "pu")
+    | dict.fromkeys(("P_set_lim", "V_set_min", "V_set_max"), "pu")
     | dict.fromkeys(("db_UF", "db_OF"), "Hz"),
 }
 """Unit that a key of the file carries where the field, named as in the models' equations, does not."""

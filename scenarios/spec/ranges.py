@@ -44,6 +44,8 @@ _LIMITS = {
     **dict.fromkeys(("X_f",), Range("a filter reactance", "pu", 0.001, 1.0, above_zero=True)),
     **dict.fromkeys(("P_max", "P_min"), Range("a limit of P", "pu", -2.0, 3.0)),
     **dict.fromkeys(("Q_max", "Q_min"), Range("a limit of Q", "pu", -10.0, 10.0)),
+    **dict.fromkeys(("P_set_lim",), Range("the bound of P_set", "pu", 0.1, 10.0, above_zero=True)),
+    **dict.fromkeys(("V_set_min", "V_set_max"), Range("a bound of V_set", "pu", 0.1, 2.0, above_zero=True)),
     **dict.fromkeys(("E_min", "E_max"), Range("a limit of the internal voltage", "pu", 0.0, 2.0)),
     **dict.fromkeys(("S_max", "i_max"), Range("a limit of apparent power or current", "pu", 0.1, 5.0, above_zero=True)),
     **dict.fromkeys(("V_lim",), Range("the limiters' bound V_lim", "pu", 0.01, 10.0, above_zero=True)),

@@ -74,6 +74,21 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         ('paper = "islanding"', 'paper = "islands"', r'paper: there is no "islands"'),
         ("[plant]", "[plant.gfm]\nT_p = 0.01\n\n[plant]", r"plant.gfm.T_p: unknown key; write T_p_s, in seconds"),
         ("[plant]", "[plant.gfm]\nP_max_pu = 100\n\n[plant]", r"plant.gfm.P_max_pu: .* did you mean 1 \(100 %\)\?"),
+        (
+            "[plant]",
+            "[plant.gfm]\nP_max_pu = 0.6\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is above plant.gfm.P_max_pu = 0.6 pu.*inv1 388.2 of 360, .* kW\); lower",
+        ),
+        (
+            "[plant]",
+            "[plant.gfl]\nP_max_pu = 0.6\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is above plant.gfl.P_max_pu = 0.6 pu.*inv2 226.45 of 210, .* kW\)",
+        ),
+        (
+            "[plant]",
+            "[plant.gfm]\nP_min_pu = 0.7\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is below plant.gfm.P_min_pu = 0.7 pu.*raise P_set0_pu",
+        ),
         ("[plant]", "[plant.gfm]\nE_min_pu = 1.5\n\n[plant]", r"plant.gfm.E_min_pu: 1.5 must be below E_max_pu = 1.25"),
     ],
 )
