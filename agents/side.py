@@ -43,6 +43,10 @@ class Side:
         """Whether the plant's token was ever there."""
         self._config, self._name, self._instance = config, config.name, instance
         self._agent = Agent(config)
+        try:
+            decode(encode(self._agent.nameplate))
+        except RejectedError as rejected:
+            raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
         self._links = links
         self._actions: list[Action | Say] = []
         self._routes: dict[str, tuple[str, Handler]] = {

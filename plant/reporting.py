@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import get_type_hints
+
+from msgspec.structs import replace
 
 from plant.interface import PlantLike, ReadingLike
-from wire.codec import LIMIT
-from wire.messages import PLANT, Measurement, Pacing, PlantEvent, Telemetry
+from wire.messages import LIMIT, PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
+from wire.printable import printable
 
 _NUMBER_BYTES = 9
 """Bytes of one float in msgpack."""
@@ -16,24 +19,37 @@ _NUMBER_BYTES = 9
 def measurement_of(
     name: str, reading: ReadingLike, *, incarnation: int, tick: int, t: float, roster: tuple[str, ...] = ()
 ) -> Measurement:
-    """Measurement of one inverter (t in s) from what its sensors read."""
+    """Measurement of one inverter (t in s) from what its sensors read, within the range of any sensor.
+
+    Beyond it a sensor shows the end of its scale. So a plant that swings wildly still grants its ticks; what it really
+    did stands in the telemetry.
+    """
     return Measurement(
         sender=PLANT,
         incarnation=incarnation,
         seq=tick,
         t=t,
         to=name,
-        P=reading.P,
-        Q=reading.Q,
-        V=reading.V,
-        f=reading.f,
-        P_set=reading.P_set,
-        V_set=reading.V_set,
+        P=_in_W(reading.P),
+        Q=_in_W(reading.Q),
+        V=_in_V(reading.V),
+        f=_in_Hz(reading.f),
+        P_set=_in_W(reading.P_set),
+        V_set=_in_V(reading.V_set),
         grid_connected=reading.grid_connected,
         island=reading.island,
         roster=roster,
     )
 
+
+def _scale(field: str) -> Callable[[float], float]:
+    """The scale of a sensor: the bounds of what a field of a measurement may be."""
+    bounds = get_type_hints(Measurement, include_extras=True)[field].__metadata__[0]
+    low, high = float(bounds.ge), float(bounds.le)
+    return lambda value: value if low <= value <= high else min(max(value, low), high)
+
+
+_in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
 
 _LATEST = 20
 """Events that are told to who comes late: with twice as many of the longest, an answer is still short."""
@@ -61,12 +77,12 @@ class Reporter:
     def collect(self) -> None:
         """Take what the plant has recorded."""
         self._rows += self._plant.take_rows()
-        events = self._plant.take_events()
-        self._events += events
-        self.latest.extend(events)
+        for event in self._plant.take_events():
+            self.note(event)
 
     def note(self, event: PlantEvent) -> None:
-        """Add an event that is not the plant's own."""
+        """Add an event."""
+        event = replace(event, subject=printable(event.subject, 200), text=printable(event.text))
         self._events.append(event)
         self.latest.append(event)
 
@@ -83,7 +99,7 @@ class Reporter:
     ) -> Iterator[Telemetry]:
         """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
         inverters = self._plant.inverters
-        bytes_per_row = _NUMBER_BYTES * (1 + 6 * len(inverters)) + 8
+        bytes_per_row = _NUMBER_BYTES * (1 + VALUES * len(inverters)) + 8
         at_once = max(1, LIMIT // 2 // bytes_per_row)
         rows, events = self._rows, self._events
         self._rows, self._events = [], []
@@ -98,7 +114,7 @@ class Reporter:
                 rows=tuple(part),
                 events=() if rows else tuple(events),
                 final=final and not rows,
-                outcome=outcome,
+                outcome=printable(outcome),
                 reproducible=reproducible,
                 pacing=pacing,
                 awaited=() if rows else awaited,

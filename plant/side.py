@@ -14,6 +14,7 @@ from wire.codec import RejectedError, Rejects, encode
 from wire.keys import Keys, check_name
 from wire.links import Links, arrived
 from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Pacing, State, Stop
+from wire.printable import printable
 
 CLOSING = 2.0
 """Longest wait for the others to close (s)."""
@@ -89,7 +90,9 @@ class Side:
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
         """Tell one agent, or all, to close."""
         incarnation = self.config.incarnation
-        stop = Stop(sender=PLANT, incarnation=incarnation, seq=self.tick, t=self.t, reason=reason, refused=refused)
+        stop = Stop(
+            sender=PLANT, incarnation=incarnation, seq=self.tick, t=self.t, reason=printable(reason), refused=refused
+        )
         self._publish(key, encode(stop))
 
     def _publish(self, key: str, payload: bytes) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
+from itertools import pairwise
+from types import ModuleType
 from typing import NamedTuple
 
 import msgspec
@@ -45,6 +47,24 @@ def field_docs(cls: type[msgspec.Struct]) -> tuple[FieldDoc, ...]:
     return tuple(
         FieldDoc(field.encode_name, written[field.name][0], _default(field), written[field.name][1])
         for field in msgspec.structs.fields(cls)
+    )
+
+
+def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
+    """Names and docstrings of the annotated types that a module defines for its fields.
+
+    Examples
+    --------
+    >>> from wire import messages
+    >>> dict(alias_docs(messages))["Rating"]
+    'W: more than none, and at most a gigawatt.'
+    """
+    body = ast.parse(inspect.getsource(module)).body
+    return tuple(
+        (ast.unparse(statement.targets[0]), " ".join(str(after.value.value).split()))
+        for statement, after in pairwise(body)
+        if isinstance(statement, ast.Assign) and ast.unparse(statement.value).startswith("Annotated[")
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
     )
 
 

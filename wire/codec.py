@@ -2,21 +2,22 @@
 
 msgpack through msgspec, which checks types and bounds while it decodes, and the CRC-32 of that in the last four bytes:
 TCP's checksum of 16 bits lets an error through now and then, and a bit flipped within a number would decode as another
-number. So a message that comes out of `decode` is as it was sent, and its numbers are finite. Whatever is not is a
-`RejectedError` of one of the kinds in `KINDS`: receivers count it and go on, as no message may stop an agent.
+number. So a message that comes out of `decode` is as it was sent, and within the bounds of `wire.messages`. Whatever is
+not is a `RejectedError` of one of the kinds in `KINDS`: receivers count it and go on, as no message may stop an agent.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from math import isfinite
+from typing import Any
 from zlib import crc32
 
 import msgspec
 
-from wire.messages import AnyMessage, Message
-
-LIMIT = 64_000
-"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
+from wire.messages import LIMIT, AnyMessage, Message
+from wire.printable import printable
 
 CRC = 4
 """Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first."""
@@ -30,15 +31,21 @@ KINDS = {
     "garbled": "not msgpack, or not the fields of its type",
     "unknown": "of a type that nobody here knows",
     "not finite": "a number in it is NaN or infinite",
+    "implausible": "a value in it is beyond what can be, or contradicts another",
     "foreign": "on a key of another run, or not sent by whom the key says",
     "ghost": "from an earlier life of its sender",
     "stale": "about a tick or a roster that is over",
     "unexpected": "well-formed, but not for here and now",
+    "failed": "an error of ours came up while it was handled, see its traceback",
 }
 """The kinds of rejects and what each means."""
 
 _encoder = msgspec.msgpack.Encoder()
 _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
+
+
+TRACED = 40
+"""Last lines of a traceback that are logged."""
 
 
 class RejectedError(Exception):
@@ -65,7 +72,7 @@ def encode(message: Message) -> bytes:
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Message of the bytes, whole and finite, or `RejectedError`.
+    """Message of the bytes, whole and within its bounds, or `RejectedError`.
 
     Examples
     --------
@@ -80,15 +87,33 @@ def decode(payload: bytes) -> AnyMessage:
     try:
         return _decoder.decode(payload[:-CRC])
     except msgspec.ValidationError as error:
-        raise RejectedError(_kind(str(error)), str(error)) from None
+        raise RejectedError(_kind(str(error), payload), str(error)) from None
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise RejectedError("garbled", str(error)) from None
 
 
-def _kind(text: str) -> str:
+_WRONG_TYPE = re.compile(r"^(Expected `[^`]*`, got |Object |Invalid |\w+ value out of range)")
+"""How msgspec begins where no value is wrong. Bounds, and what a message finds by itself, read otherwise."""
+
+
+def _kind(text: str, payload: bytes) -> str:
     if text.endswith("`$.type`"):
         return "unknown"
-    return "not finite" if "1e+300" in text else "garbled"
+    if _WRONG_TYPE.match(text):
+        return "garbled"
+    try:
+        return "implausible" if _is_finite(msgspec.msgpack.decode(payload[:-CRC])) else "not finite"
+    except (ValueError, TypeError, RecursionError):  # behind the value that is wrong there may be anything
+        return "implausible"
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether there is no NaN and no infinity among the numbers of a message."""
+    if isinstance(value, float):
+        return isfinite(value)
+    if isinstance(value, dict):
+        return all(map(_is_finite, value.values()))
+    return not isinstance(value, list) or all(map(_is_finite, value))
 
 
 class Rejects:
@@ -105,14 +130,15 @@ class Rejects:
         self._who = who
         self._lines: list[str] = []
 
-    def add(self, kind: str, key: str, text: str) -> None:
-        """Count one; the first of its kind is worth a line."""
+    def add(self, kind: str, key: str, text: str, traceback: str = "") -> None:
+        """Count one; the first of its kind is worth a line, and the traceback of an error of ours."""
         assert kind in KINDS
         if not self.counts[kind]:
-            self._lines.append(
-                f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {text[:200]}. "
+            line = (
+                f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {printable(text, 200)}. "
                 "More of this kind are only counted. See docs/protocol.md"
             )
+            self._lines.append("\n".join([line, *(printable(row, 200) for row in traceback.splitlines()[-TRACED:])]))
         self.counts[kind] += 1
 
     @property

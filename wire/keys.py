@@ -10,8 +10,9 @@ import re
 
 import msgspec
 
-_CHUNK = re.compile(r"[A-Za-z0-9_.-]{1,64}")
-"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
+from wire.messages import NAME
+
+_NAME = re.compile(NAME)
 
 
 LATEST_ONLY = ("measurement", "state", "status")
@@ -49,7 +50,7 @@ def check_name(what: str, name: str) -> None:
         ...
     ValueError: run: "a/b" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."
     """
-    if not _CHUNK.fullmatch(name):
+    if not _NAME.fullmatch(name):
         raise ValueError(
             f'{what}: "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."'
         )

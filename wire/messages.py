@@ -1,5 +1,9 @@
 """The messages of a run. Frozen, validated, SI units on the wire.
 
+The annotations are the only place where bounds stand; the codec checks them while it decodes. They are physical: as
+wide as anything that a plant, an inverter or a run can be, and no wider. What a message says twice must agree
+(`__post_init__`). So whatever has been decoded is safe to compute with, to print and to put into a key.
+
 Every message carries who sent it (`sender`), which life of that sender (`incarnation`: a restarted
 agent has a higher one than its ghost), a number (`seq`) and the run's time (`t`, s). In messages of
 the tick loop `seq` is the tick k and `t` is k T_c.
@@ -7,6 +11,7 @@ the tick loop `seq` is the tick k and `t` is k T_c.
 
 from __future__ import annotations
 
+from math import inf
 from typing import Annotated, Literal
 
 import msgspec
@@ -14,17 +19,78 @@ import msgspec
 PLANT = "plant"
 """Name under which the plant process sends."""
 
-Name = Annotated[str, msgspec.Meta(max_length=64)]
-"""A name on the wire: never longer than 64 characters."""
+LIMIT = 64_000
+"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
 
-Words = Annotated[str, msgspec.Meta(max_length=4000)]
-"""An order to links, as text that no core reads."""
+NAME = r"[A-Za-z0-9_.-]{1,64}"
+"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
 
-Number = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
-"""A finite number: NaN and the infinities fail these bounds, and the message with them."""
+UNPRINTABLE = "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
+"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing."""
 
-Count = Annotated[int, msgspec.Meta(ge=0)]
-"""A tick, a sequence number, an incarnation: never negative."""
+_PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
+
+Name = Annotated[str, msgspec.Meta(pattern=rf"^{NAME}\Z")]
+"""Name of an inverter, process or run: 1 to 64 letters, digits, "_", "-" or "."; safe in keys, files and logs."""
+
+NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
+"""The same, or empty if there is none or it is not known."""
+
+Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
+"""What people call something in their tables: up to 200 printable characters."""
+
+Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
+"""A sentence for people, or an order that no core reads: up to 4000 printable characters on one line."""
+
+Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
+"""What somebody asked for: printable, and only as long as a message may be."""
+
+Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
+"""Bytes that no core looks into."""
+
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
+"""A tick, a sequence number, an incarnation: never negative, and exact as a float too."""
+
+Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
+"""s, of run time or of waiting: up to 30 years."""
+
+Age = Annotated[float, msgspec.Meta(ge=-1.0, le=1e9)]
+"""s; -1 if there is none."""
+
+Rating = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
+"""W: more than none, and at most a gigawatt."""
+
+Power = Annotated[float, msgspec.Meta(ge=-1e11, le=1e11)]
+"""W or var: up to 100 times the largest rating, which is what an agent without limits ever sets."""
+
+NominalVoltage = Annotated[float, msgspec.Meta(gt=0.0, le=1e5)]
+"""V, line-to-neutral: at the terminals of an inverter, so at most 100 kV."""
+
+Voltage = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
+"""V, line-to-neutral RMS: up to 10 times the highest nominal voltage."""
+
+NominalFrequency = Annotated[float, msgspec.Meta(ge=1.0, le=1000.0)]
+"""Hz: 16.7, 50, 60 and 400 are in use."""
+
+Frequency = Annotated[float, msgspec.Meta(ge=0.0, le=2000.0)]
+"""Hz: from standstill to twice the highest nominal frequency."""
+
+Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+"""pu per pu: some; at 1 full power would take the whole frequency, or voltage."""
+
+Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
+"""Cycles: the farthest frequency for the longest time."""
+
+MOST = 1000
+"""Most inverters in a run: one row of telemetry on more would not fit into a message."""
+
+Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
+"""Names of inverters or processes."""
+
+
+def _once(what: str, names: tuple[str, ...]) -> None:
+    if len(set(names)) != len(names):
+        raise ValueError(f"{what}: a name stands there twice")
 
 
 class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -36,7 +102,7 @@ class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True,
     """Which life of the sender: greater after every restart."""
     seq: Count
     """Tick number k in the tick loop, roster number while a roster is prepared."""
-    t: Number
+    t: Time
     """Run time (s)."""
 
 
@@ -45,17 +111,17 @@ class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
     kind: Literal["GFM", "GFL"]
     """Grid-forming (a leader of the consensus) or grid-following (a follower)."""
-    microgrid: Name
+    microgrid: Label
     """Name of the microgrid the inverter stands in."""
-    P_rated: Number
+    P_rated: Rating
     """Rated real power s_i (W), base of every per-unit power of this inverter."""
-    V_nom: Number
+    V_nom: NominalVoltage
     """Nominal terminal voltage (V, line-to-neutral RMS)."""
-    f_nom: Number
+    f_nom: NominalFrequency
     """Nominal frequency (Hz)."""
-    m_p: Number
+    m_p: Droop
     """P-f droop (pu frequency per pu power; 0.01 = 1 %)."""
-    m_q: Number
+    m_q: Droop
     """Q-V droop (pu voltage per pu reactive power; 0.05 = 5 %)."""
 
 
@@ -64,45 +130,48 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
 
     to: Name
     """Inverter this measurement belongs to."""
-    P: Number
+    P: Power
     """Real power out of the inverter (W, three phases)."""
-    Q: Number
+    Q: Power
     """Reactive power out of the inverter (var, three phases)."""
-    V: Number
+    V: Voltage
     """Terminal voltage (V, mean of the line-to-neutral RMS values)."""
-    f: Number
+    f: Frequency
     """Frequency (Hz): of the internal voltage of a GFM, of the PLL of a GFL."""
-    P_set: Number
+    P_set: Power
     """Real-power set-point the plant holds now (W)."""
-    V_set: Number
+    V_set: Voltage
     """Voltage set-point the plant holds now (V)."""
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
-    island: Name
+    island: NameOrNone
     """Name of the island: "grid", or the first inverter in it."""
-    roster: tuple[Name, ...]
+    roster: Names
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
+
+    def __post_init__(self) -> None:
+        _once("roster", self.roster)
 
 
 class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):
     """The integral of an inverter's frequency: two that differ ever more are not in step."""
 
-    cycles: Number
+    cycles: Cycles
     """int (f - f_nom) dt."""
-    since: Number
+    since: Time
     """Run time whence it counts (s): it begins anew where measurements are missing."""
 
 
 class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """What an agent decided at tick k: its set-points, heard by its neighbours and by the plant."""
 
-    P_set: Number
+    P_set: Power
     """Real-power set-point (W)."""
-    V_set: Number
+    V_set: Voltage
     """Voltage set-point (V)."""
-    Q: Number
+    Q: Power
     """Reactive power measured at tick k (var)."""
-    island: Name = ""
+    island: NameOrNone = ""
     """Island the inverter stood in at that measurement: who stands in another one leaves this state out of its sums.
     Empty if it is not known."""
     angle: Angle | None = None
@@ -112,16 +181,21 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """The plant asks every agent of a roster to be ready to hear its neighbours (plant -> agents)."""
 
-    roster: tuple[Name, ...]
+    roster: Names
     """Agents that will take part from the next tick on, in the order of the inverters."""
-    instances: tuple[Name, ...]
+    instances: Names
     """Of each agent on the roster the instance that is meant: two processes may claim one name."""
+
+    def __post_init__(self) -> None:
+        _once("roster", self.roster)
+        if len(self.instances) != len(self.roster):
+            raise ValueError(f"instances: {len(self.instances)} for {len(self.roster)} names on the roster")
 
 
 class Waiting(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """The plant is there, but not yet at t = 0; now and then until it is (plant -> agents, wall-clock time)."""
 
-    waits_for: tuple[Name, ...]
+    waits_for: Names
     """Agents that have not come."""
 
 
@@ -132,7 +206,7 @@ class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
 class Stop(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """The run is over and agents close; or, sent to one agent, it cannot take part or shall leave (plant -> agents)."""
 
-    reason: str
+    reason: Text
     """Why, for the log: "end of the scenario", or what went wrong."""
     refused: bool = False
     """Whether the agent never took part, as another has its name or no inverter has."""
@@ -145,18 +219,22 @@ class Leave(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
 class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What the emulated links into one receiver did of late (agent -> plant -> recorders)."""
 
-    data: bytes
+    data: Data
     """A part of the receiver's book, for the record; no core looks into it."""
-    instance: Name = ""
+    instance: NameOrNone = ""
     """Which process of the sender's: it is told that its last part has come."""
     final: bool = False
     """Whether this is the last part: the sender closes once it is told."""
+
+    def __post_init__(self) -> None:
+        if self.final and not self.instance:
+            raise ValueError("instance: the last part must say whom to tell that it has come")
 
 
 class LinkOrder(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What emulated links shall do to messages sent at `t` or later; number 0 asks how they stand (plant -> agent)."""
 
-    text: Words
+    text: Text
     """What a person ordered, for the agent's links."""
     reply_to: Name
     """Who wants to know: last part of the key under which the plant passes the `LinkAnswer` on."""
@@ -167,11 +245,11 @@ class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
 
     ok: bool
     """Whether it was done."""
-    text: str
+    text: Text
     """Which links it concerned, or why it was not done."""
     reply_to: Name
     """Of the order."""
-    data: bytes = b""
+    data: Data = b""
     """How the links stand, to number 0; no core looks into it."""
 
 
@@ -181,7 +259,7 @@ class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     verb: Literal["open", "close", "stop", "down", "status", "link", "links"]
     """Open or close a switch; have an agent leave; end the run; tell how it stands; order emulated links to do
     something; ask all of them how they stand."""
-    argument: Words = ""
+    argument: Text = ""
     """Name of the switch or of the agent; the order; empty for the others."""
     reply_to: Name
     """Unique id of who asks: last part of the key of the `Answer`."""
@@ -192,7 +270,7 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
 
     ok: bool
     """Whether it was done."""
-    text: str
+    text: Reply
     """One sentence for a person; the answers to "status", "link", "links" are one JSON object each."""
 
 
@@ -201,15 +279,15 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
 
     phase: Literal["seeking", "waiting", "running"]
     """No plant is there; the plant is there but no fresh measurement; ticking."""
-    waits_for: str
+    waits_for: Text
     """What it waits for, for a person; empty while it runs."""
-    island: Name
+    island: NameOrNone
     """Island it stands in: "grid", the first inverter in it, or empty if that is not known."""
-    neighbours: tuple[Name, ...]
+    neighbours: Names
     """Whom the run's rule tells it to listen to among those present."""
-    ages: tuple[Number, ...]
+    ages: Annotated[tuple[Age, ...], msgspec.Meta(max_length=MOST)]
     """Of each neighbour the age of its last state (s of run time, on the own clock); -1 if none was heard."""
-    used: tuple[Name, ...]
+    used: Names
     """The neighbours in its sums now: heard, present, young enough and in the same island."""
     received: Count
     """Messages that came in and were used, since its start."""
@@ -223,22 +301,27 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Ticks done since its start."""
     missed: Count
     """Ticks skipped since its start, as their time was over."""
-    lateness: Number
+    lateness: Time
     """Longest delay of a tick behind its time since the last status (s of wall time)."""
-    impaired: tuple[Name, ...] = ()
+    impaired: Names = ()
     """Senders between whom and this agent an emulated fault holds now."""
+
+    def __post_init__(self) -> None:
+        _once("neighbours", self.neighbours)
+        if len(self.ages) != len(self.neighbours):
+            raise ValueError(f"ages: {len(self.ages)} of {len(self.neighbours)} neighbours")
 
 
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Something that happened in the plant or to the roster, for `events.csv`."""
 
-    t: float
+    t: Time
     """Run time (s)."""
     kind: Literal["switch", "island", "dead", "inverter", "limit", "roster", "link", "warning"]
     """What sort of event."""
-    subject: str
+    subject: Label
     """The switch, island or agent concerned."""
-    text: str
+    text: Text
     """One sentence for a person."""
 
 
@@ -249,42 +332,59 @@ class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Steps since the start."""
     late: Count
     """Steps more than one control period (of wall time) late."""
-    p50: Number
+    p50: Time
     """Median delay (s)."""
-    p95: Number
+    p95: Time
     """95 % of the steps were not later than this (s)."""
-    p99: Number
+    p99: Time
     """99 % of the steps were not later than this (s)."""
-    worst: Number
+    worst: Time
     """Longest delay (s)."""
-    slipped: Number
+    slipped: Time
     """By how much the schedule was put off in all, as it could not be caught up with (s)."""
+
+
+VALUES = 6
+"""Values of each inverter in a row of telemetry."""
 
 
 class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What the recorder writes: the plant's truth since the last telemetry (plant -> recorder)."""
 
-    inverters: tuple[str, ...]
+    inverters: Names
     """Names of the inverters, the order of the columns."""
-    rows: tuple[tuple[float, ...], ...]
+    rows: Annotated[tuple[tuple[float, ...], ...], msgspec.Meta(max_length=2000)]
     """Rows [t (s), then for each inverter f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V)].
 
-    P_set and V_set are those that were in force in the step that ended at t.
+    P_set and V_set are those that were in force in the step that ended at t. Of t apart, a number may be infinite or
+    none at all: the recorder is told the plant's truth.
     """
-    events: tuple[PlantEvent, ...]
+    events: Annotated[tuple[PlantEvent, ...], msgspec.Meta(max_length=1000)]
     """Events since the last telemetry."""
     final: bool
     """Whether this is the last one of the run."""
-    outcome: str
+    outcome: Text
     """Empty while running and after a clean end; else why the run broke."""
     reproducible: bool
     """False once something unscripted (a dead agent) has entered the run; always false in wall-clock time."""
     pacing: Pacing | None = None
     """How well the plant keeps real time; only in wall-clock time."""
-    awaited: tuple[Name, ...] = ()
+    awaited: Names = ()
     """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
-    impaired: tuple[Name, ...] = ()
+    impaired: Names = ()
     """Agents between whom and the plant an emulated fault holds now; only in wall-clock time."""
+
+    def __post_init__(self) -> None:
+        _once("inverters", self.inverters)
+        columns, before = 1 + VALUES * len(self.inverters), -inf
+        for row in self.rows:
+            if len(row) != columns:
+                raise ValueError(
+                    f"rows: one has {len(row)} values; t and those of {len(self.inverters)} inverters are {columns}"
+                )
+            if not (before < row[0] <= 1e9 and row[0] >= 0.0):
+                raise ValueError(f"rows: one of t = {row[0]:g} s comes after that of {before:g} s")
+            before = row[0]
 
 
 AnyMessage = (

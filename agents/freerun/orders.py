@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wire.links import Links
 from wire.messages import LinkAnswer, LinkOrder
+from wire.printable import printable
 
 
 class Orders:
@@ -56,7 +57,7 @@ class Orders:
             seq=order.seq,
             t=order.t,
             ok=ok,
-            text=text,
+            text=printable(text),
             reply_to=order.reply_to,
             data=data,
         )

@@ -8,6 +8,7 @@ from typing import Literal
 from agents.config import AgentConfig
 from agents.freerun.heard import Heard
 from wire.messages import AgentStatus
+from wire.printable import printable
 
 Phase = Literal["seeking", "waiting", "running"]
 
@@ -60,7 +61,7 @@ class Tally:
             seq=self.sent,
             t=heard.t,
             phase=phase,
-            waits_for=waits_for[phase],
+            waits_for=printable(waits_for[phase]),
             island="" if heard.measurement is None else heard.measurement.island,
             neighbours=neighbours,
             ages=tuple(age if age < float("inf") else -1.0 for age in ages),

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from wire.messages import PLANT, Answer, Command
+from wire.messages import LIMIT, PLANT, Answer, Command
+from wire.printable import printable
 
 if TYPE_CHECKING:
     from plant.freerun import FreePlant
@@ -34,7 +35,14 @@ class Service:
             ok = True
         except ValueError as error:
             text, ok = str(error), False
-        return Answer(sender=PLANT, incarnation=side.config.incarnation, seq=command.seq, t=side.t, ok=ok, text=text)
+        return Answer(
+            sender=PLANT,
+            incarnation=side.config.incarnation,
+            seq=command.seq,
+            t=side.t,
+            ok=ok,
+            text=printable(text, LIMIT),
+        )
 
     def _do(self, command: Command, now: float) -> str:
         side, verb, argument = self._side, command.verb, command.argument

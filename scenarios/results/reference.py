@@ -13,10 +13,11 @@ from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from plant.config import GflParameters, GfmParameters
-from scenarios.field_docs import FieldDoc, class_doc, field_docs
+from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
 from wire import keys, messages
-from wire.codec import KINDS, LIMIT
+from wire.codec import KINDS
+from wire.messages import LIMIT
 
 TOPICS = ("keys", "messages", "scenario")
 """Pages there are."""
@@ -62,7 +63,7 @@ def _messages() -> Iterator[str]:
     yield "# Messages"
     yield ""
     yield f"msgpack maps with a field `type` that names the message, and their CRC-32; SI units; at most {LIMIT} bytes."
-    yield "Another CRC-32, unknown fields, missing fields, wrong types and numbers that are not finite are refused:"
+    yield "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:"
     yield "counted by kind, logged once and dropped."
     common = {doc.name for doc in field_docs(messages.Message)}
     yield from _section("Fields of every message", messages.Message, "")
@@ -70,6 +71,10 @@ def _messages() -> Iterator[str]:
         yield from _section(
             kind.__name__, kind, class_doc(kind), leave_out=common if kind != messages.PlantEvent else set()
         )
+    yield ""
+    yield "## Types, and their bounds"
+    yield ""
+    yield from _table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(messages)))
     yield ""
     yield "## Kinds of refused messages"
     yield ""

@@ -149,7 +149,6 @@ def test_an_earlier_life_is_a_ghost() -> None:
     ("message", "kind"),
     [
         (prepare(3, B), "stale"),
-        (replace(prepare(4, B), instances=("a",)), "garbled"),
         (replace(prepare(4, B), instances=("another", "b")), "unexpected"),
         (replace(prepare(4), roster=("inv2",)), "unexpected"),
     ],

@@ -2,22 +2,28 @@ from __future__ import annotations
 
 import math
 from typing import Any, get_args
-from zlib import crc32
 
 import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import inspect
 
-from wire.codec import CRC, KINDS, LIMIT, RejectedError, Rejects, decode, encode
-from wire.messages import MESSAGES, Angle, AnyMessage, PlantEvent, State, Telemetry, Waiting
+from tests.hostile.cases import cases, packed, sealed, sound
+from wire.codec import KINDS, LIMIT, RejectedError, Rejects, decode, encode
+from wire.messages import (
+    MESSAGES,
+    AgentStatus,
+    AnyMessage,
+    LinkReport,
+    Measurement,
+    Message,
+    Prepare,
+    State,
+    Telemetry,
+)
 
 STATE = State(sender="inv1", incarnation=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
-
-
-def sealed(body: bytes) -> bytes:
-    """Bytes with a checksum that is right."""
-    return body + crc32(body).to_bytes(CRC, "little")
 
 
 def kind_of(payload: bytes) -> str:
@@ -27,38 +33,80 @@ def kind_of(payload: bytes) -> str:
     return rejected.value.kind
 
 
+def refusal(payload: bytes) -> str:
+    """Kind of reject that the bytes are; empty if they are none."""
+    try:
+        decode(payload)
+    except RejectedError as rejected:
+        return rejected.kind
+    return ""
+
+
 @pytest.mark.parametrize("kind", MESSAGES)
-def test_every_message_survives_the_wire(kind: type[msgspec.Struct]) -> None:
+def test_every_message_survives_the_wire(kind: type[Message]) -> None:
     """What is encoded comes back equal, for each type of message."""
+    message = decode(packed(sound(kind)))
 
-    def fill(field: msgspec.structs.FieldInfo) -> Any:
-        examples = {"kind": "GFM", "roster": ("inv1", "inv2"), "instances": ("a", "b"), "inverters": ("inv1",)}
-        events = (PlantEvent(t=1.0, kind="switch", subject="13-152", text="opened"),)
-        more = {"rows": ((0.0, 60.0),), "events": events, "incarnation": 2, "seq": 7}
-        flags = {"grid_connected": True, "final": False, "reproducible": True}
-        words = {"sender": "inv1", "to": "inv1", "island": "grid", "microgrid": "mg1", "reason": "end", "outcome": ""}
-        flags |= {"refused": True, "ok": False}
-        words |= {"verb": "open", "argument": "sw1_2", "reply_to": "a1", "text": "done", "phase": "running"}
-        words |= {
-            "waits_for": ("inv2",) if kind is Waiting else "",
-            "pacing": None,
-            "data": b"book",
-            "instance": "a1",
-            "angle": Angle(0.3, 1.5),
-        }
-        lists = {
-            "impaired": ("inv2",),
-            "neighbours": ("inv2", "inv3"),
-            "ages": (0.01, -1.0),
-            "used": ("inv2",),
-            "awaited": ("inv2",),
-        }
-        counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 9)
-        return (examples | more | flags | words | lists | counts).get(field.name, 0.1 + 0.2)
+    assert type(message) is kind
+    assert decode(encode(message)) == message
 
-    message = kind(**{field.name: fill(field) for field in msgspec.structs.fields(kind)})
 
-    assert decode(encode(message)) == message  # type: ignore[arg-type]
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_every_field_has_bounds_and_only_what_is_within_is_believed(kind: type[Message]) -> None:
+    """At its bounds a value is taken; below, beyond, of another type or missing, the message is refused."""
+    tried = 0
+    for case in cases(kind):
+        refused = refusal(case.payload)
+        assert refused in ("", "implausible", "not finite", "garbled", "oversized")
+        assert case.within in (None, not refused), f"{kind.__name__}.{case.path} = {case.value!r:.80}: {refused}"
+        tried += 1
+
+    assert tried > 50
+
+
+def test_no_field_is_without_bounds() -> None:
+    """Numbers, texts, bytes and lists are all bounded; but the recorder is told of whatever number the plant has."""
+
+    def unbounded(type_: Any, path: str) -> list[str]:
+        match type_:
+            case inspect.FloatType() | inspect.IntType():
+                return [] if type_.le is not None and (type_.ge is not None or type_.gt is not None) else [path]
+            case inspect.StrType():
+                return [] if type_.pattern is not None else [path]
+            case inspect.BytesType():
+                return [] if type_.max_length is not None else [path]
+            case inspect.VarTupleType():
+                own = [] if type_.max_length is not None else [path]
+                return own + unbounded(type_.item_type, f"{path}[]")
+            case inspect.UnionType():
+                return [name for part in type_.types for name in unbounded(part, path)]
+            case inspect.StructType():
+                return [name for field in type_.fields for name in unbounded(field.type, f"{path}.{field.name}")]
+        return []
+
+    found = [name for kind in MESSAGES for name in unbounded(inspect.type_info(kind), kind.__name__)]
+
+    assert found == ["Telemetry.rows[]", "Telemetry.rows[][]"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        (Measurement, {"roster": ["inv1", "inv2", "inv1"]}),
+        (Prepare, {"instances": ["a"]}),
+        (Prepare, {"roster": ["inv1", "inv1"]}),
+        (LinkReport, {"final": True, "instance": ""}),
+        (AgentStatus, {"ages": [0.1, 0.2]}),
+        (AgentStatus, {"neighbours": ["inv2", "inv2"], "ages": [0.1, 0.2]}),
+        (Telemetry, {"inverters": ["inv1", "inv2"]}),
+        (Telemetry, {"rows": [[0.0, *[1.0] * 6], [0.0, *[1.0] * 6]]}),
+        (Telemetry, {"rows": [[math.nan, *[1.0] * 6]]}),
+        (Telemetry, {"rows": [[]]}),
+    ],
+)
+def test_what_a_message_says_twice_must_agree(kind: type[Message], changes: dict[str, Any]) -> None:
+    """Rosters without doubles, lists that belong together equally long, rows in order of time."""
+    assert kind_of(packed(sound(kind, **changes))) in ("implausible", "not finite")
 
 
 def test_the_list_of_messages_is_whole() -> None:
@@ -90,8 +138,9 @@ def test_rejects_are_told_apart() -> None:
     assert kind_of_changed(type="Bomb") == "unknown"
     assert kind_of_changed(P_set="high") == "garbled"
     assert kind_of_changed(extra=1) == "garbled"
-    assert kind_of_changed(seq=-1) == "garbled"
-    assert kind_of_changed(sender="x" * 65) == "garbled"
+    assert kind_of_changed(seq=-1) == kind_of_changed(seq=2**63) == kind_of_changed(seq=2**64 - 1) == "implausible"
+    assert kind_of_changed(sender="x" * 65) == kind_of_changed(sender="\x1b[2J") == "implausible"
+    assert kind_of_changed(P_set=1e300) == "implausible"
     assert kind_of(sealed(b"\x91" * 5000)) == "garbled"
 
 
@@ -142,11 +191,24 @@ def test_one_line_is_kept_for_each_kind() -> None:
     assert rejects.take_lines() == ()
 
 
+def test_lines_are_printable_whatever_was_sent() -> None:
+    """A log is read on terminals: nobody's bytes clear the screen there, or forge a line."""
+    rejects = Rejects("inv1")
+    rejects.add("unknown", "some/key", "type \x1b[2J\n2026-01-01 ERROR \u202egnorw si lla")
+    rejects.add("failed", "some/key", "KeyError: '\x1b'", "Traceback\n" + "  at \x1b[31m\n" * 1000)
+
+    one, traced = rejects.take_lines()
+
+    assert one.isprintable()
+    assert all(line.isprintable() for line in traced.split("\n"))
+    assert 30 < len(traced.split("\n")) < 50
+
+
 def test_telemetry_may_carry_what_is_not_finite() -> None:
     """The recorder is told the plant's truth, even where it is not a number."""
     telemetry = Telemetry(
-        sender="plant", incarnation=1, seq=0, t=0.0, inverters=("inv1",), rows=((0.0, math.nan),), events=(),
-        final=False, outcome="", reproducible=True,
+        sender="plant", incarnation=1, seq=0, t=0.0, inverters=("inv1",), rows=((0.0, math.nan, *[1.0] * 5),),
+        events=(), final=False, outcome="", reproducible=True,
     )  # fmt: skip
 
     decoded = decode(encode(telemetry))

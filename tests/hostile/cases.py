@@ -1,0 +1,173 @@
+"""Every field of every message at, below and beyond its bounds, from the annotations: a new field is in at once."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import msgspec
+from msgspec import inspect
+
+from wire.codec import CRC
+from wire.messages import MESSAGES, Message
+
+BODIES: dict[str, dict[str, Any]] = {
+    "Nameplate": dict(kind="GFM", microgrid="mg 1", P_rated=1e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05),
+    "Measurement": dict(
+        to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0, P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
+        roster=("inv1", "inv2"),
+    ),
+    "State": dict(P_set=9e4, V_set=277.0, Q=0.0, island="inv1", angle=[0.5, 1.0]),
+    "Prepare": dict(roster=("inv1", "inv2"), instances=("a", "b")),
+    "Waiting": dict(waits_for=("inv3",)),
+    "Ready": {},
+    "Stop": dict(reason="enough", refused=False),
+    "Leave": {},
+    "LinkReport": dict(data=b"book", instance="a", final=False),
+    "LinkOrder": dict(text="{}", reply_to="z1"),
+    "LinkAnswer": dict(ok=True, text="done", reply_to="z1", data=b""),
+    "Command": dict(verb="status", argument="", reply_to="z1"),
+    "Answer": dict(ok=True, text="done"),
+    "AgentStatus": dict(
+        phase="running", waits_for="", island="inv1", neighbours=("inv2",), ages=(0.02,), used=("inv2",), received=9,
+        sent=9, rejected=0, lost=0, ticks=9, missed=0, lateness=0.001, impaired=(),
+    ),
+    "Telemetry": dict(
+        inverters=("inv1",), rows=((0.0, 60.0, 5e4, 0.0, 277.0, 5e4, 277.0),),
+        events=(dict(t=0.0, kind="switch", subject="13-152", text="opened"),), final=False, outcome="",
+        reproducible=True, awaited=(), impaired=(),
+        pacing=dict(steps=9, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0),
+    ),
+}  # fmt: skip
+"""Of each type of message the fields that no other has, in one that is sound."""
+
+TEXTS = (
+    "", "x", "inv1", "plant", "x" * 64, "x" * 65, "x" * 200, "x" * 201, "x" * 4000, "x" * 4001, "a b", "a/b", "*",
+    "a\n", "\x1b[2Jinv1", "inv1\x00", "\u202e1vni", "inv1\r2026-01-01 ERROR all is lost", "ä", "\ud7ff\U0001f600",
+)  # fmt: skip
+"""Texts on both sides of any bound; which side, the annotation says."""
+
+
+class Case(NamedTuple):
+    """One field with one value."""
+
+    kind: type[Message]
+    path: str
+    """Of the field, e.g. "events.0.t"."""
+    value: Any
+    within: bool | None
+    """Whether the annotation allows it; None if it may contradict another field."""
+    payload: bytes
+
+
+def sealed(body: bytes) -> bytes:
+    """Bytes with a checksum that is right."""
+    return body + crc32(body).to_bytes(CRC, "little")
+
+
+def sound(kind: type[Message], **header: Any) -> dict[str, Any]:
+    """A message that can be decoded, as a dictionary."""
+    head = dict(type=kind.__name__, sender="inv2", incarnation=1, seq=3, t=0.06)
+    return {**head, **BODIES[kind.__name__], **header}
+
+
+def packed(body: dict[str, Any]) -> bytes:
+    """Bytes of a message that was put together by hand."""
+    return sealed(msgspec.msgpack.encode(body))
+
+
+def cases(kind: type[Message], **header: Any) -> Iterator[Case]:
+    """Every field of a message at, below and beyond its bounds; the header's fields are as given elsewhere."""
+    body = sound(kind, **header)
+    for path, type_, put in _leaves(inspect.type_info(kind), body):
+        for value, within in _values(type_):
+            yield Case(kind, path, value, within, packed(put(value)))
+    yield Case(kind, "(more)", 1, False, packed({**body, "more": 1}))
+    for name in [field.name for field in msgspec.structs.fields(kind) if field.required]:
+        yield Case(kind, name, "(missing)", False, packed({key: value for key, value in body.items() if key != name}))
+
+
+def all_cases(**header: Any) -> Iterator[Case]:
+    """Those of all messages there are."""
+    for kind in MESSAGES:
+        yield from cases(kind, **header)
+
+
+def _leaves(type_: Any, body: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Path, type and a function that puts a value there, of each field and of what is inside of it."""
+    for i, field in enumerate(type_.fields):
+        key: Any = i if type_.array_like else field.encode_name
+        yield from _inside(str(field.encode_name), field.type, body, key)
+
+
+def _inside(path: str, type_: Any, holder: Any, key: Any) -> Iterator[tuple[str, Any, Any]]:
+    def put(value: Any) -> Any:
+        copy = list(holder) if isinstance(holder, list | tuple) else dict(holder)
+        copy[key] = value
+        return copy
+
+    yield path, type_, put
+    inner = next((part for part in _parts(type_) if isinstance(part, inspect.StructType)), None)
+    if isinstance(type_, inspect.VarTupleType):
+        inside = _inside("0", type_.item_type, list(holder[key] or [0.0]), 0)
+    elif inner is not None:
+        inside = _leaves(inner, holder[key])
+    else:
+        return
+    for tail, leaf, put_inside in inside:
+        yield f"{path}.{tail}", leaf, lambda value, put_inside=put_inside: put(put_inside(value))
+
+
+def _parts(type_: Any) -> tuple[Any, ...]:
+    return type_.types if isinstance(type_, inspect.UnionType) else (type_,)
+
+
+def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
+    """Values on both sides of what a type allows, and whether it does; None where it depends on other fields."""
+    types = _parts(type_)
+    none = any(isinstance(part, inspect.NoneType) for part in types)
+    yield None, none
+    for part in types:
+        match part:
+            case inspect.FloatType() | inspect.IntType():
+                yield from _numbers(part)
+            case inspect.StrType():
+                for text in TEXTS:
+                    fits = part.pattern is None or re.search(part.pattern, text) is not None
+                    yield text, fits and (part.max_length is None or len(text) <= part.max_length)
+                yield 7, False
+            case inspect.BytesType():
+                yield b"\xc1" * 100, True
+                yield from [(b"\x00" * (part.max_length + 1), False)] if part.max_length is not None else []
+            case inspect.BoolType():
+                yield from ((True, None), (False, None), (2, False))
+            case inspect.LiteralType():
+                yield from ((value, True) for value in part.values)
+                yield "nothing of the kind", False
+            case inspect.VarTupleType():
+                yield (), None
+                assert part.max_length is not None or isinstance(part.item_type, inspect.FloatType)
+                yield [None] * ((part.max_length or 10_000) + 1), False
+                yield ("inv1", "inv1"), None
+                yield {"0": "inv1"}, False
+            case inspect.StructType():
+                yield 7, False
+
+
+def _numbers(part: Any) -> Iterator[tuple[Any, bool | None]]:
+    whole = isinstance(part, inspect.IntType)
+    if part.ge is part.gt is part.le is part.lt is None:  # the recorder's rows take what the plant says
+        yield from ((math.nan, None), (1e300, None), ("1", False))
+        return
+    assert part.le is not None
+    low, high = part.ge if part.ge is not None else part.gt, part.le
+    beyond = [high + 1, 2**63 - 1, 2**63, 2**64 - 1, low - 1, -(2**63)] if whole else [1e300, -1e300, 2**63, 2**64 - 1]
+    if not whole:
+        beyond += [math.nextafter(high, math.inf), math.nextafter(low, -math.inf), math.nan, math.inf, -math.inf]
+        beyond += [] if part.ge is not None else [low]
+    at = [low if part.ge is not None else math.nextafter(low, math.inf), high]
+    yield from ((value, True) for value in at)
+    yield from ((value, False) for value in [*beyond, "1", [], b"\x00" * 8])
