@@ -50,7 +50,7 @@ class PlantLike(Protocol):
         ...
 
     def advance(self) -> None:
-        """Go one control period on; RuntimeError if there is no solution."""
+        """Go one control period on; an island without solution is de-energised and told, and ends nothing."""
         ...
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:

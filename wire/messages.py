@@ -317,7 +317,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: Time
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "inverter", "limit", "roster", "link", "warning"]
+    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "warning"]
     """What sort of event."""
     subject: Label
     """The switch, island or agent concerned."""

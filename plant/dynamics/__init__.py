@@ -4,5 +4,6 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverter
 from plant.dynamics.simulation import Dynamics
+from plant.dynamics.switching import Trip
 
-__all__ = ["Circuit", "Dynamics", "Inverter", "PlantError"]
+__all__ = ["Circuit", "Dynamics", "Inverter", "PlantError", "Trip"]

@@ -5,7 +5,7 @@ Made by `plant.network` for every set of closed switches; tests make their own s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Circuit:
     """A linear network with non-linear load branches, ideal sources and inverter terminals.
 
@@ -38,6 +38,14 @@ class Circuit:
     """Constant current of each branch (A), at branch voltage angle 0: I = I0 V / abs(V)."""
     V_branch: NDArray[np.complex128]
     """Nominal phasor of each branch (V): where the first solution starts."""
+
+    def __deepcopy__(self, memo: object) -> Circuit:
+        """Nothing in it is ever written: copies of a plant share it, and what was factored for it."""
+        return self
+
+    def without_source(self) -> Circuit:
+        """The same network with its substation disconnected."""
+        return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 
     def components(self) -> tuple[int, NDArray[np.int64]]:
         """Electrical islands: number and label of each node.

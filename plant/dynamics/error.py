@@ -5,3 +5,17 @@ from __future__ import annotations
 
 class PlantError(RuntimeError):
     """The plant has no solution: the message says where, and what to try."""
+
+
+class NoSolutionError(PlantError):
+    """Islands of a network have no solution with the present injections.
+
+    Attributes
+    ----------
+    islands : tuple of int
+        Which, as the network's reduction numbers them.
+    """
+
+    def __init__(self, islands: tuple[int, ...]) -> None:
+        super().__init__(f"{len(islands)} islands have no solution")
+        self.islands = islands

@@ -156,7 +156,7 @@ class Inverters:
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[~online] = 0.0
         f = np.full(S.size, gfl_model.F_NOM)
-        f[self.gfm_at] += self.gfm_state["w"] / (2.0 * np.pi)
+        f[self.gfm_at] += np.where(online[self.gfm_at], self.gfm_state["w"], 0.0) / (2.0 * np.pi)
         f[self.gfl_at] = np.where(online[self.gfl_at], self.gfl_state["f"], gfl_model.F_NOM)
         return np.column_stack([f, S.real, S.imag, np.mean(np.abs(self.V), axis=1)])
 

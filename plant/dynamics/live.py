@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import PlantError
+from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.newton import solve_islands
 from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
 
 TOLERANCE = 1e-11
@@ -41,15 +42,23 @@ class LiveNetwork:
 
     def __init__(self, circuit: Circuit, inverters: Inverters) -> None:
         self._inverters = inverters
-        self._reductions: dict[tuple[int, bytes], Reduction] = {}
+        self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
+        self._unsourced: dict[Circuit, Circuit] = {}
+        self.substation_on = True
+        """Whether the ideal sources are connected; `plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self.V_branch = circuit.V_branch.astype(complex)
+        self._source_voltage = self.reduction.circuit.source_voltage
 
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once: called ahead of a scheduled event, it takes the work out of the event's step."""
         units = self._inverters
-        key = id(circuit), units.connected.tobytes()  # the reduction keeps its circuit, so the id stays its own
+        if not self.substation_on:
+            if circuit not in self._unsourced:
+                self._unsourced[circuit] = circuit.without_source()
+            circuit = self._unsourced[circuit]
+        key = circuit, units.connected.tobytes()
         if key not in self._reductions:
             self._reductions[key] = Reduction(circuit, units.y_f, units.forming, units.connected)
         return self._reductions[key]
@@ -61,6 +70,7 @@ class LiveNetwork:
         self.V_branch[dead] = 0.0
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
+        self._source_voltage = self.reduction.circuit.source_voltage
 
     def guess(self) -> None:
         """Start the next solution from the last voltages, or from nominal ones where there was hardly any."""
@@ -72,15 +82,15 @@ class LiveNetwork:
 
         Raises
         ------
-        PlantError
-            If there is no solution.
+        NoSolutionError
+            If islands have no solution; the terminal voltages are then as before.
         """
         units, branches = self._inverters, self.reduction.branches
-        V_b, theta = self.V_branch[branches], units.theta()
+        V_b, theta, V = self.V_branch[branches], units.theta(), units.V.copy()
         still = np.ones(self.reduction.count, complex)
         scale = float(units.V_b.max())
         for attempt in range(4):
-            self.net = self.reduction.linearise(V_b, self.circuit.source_voltage, theta)
+            self.net = self.reduction.linearise(V_b, self._source_voltage, theta)
             m = V_b.size
             x = np.concatenate([V_b.real, V_b.imag])
             I_b, work = np.empty(m, complex), np.empty(12 * len(units) + 6 * m)
@@ -90,24 +100,41 @@ class LiveNetwork:
                 break
             V_b = self.circuit.V_branch[branches] * (1.0 - 0.1 * attempt) * np.exp(1j * self._island_angle()[branches])
         else:
-            raise PlantError(
-                "the network has no solution after switching: the load of an island may be more than its inverters "
-                "can feed; switch off load, or start from other set-points"
-            )
-        self._linearise(V_b, self.circuit.source_voltage)
+            units.V[:] = V
+            V_b = self._solve_islands(self.V_branch[branches])
+            units.V[:] = self.reduction.terminal_voltages(units.J, V_b, self._source_voltage)
+        self._linearise(V_b)
         self.V_branch[branches] = V_b
+
+    def renew(self) -> None:
+        """Linearise anew where the present injections lead from the present voltages, in the middle of a step.
+
+        Raises
+        ------
+        NoSolutionError
+            If islands have no solution.
+        """
+        self._linearise(self._solve_islands(self._branch_voltages()))
 
     def set_source(self, source_voltage: Complex) -> None:
         """Move the ideal sources to other phasors (V), topology unchanged."""
-        self._linearise(self._branch_voltages(), source_voltage)
+        self._source_voltage = source_voltage
+        self._linearise(self._branch_voltages())
 
     def note(self) -> None:
         """Note the branch voltages to which the steps since the last solution have led."""
         if self.x.size:
             self.V_branch[self.reduction.branches] = self._branch_voltages()
 
-    def _linearise(self, V_b: Complex, source_voltage: Complex) -> None:
-        self.net = self.reduction.linearise(V_b, source_voltage, self._inverters.theta())
+    def _solve_islands(self, guess: Complex) -> Complex:
+        """Voltages of the live branches (V) from a guess, or NoSolutionError."""
+        V_b, failed = solve_islands(self.reduction, self._inverters.J, self._source_voltage, guess)
+        if failed:
+            raise NoSolutionError(failed)
+        return V_b
+
+    def _linearise(self, V_b: Complex) -> None:
+        self.net = self.reduction.linearise(V_b, self._source_voltage, self._inverters.theta())
         self.x = np.concatenate([V_b.real, V_b.imag])
 
     def _branch_voltages(self) -> Complex:

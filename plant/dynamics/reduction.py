@@ -37,7 +37,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-def _one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Have linear algebra done by one thread: with more its sums come in another order.
 
     Another number of cores would give other last digits, and the same run other bytes.
@@ -95,7 +95,7 @@ class Reduction:
         Which inverters are connected; the others neither inject nor load the network.
     """
 
-    @_one_thread
+    @one_thread
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
         self.circuit = circuit
         n_inv = circuit.terminals.shape[0]
@@ -157,17 +157,33 @@ class Reduction:
             return rows
 
         self._unknown, self._columns = unknown, (Z_G, Z_C, Z_S)
-        self._T_bG, self._Z_bb, self._b_S = C_U.T @ Z_G, C_U.T @ Z_C, C_U.T @ Z_S + C_S.T
+        self._T_bG, self.Z_bb, self._b_S = C_U.T @ Z_G, C_U.T @ Z_C, C_U.T @ Z_S + C_S.T
         self._Z_GG, self._Z_Gb, self._G_S = at_terminals(Z_G), at_terminals(Z_C), at_terminals(Z_S)
         for row, node in enumerate(G):
             if held[node]:
                 self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = 1.0
 
+    def __deepcopy__(self, memo: object) -> Reduction:
+        """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
+        return self
+
+    def without_load(self, J: Complex, source_voltage: Complex) -> tuple[Complex, Complex]:
+        """What injections J (n_inv x 3, A) and ideal sources (V) would give at branches and terminals (V)."""
+        s_b, s_G = self.source_parts(source_voltage)
+        return self._T_bG @ J.T.ravel() + s_b, self._Z_GG @ J.T.ravel() + s_G
+
+    def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
+        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
+        I_b = np.conj(S / V_b) + I0 * V_b / np.abs(V_b)
+        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ I_b
+        return V_G.reshape(3, -1).T
+
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
         """What the ideal sources alone give at the branches and at the terminals (V)."""
         return self._b_S @ source_voltage, self._G_S @ source_voltage
 
-    @_one_thread
+    @one_thread
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
@@ -181,18 +197,16 @@ class Reduction:
             Angle of every inverter at that point (rad).
         """
         S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
-        magnitude = np.abs(V_b)
-        A = I0 / (2.0 * magnitude)
-        B = -np.conj(S) / np.conj(V_b) ** 2 - I0 * V_b / (2.0 * magnitude * np.conj(V_b))
-        i_c = np.conj(S / V_b) + I0 * V_b / magnitude - A * V_b - B * np.conj(V_b)
+        A, B = tangent(S, I0, V_b)
+        i_c = np.conj(S / V_b) + I0 * V_b / np.abs(V_b) - A * V_b - B * np.conj(V_b)
         s_b, s_G = self.source_parts(source_voltage)
         m = V_b.size
-        M = np.eye(2 * m) + _linear(self._Z_bb * A) + _conjugate_linear(self._Z_bb * B)
+        M = np.eye(2 * m) + _linear(self.Z_bb * A) + _conjugate_linear(self.Z_bb * B)
         M_inverse = np.linalg.inv(M)
         return Reduced(
             PT=np.ascontiguousarray((M_inverse @ _linear(self._T_bG)).T),
-            QT=np.ascontiguousarray((M_inverse @ _linear(self._Z_bb)).T),
-            x_c=M_inverse @ _stack(s_b - self._Z_bb @ i_c),
+            QT=np.ascontiguousarray((M_inverse @ _linear(self.Z_bb)).T),
+            x_c=M_inverse @ _stack(s_b - self.Z_bb @ i_c),
             GGT=np.ascontiguousarray(_linear(self._Z_GG).T),
             GBT=np.ascontiguousarray(_linear(self._Z_Gb).T),
             s_G=_stack(s_G),
@@ -207,7 +221,7 @@ class Reduction:
             theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
         )
 
-    @_one_thread
+    @one_thread
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         """Voltage of every node (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
@@ -215,6 +229,12 @@ class Reduction:
         V[self._unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
         V[self.circuit.sources] = source_voltage
         return V
+
+
+def tangent(S: Complex, I0: Complex, V: Complex) -> tuple[Complex, Complex]:
+    """Tangent of the load law at voltages V (V): the factors (S) of a change of V and of its conjugate."""
+    magnitude = np.abs(V)
+    return I0 / (2.0 * magnitude), -np.conj(S) / np.conj(V) ** 2 - I0 * V / (2.0 * magnitude * np.conj(V))
 
 
 def _linear(M: Complex) -> Real:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from plant.dynamics import switching
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import PlantError
+from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
-from plant.dynamics.kernel.step import READING, run_steps
+from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduction import Complex, Real
@@ -49,6 +49,11 @@ class Dynamics:
         self.h = h
         self.inverters = Inverters(inverters, connected)
         self.network = LiveNetwork(circuit, self.inverters)
+        self._trips: list[switching.Trip] = []
+        units = self.inverters
+        self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
+        self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
+        self._J_0 = units.J.copy()
 
     def start(
         self, P: Real, Q: Real | None = None, V_set: Real | None = None, *, swing_voltage: Complex = PHASES
@@ -73,25 +78,56 @@ class Dynamics:
 
     def connect(self, circuit: Circuit) -> None:
         """Go on with another network; see `plant.dynamics.switching.connect`."""
-        switching.connect(self.inverters, self.network, circuit)
+        self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
         """Connect an inverter or take it off; see `plant.dynamics.switching.switch_inverter`."""
-        switching.switch_inverter(self.inverters, self.network, i, on)
+        self._trips += switching.switch_inverter(self.inverters, self.network, i, on)
+
+    def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
+        """Take all that feeds these islands off the network; see `plant.dynamics.switching.deenergise`."""
+        self._trips += switching.deenergise(self.inverters, self.network, islands, step)
+
+    def take_trips(self) -> list[switching.Trip]:
+        """What was tripped since the last call because its island has no solution."""
+        trips, self._trips = self._trips, []
+        return trips
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V).
+        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V), all finite.
 
-        With 0 steps the inner loop is only compiled or loaded.
-
-        Raises
-        ------
-        PlantError
-            If a network solution does not converge or a voltage is not finite.
+        Where the frozen tangent does not lead to a solution it is renewed, as often as need be. An island that has
+        none is de-energised before the step, which the others then take. With 0 steps the inner loop is only compiled
+        or loaded.
         """
+        network = self.network
+        out = np.zeros((steps, len(self.inverters), READING))
+        begin, renewed = 0, -1
+        while (status := self._advance(begin, steps, out)) < 0:
+            step, what = divmod(-1 - status, FAILURES)
+            solution = 2 * step + what
+            if what == 2:
+                islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
+            elif solution == renewed:  # just renewed, and yet not solved: rounding near the largest load there is
+                islands = set(np.flatnonzero(network.reduction.live).tolist())
+            else:
+                try:
+                    network.renew()
+                    begin = renewed = solution
+                    continue
+                except NoSolutionError as error:
+                    islands = set(error.islands)
+            self._return()
+            network.note()
+            self.deenergise(sorted(islands), step)
+            begin, renewed = 2 * step, -1
+        network.note()
+        return out
+
+    def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network = self.inverters, self.network
-        out = np.zeros((steps, len(units), READING))
-        status = run_steps(
+        return run_steps(
+            begin,
             steps,
             self.h,
             TOLERANCE * float(units.V_b.max(initial=1.0)),
@@ -99,26 +135,27 @@ class Dynamics:
             units.gfm,
             units.gfm_at,
             units.gfm_state,
+            self._gfm_0,
+            self._gfm_d,
             units.gfl,
             units.gfl_at,
             units.gfl_state,
+            self._gfl_0,
+            self._gfl_d,
             network.reduction.online,
             units.set_points,
             units.J,
+            self._J_0,
             units.V,
             units.I,
             network.x,
             out,
         )
-        if status < 0 or not np.isfinite(out[-1:]).all():
-            where = f" in step {-1 - status} of {steps}" if status < 0 else ""
-            raise PlantError(
-                f"the network solution did not converge{where} (lowest terminal voltage "
-                f"{np.nanmin(np.abs(units.V) / units.V_b[:, None]):.2f} pu): the load may be more than the inverters "
-                "can feed, or the controllers unstable; try a smaller h, other gains, or less load"
-            )
-        network.note()
-        return out
+
+    def _return(self) -> None:
+        """Go back to the start of the step that failed."""
+        units = self.inverters
+        units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
 
     def readings(self) -> Real:
         """Present f (Hz), P (W), Q (var), V (V) from the last solution, n_inv x 4, before any step was taken."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numpy as np
 
 from plant.dynamics.circuit import Circuit
+from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel.arithmetic import OMEGA_0
@@ -12,59 +16,103 @@ from plant.dynamics.live import LiveNetwork
 from plant.dynamics.phasors import PHASES, aligned_sum
 
 
-def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> None:
+class Trip(NamedTuple):
+    """Inverters, and perhaps the substation, that had to be taken off because their island has no solution."""
+
+    step: int
+    """Steps of the present `Dynamics.run` that were done before."""
+    inverters: tuple[int, ...]
+    """Those taken off."""
+    substation: bool
+    """Whether the substation was disconnected too."""
+    V_min: float
+    """Lowest terminal voltage among them before (pu); inf where only the substation was left."""
+
+
+def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Trip]:
     """Go on with another network: factor it and find its first solution with the present injections.
 
     Inverters that lose their source of voltage stop; those that regain it start at zero current,
-    in step with the voltage they find.
-
-    Raises
-    ------
-    PlantError
-        If the new network has no solution.
+    in step with the voltage they find. An island without solution is de-energised; returns what was tripped for it.
     """
     before = network.reduction.online
+    trips: list[Trip] = []
     network.change(circuit)
-    online = network.reduction.online
-    regained = online & ~before
-    units.J[~online] = 0.0
-    for i in np.flatnonzero(regained & units.forming).tolist():
-        _black_start(units, i)
-    network.guess()
-    network.solve()
-    followers = np.flatnonzero(regained & ~units.forming).tolist()
-    for i in followers:
-        units.J[i], units.I[i] = units.y_f[i] * units.V[i], 0.0
-        units.rest(i, 0.0, _mean_voltage(units, i))
-    if regained.any():
-        network.solve()
+    while True:
+        online = network.reduction.online
+        regained = online & ~before
+        units.J[~online] = 0.0
+        try:
+            for i in np.flatnonzero(regained & units.forming).tolist():
+                _black_start(units, i)
+            network.guess()
+            network.solve()
+            followers = np.flatnonzero(regained & ~units.forming).tolist()
+            for i in followers:
+                units.J[i], units.I[i] = units.y_f[i] * units.V[i], 0.0
+                units.rest(i, 0.0, _mean_voltage(units, i))
+            if regained.any():
+                network.solve()
+            return trips
+        except NoSolutionError as error:
+            trips.append(_trip(units, network, error.islands, 0))
+            network.change(circuit)
 
 
-def switch_inverter(units: Inverters, network: LiveNetwork, i: int, on: bool) -> None:
+def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> list[Trip]:
+    """Take all inverters of these islands off the network; where there are none, the substation.
+
+    An island that the substation feeds thus first loses its inverters only: the grid may well feed it without them.
+    Inverters come back by `switch_inverter`, the substation does not.
+
+    Parameters
+    ----------
+    units, network
+        The inverters and the network between them.
+    islands
+        As the present reduction numbers them.
+    step
+        Steps of the present run that were done before; told again in the trips.
+    """
+    trip = _trip(units, network, islands, step)
+    return [trip, *(later._replace(step=step) for later in connect(units, network, network.circuit))]
+
+
+def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> Trip:
+    """Mark as taken off what feeds these islands; the network is yet to be changed."""
+    reduction = network.reduction
+    numbers = list(islands)
+    lost = reduction.online & np.isin(reduction.inverter_island, numbers)
+    bare = [k for k in numbers if not lost[reduction.inverter_island == k].any()]
+    v = np.abs(units.V[lost]) / units.V_b[lost, None]
+    units.connected[lost] = False
+    if bare:
+        network.substation_on = False
+    return Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), float(np.min(v, initial=np.inf)))
+
+
+def switch_inverter(units: Inverters, network: LiveNetwork, i: int, on: bool) -> list[Trip]:
     """Take an inverter off the network, or put it back at zero current, in step with the voltage there.
 
     Back, its set-points are those at which it rests there: V_set the terminal's voltage, and the P_set whose
     droop gives no power at the island's frequency. What comes next is a matter of control alone.
-
-    Raises
-    ------
-    PlantError
-        If the network without it, or with it, has no solution.
+    Returns what had to be tripped because its island has no solution without it, or with it.
     """
     if on == bool(units.connected[i]):
-        return
+        return []
     w = _island_speed(units, network, i)
     units.connected[i] = on
     if on:
         v = _mean_voltage(units, i)
         units.set_points[i] = w / (units.m_p[i] * OMEGA_0), v if v > 0.1 else 1.0, 0.0
-    connect(units, network, network.circuit)
+    trips = connect(units, network, network.circuit)
     if on and units.forming[i]:
         units.gfm_state["w"][units.gfm_at == i] = w
     elif on:  # its PLL has found the island's frequency before the contactor closes
         follower = units.gfl_at == i
         units.gfl_state["w_i"][follower] = w
         units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = gfl_model.F_NOM + w / (2.0 * np.pi)
+    return trips
 
 
 def _black_start(units: Inverters, i: int) -> None:

@@ -13,6 +13,7 @@ from plant.feeder.circuits import Circuits
 from plant.feeder.islands import GRID, Islands
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
+from plant.feeder.trips import Closing, trip_event
 from plant.network import Network
 from wire.messages import PlantEvent
 
@@ -95,6 +96,7 @@ class Plant:
             settings.h,
             connected=[not unit.spare for unit in network.inverters],
         )
+        self._closings: list[Closing] = []
         n = len(self.inverters)
         self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
         self._check_start()
@@ -152,13 +154,7 @@ class Plant:
         return (self.network.switch_name(name) in closed) == (action == "close")
 
     def connect(self, name: str, on: bool) -> None:
-        """Put an inverter on the network, at zero current and in step with it, or take it off.
-
-        Raises
-        ------
-        PlantError
-            If the network has no solution then.
-        """
+        """Put an inverter on the network, at zero current and in step with it, or take it off."""
         i = self._row[name]
         if bool(self._dynamics.inverters.connected[i]) == on:
             return
@@ -166,29 +162,26 @@ class Plant:
         t = round(self.tick * self._T_c, 9)
         text = f"{name} {'connected, at no load' if on else 'disconnected'}"
         self._events.append(PlantEvent(t=t, kind="inverter", subject=name, text=text))
+        if self._tell_trips(self.tick * self._steps):
+            self._now = self._dynamics.readings()
         self._events += self._islands.report(t, self._switches.closed, self._dynamics.network.reduction)
         self._now[i] = self._dynamics.readings()[i]
 
     def advance(self) -> None:
         """Go to the next tick; switches whose time comes are operated on the way.
 
-        Raises
-        ------
-        PlantError
-            If the network has no solution; the plant is then broken and says where and when.
+        An island whose network has no solution is de-energised and told as an event; the others go on.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         stops = sorted({s for s in (*self._switches.steps, *self._limits) if first < s < last} | {last})
         step = first
         for stop in stops:
-            try:
-                if step in self._switches.steps:
-                    self._operate(step)
-                for limit in self._limits.get(step, ()):
-                    self._limit(limit)
-                out = self._dynamics.run(stop - step)
-            except PlantError as error:
-                raise PlantError(f"plant at t = {step * self._h:.3f} s: {error}") from None
+            if step in self._switches.steps:
+                self._operate(step)
+            for limit in self._limits.get(step, ()):
+                self._limit(limit)
+            out = self._dynamics.run(stop - step)
+            self._tell_trips(step)
             for k in range(stop - step):
                 if (step + k + 1) % self._record == 0:
                     self._rows.append(self._as_row(step + k + 1, out[k]))
@@ -233,10 +226,30 @@ class Plant:
 
     def _operate(self, step: int) -> None:
         """Operate the switches of this step, all at once, then find the islands anew."""
-        self._events += self._switches.operate(step)
+        t, before = round(step * self._h, 9), self._switches.closed
+        told = self._switches.operate(step)
         closed = self._switches.closed
-        self._dynamics.connect(self._circuits.of(closed))
-        self._events += self._islands.report(round(step * self._h, 9), closed, self._dynamics.network.reduction)
+        try:
+            circuit = self._circuits.of(closed)
+        except PlantError as error:  # such a network cannot be solved; the run need not end for it
+            self._switches.closed = before
+            names = ", ".join(event.subject for event in told)
+            self._events.append(PlantEvent(t=t, kind="warning", subject=names, text=f"{names} not operated: {error}"))
+            return
+        self._events += told
+        self._dynamics.connect(circuit)
+        self._tell_trips(step)
+        self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
+
+    def _tell_trips(self, step: int) -> bool:
+        """Tell what was tripped since `step` because its island has no solution. Whether anything was."""
+        trips = self._dynamics.take_trips()
+        closed = self._switches.closed
+        for trip in trips:
+            t = round((step + trip.step) * self._h, 9)
+            self._events.append(trip_event(t, trip, self.network, closed, self._closings))
+            self._events += self._islands.report_dead(t, closed, self._dynamics.network.reduction)
+        return bool(trips)
 
     def _limit(self, limit: PowerLimit) -> None:
         """Change what an inverter has available; it acts from the next step on."""

@@ -269,3 +269,37 @@ def test_what_is_dead_from_the_start_is_said() -> None:
     assert (event.t, event.kind) == (0.0, "dead")
     assert "1 buses (162)" in event.text
     assert "inv3 idle" in event.text
+
+
+def scaled(factor: float, *events: SwitchEvent) -> Plant:
+    """Make the microgrid feeder with all loads times a factor."""
+    feeder = read_feeder("microgrid123")
+    loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
+    return Plant(Network(replace(feeder, loads=loads)), PlantSettings(events=events), T_C, T_C)
+
+
+def test_the_grid_takes_back_an_island_out_of_phase() -> None:
+    """Two and a half seconds of droop put the island 122 degrees behind; closed so, it is pulled back into step."""
+    p = plant(*opened(0.1, "13-152"), SwitchEvent(t=2.5, switch="13-152", action="close"))
+
+    run(p, 6.0)
+
+    assert [event for event in p.take_events() if event.kind == "trip"] == []
+    assert [r.f for r in p.measure().values()] == pytest.approx([60.0] * 9, abs=1e-3)
+    assert np.isfinite(p.take_rows()).all()
+
+
+@pytest.mark.parametrize("factor", [1.6, 2.0])
+def test_an_overloaded_island_trips_and_the_rest_goes_on(factor: float) -> None:
+    """Islanded with more load than its ratings, the feeder goes dark and says why; the run reaches its end."""
+    p = scaled(factor, *opened(0.1, "13-152"))
+
+    run(p, 1.0)
+
+    events = p.take_events()
+    (trip,) = [event for event in events if event.kind == "trip"]
+    assert "inv9 tripped, as the island has no solution: overload, " in trip.text
+    assert f"{3432 * factor:.0f} kW of load on inverters of 3900 kVA" in trip.text
+    assert [event.kind for event in events][-2:] == ["trip", "dead"]
+    assert all((r.P, r.V, r.grid_connected) == (0.0, 0.0, False) for r in p.measure().values())
+    assert np.isfinite(p.take_rows()).all()

@@ -38,7 +38,7 @@ def solve_network(
     tolerance: float,
     work: NDArray[np.float64],
 ) -> int:
-    """Solve for the terminal voltages; returns the iterations, or -1 if they did not converge.
+    """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
     Parameters
     ----------
@@ -103,8 +103,11 @@ def solve_network(
         for b in range(m):
             rest[b], rest[m + b] = I_b[b].real, I_b[b].imag
         multiply_add(net.GBT, rest, -1.0, V_G)
+    size = 0.0
     for i in range(n):
         back = rotation[net.inverter_island[i]].conjugate()
         for phase in range(3):
             V[i, phase] = complex(V_G[phase * n + i], V_G[n3 + phase * n + i]) * back
-    return iterations
+            size += abs(V_G[phase * n + i]) + abs(V_G[n3 + phase * n + i])
+    # not a number is no change either: the loop above takes it for converged
+    return iterations if np.isfinite(size) else -1

@@ -16,6 +16,9 @@ from plant.dynamics.kernel.solve import solve_network
 READING = 4
 """Numbers recorded per inverter and step: f (Hz), P (W), Q (var), V (V)."""
 
+FAILURES = 3
+"""What can fail in a step: 0 the first network solution, 1 the second, 2 a controller whose frequency is not finite."""
+
 
 @compiled
 def read_terminal(
@@ -37,6 +40,7 @@ def read_terminal(
 
 @compiled
 def run_steps(
+    begin: int,
     steps: int,
     h: float,
     tolerance: float,
@@ -44,21 +48,31 @@ def run_steps(
     gfm: Any,
     gfm_at: NDArray[np.int64],
     gfm_state: Any,
+    gfm_0: Any,
+    gfm_d: Any,
     gfl: Any,
     gfl_at: NDArray[np.int64],
     gfl_state: Any,
+    gfl_0: Any,
+    gfl_d: Any,
     online: NDArray[np.bool_],
     set_points: NDArray[np.float64],
     J: NDArray[np.complex128],
+    J_0: NDArray[np.complex128],
     V: NDArray[np.complex128],
     I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
     x: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> int:
-    """Advance by `steps` steps; returns the network iterations, or -1 - k if step k did not converge.
+    """Advance to the end of `steps` steps; returns the network iterations, or -1 - (FAILURES k + what) for step k.
+
+    A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with
+    `begin` = 2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0`.
 
     Parameters
     ----------
+    begin
+        Network solution to begin with, two a step.
     steps, h
         Number of steps and their length (s).
     tolerance
@@ -67,7 +81,9 @@ def run_steps(
         A `plant.dynamics.reduction.Reduced`.
     gfm, gfm_at, gfm_state
         Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
-    gfl, gfl_at, gfl_state
+    gfm_0, gfm_d
+        Their states at the start of the step, and the first pass' slopes; written here.
+    gfl, gfl_at, gfl_state, gfl_0, gfl_d
         The same for `plant.dynamics.kernel.gfl`.
     online
         Inverters that are connected and in a live island.
@@ -75,6 +91,8 @@ def run_steps(
         n_inv x 3: P_set, V_set, Q_set (pu).
     J
         Injections (A), n_inv x 3: in, the last corrector's; out, the new ones.
+    J_0
+        Injections (A) at the start of the step, written here.
     V
         Terminal voltages (V), n_inv x 3, of the last network solution.
     I
@@ -88,80 +106,86 @@ def run_steps(
     m = net.S.size
     work = np.empty(12 * n + 6 * m)
     I_b = np.empty(m, np.complex128)
+    x_0 = np.empty_like(x)
     rotation = np.empty(net.leader.size, np.complex128)
     theta = np.zeros(n)
-    gfm_0, gfl_0 = gfm_state.copy(), gfl_state.copy()
-    gfm_d, gfl_d = gfm_state.copy(), gfl_state.copy()
     total = 0
-    for step in range(steps):
-        for k in range(gfm_at.size):
-            gfm_0[k] = gfm_state[k]
-        for k in range(gfl_at.size):
-            gfl_0[k] = gfl_state[k]
-        for solution in range(2):
-            second = solution == 1
+    for solution in range(begin, 2 * steps):
+        step = solution // 2
+        second = solution % 2 == 1
+        if not second:
             for k in range(gfm_at.size):
-                theta[gfm_at[k]] = gfm_state[k].theta
-            for island in range(net.leader.size):
-                rotation[island] = 1.0
-                if net.leader[island] >= 0:
-                    rotation[island] = np.exp(-1j * (theta[net.leader[island]] - net.theta_lin[island]))
-            iterations = solve_network(net, J, rotation, x, I_b, V, tolerance, work)
-            if iterations < 0:
-                return -1 - step
-            total += iterations
-
-            for k in range(gfm_at.size):
-                i = gfm_at[k]
-                if not online[i]:
-                    continue
-                former = gfm[k]
-                read_terminal(former.y_f, J[i], V[i], I[i], out[step, i])
-                state = gfm_state[k]
-                advance_gfm(
-                    former,
-                    set_points[i, 0],
-                    set_points[i, 1],
-                    gfm_0[k],
-                    state,
-                    gfm_d[k],
-                    out[step, i, 1] / former.S_b,
-                    out[step, i, 2] / former.S_b,
-                    out[step, i, 3] / former.V_b,
-                    h,
-                    second,
-                )
-                J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
-                J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
-                out[step, i, 0] = F_NOM + state.w / (2.0 * np.pi)
-
+                gfm_0[k] = gfm_state[k]
             for k in range(gfl_at.size):
-                i = gfl_at[k]
-                if not online[i]:
-                    continue
-                follower = gfl[k]
-                read_terminal(follower.y_f, J[i], V[i], I[i], out[step, i])
-                J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
-                    follower,
-                    set_points[i, 0],
-                    set_points[i, 1],
-                    set_points[i, 2],
-                    gfl_0[k],
-                    gfl_state[k],
-                    gfl_d[k],
-                    V[i, 0],
-                    V[i, 1],
-                    V[i, 2],
-                    J[i, 0],
-                    J[i, 1],
-                    J[i, 2],
-                    h,
-                    second,
-                )
-                out[step, i, 0] = gfl_state[k].f
+                gfl_0[k] = gfl_state[k]
+            J_0[:] = J
+        for k in range(gfm_at.size):
+            theta[gfm_at[k]] = gfm_state[k].theta
+        for island in range(net.leader.size):
+            rotation[island] = 1.0
+            if net.leader[island] >= 0:
+                rotation[island] = np.exp(-1j * (theta[net.leader[island]] - net.theta_lin[island]))
+        x_0[:] = x
+        iterations = solve_network(net, J, rotation, x, I_b, V, tolerance, work)
+        if iterations < 0:
+            x[:] = x_0
+            return -1 - (FAILURES * step + solution % 2)
+        total += iterations
 
-        for i in range(n):
+        for k in range(gfm_at.size):
+            i = gfm_at[k]
             if not online[i]:
-                out[step, i, 0], out[step, i, 1], out[step, i, 2] = F_NOM, 0.0, 0.0
-                out[step, i, 3] = (abs(V[i, 0]) + abs(V[i, 1]) + abs(V[i, 2])) / 3.0
+                continue
+            former = gfm[k]
+            read_terminal(former.y_f, J[i], V[i], I[i], out[step, i])
+            state = gfm_state[k]
+            advance_gfm(
+                former,
+                set_points[i, 0],
+                set_points[i, 1],
+                gfm_0[k],
+                state,
+                gfm_d[k],
+                out[step, i, 1] / former.S_b,
+                out[step, i, 2] / former.S_b,
+                out[step, i, 3] / former.V_b,
+                h,
+                second,
+            )
+            J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
+            J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
+            out[step, i, 0] = F_NOM + state.w / (2.0 * np.pi)
+
+        for k in range(gfl_at.size):
+            i = gfl_at[k]
+            if not online[i]:
+                continue
+            follower = gfl[k]
+            read_terminal(follower.y_f, J[i], V[i], I[i], out[step, i])
+            J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
+                follower,
+                set_points[i, 0],
+                set_points[i, 1],
+                set_points[i, 2],
+                gfl_0[k],
+                gfl_state[k],
+                gfl_d[k],
+                V[i, 0],
+                V[i, 1],
+                V[i, 2],
+                J[i, 0],
+                J[i, 1],
+                J[i, 2],
+                h,
+                second,
+            )
+            out[step, i, 0] = gfl_state[k].f
+
+        if second:
+            for i in range(n):
+                if not online[i]:
+                    out[step, i, 0], out[step, i, 1], out[step, i, 2] = F_NOM, 0.0, 0.0
+                    out[step, i, 3] = (abs(V[i, 0]) + abs(V[i, 1]) + abs(V[i, 2])) / 3.0
+                elif not np.isfinite(out[step, i, 0]):
+                    return -1 - (FAILURES * step + 2)
     return total

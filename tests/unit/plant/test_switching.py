@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from plant.dynamics import Circuit, Dynamics, PlantError
+from plant.dynamics import Circuit, Dynamics
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.arithmetic import OMEGA_0
 from tests.plant.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, at_rest, loaded, lone, on_stiff_bus, pair
@@ -117,11 +117,75 @@ def test_a_network_is_factored_once_for_the_same_inverters() -> None:
     assert plant.network.reduction.online.tolist() == [True, False]
 
 
-def test_a_load_that_cannot_be_fed_is_told() -> None:
-    """A network without a solution ends in an error that says what to do, not in numbers."""
+def test_an_island_without_solution_is_de_energised() -> None:
+    """A load of twenty times the rating trips the inverter; the plant goes on with a dead island, not with an error."""
     plant: Dynamics = lone(GFM_D, 0.3)
     dead_weight = constant_power(20.0)
     plant.network.V_branch = dead_weight.V_branch.copy()
 
-    with pytest.raises(PlantError, match="no solution after switching: the load of an island may be more"):
-        plant.connect(dead_weight)
+    plant.connect(dead_weight)
+
+    (trip,) = plant.take_trips()
+    assert (trip.inverters, trip.substation, plant.take_trips()) == ((0,), False, [])
+    assert not plant.inverters.connected.any()
+    assert plant.run(5)[:, 0].tolist() == [[60.0, 0.0, 0.0, 0.0]] * 5
+
+
+def test_a_tripped_inverter_comes_back_when_the_load_is_gone() -> None:
+    """Connected again with a load that it can feed (0.4 and 0.05 pu), a tripped GFM starts the dead island."""
+    plant: Dynamics = lone(GFM_D, 0.3)
+    plant.network.V_branch = constant_power(20.0).V_branch.copy()
+    plant.connect(constant_power(20.0))
+    plant.connect(constant_power(0.4))
+    plant.switch_inverter(0, on=True)
+
+    assert plant.take_trips()[0].inverters == (0,)
+    assert plant.run(500)[-1, 0, 1] == pytest.approx(0.45 * S_B, rel=1e-4)
+
+
+def test_the_substation_trips_only_where_no_inverter_is_left() -> None:
+    """De-energising a bus that the grid feeds takes its inverter off first; the grid itself only the second time."""
+    plant = on_stiff_bus(GFM_D)
+
+    plant.deenergise([0])
+    still_fed = plant.network.reduction.live.all()
+    plant.deenergise([0])
+
+    first, second = plant.take_trips()
+    assert (first.inverters, first.substation, still_fed) == ((0,), False, True)
+    assert (second.inverters, second.substation) == ((), True)
+    assert not plant.network.reduction.live.any()
+
+
+def test_a_tangent_that_leads_nowhere_is_renewed_in_the_middle_of_a_step() -> None:
+    """With the tangent of far too low a voltage the run takes the same course: no step twice, and none left out."""
+    good, bad = at_rest(constant_power(0.9), GFM_D, h=0.002), at_rest(constant_power(0.9), GFM_D, h=0.002)
+    renewed = 0
+    for plant in (good, bad):
+        plant.inverters.set_points[0, 0] += 0.2
+    want = good.run(50)
+    got = []
+    for _ in range(10):
+        network = bad.network
+        x = network.x.copy()
+        network.net = network.reduction.linearise(
+            0.35 * network.V_branch, network.circuit.source_voltage, bad.inverters.theta()
+        )
+        network.x = x
+        spoilt = network.net
+        got.append(bad.run(5))
+        renewed += network.net is not spoilt
+
+    assert renewed == 10
+    assert bad.take_trips() == []
+    np.testing.assert_allclose(np.concatenate(got), want, rtol=1e-8, atol=1e-6)
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_a_set_point_that_is_no_number_takes_its_island_off(column: int) -> None:
+    """Whatever writes nan into a set-point, no row ever holds a number that is not finite."""
+    plant = pair(GFM_D, GFM_D, 0.4)
+    plant.inverters.set_points[0, column] = np.nan
+
+    assert np.isfinite(plant.run(20)).all()
+    assert {i for trip in plant.take_trips() for i in trip.inverters} == {0, 1}

@@ -1,0 +1,78 @@
+"""What is told when an island had to be de-energised because its network has no solution: who tripped, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from plant.dynamics import Trip
+from plant.network import Network
+from wire.messages import PlantEvent
+
+RECENT = 1.0
+"""Time (s) after a closing out of phase within which a collapse counts as its doing."""
+
+SUBSTATION = "substation"
+"""Subject of the event that tells of the substation's trip."""
+
+
+class Closing(NamedTuple):
+    """A switch that has joined two live islands."""
+
+    t: float
+    """When (s)."""
+    switch: str
+    """Its name."""
+    angle: float
+    """Angle between the two sides before (deg, 0 to 180)."""
+    in_phase: bool
+    """Whether the angle was within the window of a synchronism check."""
+
+
+def trip_event(
+    t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
+) -> PlantEvent:
+    """Tell who tripped, and whether by overload or by closing out of phase.
+
+    Parameters
+    ----------
+    t
+        When (s).
+    trip
+        What was taken off.
+    network
+        The feeder's network.
+    closed
+        Switches closed then.
+    closings
+        What had joined live islands until then.
+    """
+    names = [network.inverters[i].name for i in trip.inverters]
+    buses = {network.inverters[i].bus for i in trip.inverters}
+    if trip.substation:
+        names.append(SUBSTATION)
+        source = network.feeder.source
+        buses |= {source.bus} if source else set()
+    own = [island for island in network.islands(closed) if island & buses]
+    load = sum(row.S[p].real for row in network.feeder.loads for p in range(3) if any(row.bus in of for of in own))
+    rating = sum(network.inverters[i].P_rated for i in trip.inverters)
+    fed = network.feeder.source is not None and any(network.feeder.source.bus in of for of in own)
+    culprit = next(
+        (
+            closing
+            for closing in closings
+            if not closing.in_phase
+            and t - closing.t <= RECENT
+            and any(network.switches[closing.switch].from_bus in of for of in own)
+        ),
+        None,
+    )
+    if culprit is not None:
+        cause = f"closed out of phase, {culprit.angle:.0f} deg across {culprit.switch} at t = {culprit.t:.3f} s"
+    elif load > rating and not fed:
+        cause = f"overload, {load / 1e3:.0f} kW of load on inverters of {rating / 1e3:.0f} kVA"
+    else:
+        cause = f"voltage collapse under {load / 1e3:.0f} kW of load"
+    lowest = f"; lowest terminal voltage {trip.V_min:.2f} pu" if trip.inverters else ""
+    text = f"{', '.join(names)} tripped, as the island has no solution: {cause}{lowest}"
+    return PlantEvent(t=t, kind="trip", subject=names[0], text=text)
