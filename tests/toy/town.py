@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -10,6 +10,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from agents.config import AgentConfig
+from plant.config import PlantConfig
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.rendezvous import rendezvous
 from scenarios.results.links import LinkRecord
@@ -51,6 +53,10 @@ class Town:
         Endpoints that agents connect to beside the plant's.
     links : str, optional
         What the processes are told of emulated links.
+    configs : tuple, optional
+        Configurations of the plant and of all agents, if they are not the toy's.
+    plant_command : Sequence[str], optional
+        How the interpreter is told to run the plant; the toy plant unless said otherwise.
     changes : Any
         Fields of the plant's configuration.
     """
@@ -64,9 +70,13 @@ class Town:
         spares: tuple[str, ...] = (),
         also: tuple[str, ...] = (),
         links: str = "",
+        configs: tuple[PlantConfig, tuple[AgentConfig, ...]] | None = None,
+        plant_command: Sequence[str] = TOY,
         **changes: Any,
     ) -> None:
-        plant, agents = toy_configs(n, run=run)
+        plant, agents = toy_configs(n, run=run) if configs is None else configs
+        run, links = plant.run, links or plant.links
+        self._plant_command = list(plant_command)
         self.endpoint = rendezvous(())
         self.plant_config = replace(
             plant,
@@ -120,7 +130,9 @@ class Town:
         for name in names:
             is_plant = name == "plant"
             config = self.plant_config if is_plant else self.agent_configs[name]
-            command = list(TOY) if is_plant else ["-m", "scenarios.emulation.agent" if config.links else "agents"]
+            command = (
+                self._plant_command if is_plant else ["-m", "scenarios.emulation.agent" if config.links else "agents"]
+            )
             self.add(name, command, config)
         return self
 
