@@ -37,10 +37,14 @@ REST = (0.5, 1.5)
 PATIENCE = 60.0
 """Longest wait (s) for a heal."""
 
+DEAF = 8.0
+"""Time (s) without a heal after which this program asks itself whether its own session still hears everybody."""
+
 LEGEND = """
 healed     healing -> every agent has all eight others in its sums, as their AgentStatus tell
 noticed    cuts in which one of the six who were not cut off lost another of the six from its sums
-sessions   new sessions that agents opened, as a link had not been made anew on both sides"""
+sessions   new sessions that agents opened, as a link had not been made anew on both sides
+deaf       cuts after which this program's own session did not hear a running agent any more: not counted above"""
 
 
 def wait(fleet: Watched, seconds: float) -> None:
@@ -60,10 +64,22 @@ def noticed(fleet: Watched, here: Iterable[str]) -> bool:
     return any((who, whom) in pairs and not into for _, who, whom, into in fleet.turns)
 
 
-def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int]:
-    """Times (s) of so many heals, and in how many cuts the others noticed."""
+def healed(fleet: Watched) -> bool:
+    """Wait for a heal; whether this program heard everybody meanwhile."""
+    try:
+        fleet.all_use(*fleet.names, patience=DEAF)
+    except NotInTimeError:
+        if fleet.listen_again():
+            fleet.all_use(*fleet.names, patience=PATIENCE)
+            return False
+        fleet.all_use(*fleet.names, patience=PATIENCE - DEAF)
+    return True
+
+
+def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int, int]:
+    """Times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
     here = [name for name in fleet.names if name not in AWAY]
-    took, disturbed = [], 0
+    took, disturbed, deaf = [], 0, 0
     for i in range(repeat):
         fleet.mark(fleet.names)
         cut = rng.uniform(SHORTEST, LONGEST)
@@ -71,12 +87,15 @@ def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tu
         wait(fleet, cut)
         hosts.heal(2)
         began = monotonic()
-        fleet.all_use(*fleet.names, patience=PATIENCE)
-        took.append(max(at for at, *_ in fleet.turns) - began)
-        disturbed += noticed(fleet, here)
-        say(f"{i + 1} of {repeat}: cut for {cut:.2f} s, healed after {took[-1]:.2f} s")
+        if healed(fleet):
+            took.append(max(at for at, *_ in fleet.turns) - began)
+            disturbed += noticed(fleet, here)
+            say(f"{i + 1} of {repeat}: cut for {cut:.2f} s, healed after {took[-1]:.2f} s")
+        else:
+            deaf += 1
+            say(f"{i + 1} of {repeat}: cut for {cut:.2f} s; this program's own session was deaf")
         wait(fleet, rng.uniform(*REST))
-    return took, disturbed
+    return took, disturbed, deaf
 
 
 def main() -> int:
@@ -95,12 +114,13 @@ def main() -> int:
         fleet = Watched(Path(folder), rendezvous((listen,)), listen, elsewhere)
         say("the fleet starts")
         with fleet:
-            took, disturbed = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))
+            took, disturbed, deaf = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))
         opened = sessions(Path(folder))
     print(f"\n{'(ms)':40}{'n':>6} {'p50':>9} {'p95':>9} {'max':>9}")
     print(f"{'healed':40}{describe(took)}")
     print(f"{'noticed by the others':40}{disturbed:6}")
     print(f"{'new sessions':40}{opened:6}")
+    print(f"{'deaf':40}{deaf:6}")
     print(LEGEND)
     return 0
 

@@ -127,6 +127,7 @@ class Watched:
         try:
             self.start(PLANT, *self.names)
             self.until(lambda: self.telemetry is not None and self.telemetry.t > 2.0, "the run begins", BUILD)
+            self.listen_again()
             self.at_rest()
         except BaseException:
             self.__exit__(None, None, None)

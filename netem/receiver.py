@@ -16,6 +16,7 @@ import msgspec
 from netem.channel import FOREVER, NEVER, Channel
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models.corrupt import flip
+from netem.models.instant import INSTANT
 from netem.spec.change import Change, Heal, changed, schedule_of
 from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
@@ -110,6 +111,10 @@ class Receiver:
         """What the link from somebody does to messages sent at t (s of run time), by kind."""
         channel = self._link(src).channel
         return {} if channel.is_clear else channel.schedule.at(t).active
+
+    def was_impaired(self, src: str, t: float) -> bool:
+        """Whether the link from somebody has had a fault by t (s of run time), one that holds now included."""
+        return any(span.from_s <= t + INSTANT for span in self._link(src).channel.schedule.spans)
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
         """Judge a message.

@@ -61,7 +61,7 @@ class Links(Protocol):
         ...
 
     def order(self, text: str, t: float) -> str:
-        """Change what the links do from t on, as a person said; what was changed, or nothing if it is not for here.
+        """Change what the links do from t on, as a person said; which links changed, "" if none of those here.
 
         Raises
         ------
@@ -70,8 +70,8 @@ class Links(Protocol):
         """
         ...
 
-    def told(self, text: str) -> str:
-        """Say an order for people, in one line.
+    def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
+        """Say an order that is to hold from t on for people, in one line; and whose links it changes: their receivers.
 
         Raises
         ------

@@ -294,8 +294,13 @@ class FreePlant(Side):
             self.cause = error
             self.abort(str(error), now)
 
-    def order(self, text: str, reply_to: str, now: float) -> LinkOrder:
+    def order(self, text: str, reply_to: str, now: float) -> tuple[LinkOrder, str, tuple[str, ...]]:
         """Have links do what a person ordered, from one control period after the due tick on: till then all know it.
+
+        Returns
+        -------
+        tuple[LinkOrder, str, tuple[str, ...]]
+            As `Ordering.give` does.
 
         Raises
         ------
@@ -304,9 +309,10 @@ class FreePlant(Side):
         """
         overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
         t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
-        order, said = self.ordering.give(text, t, reply_to)
-        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=said))
-        return order
+        order, said, receivers = self.ordering.give(text, t, reply_to)
+        noted = f"order {order.seq} to links: {said}, from t = {t:.2f} s on"
+        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=noted))
+        return order, said, receivers
 
     @property
     def impaired(self) -> tuple[str, ...]:

@@ -35,10 +35,15 @@ class Ordering:
         self._incarnation, self._keys, self._links, self._publish = incarnation, keys, links, publish
         self._orders = Orders(incarnation)
 
-    def give(self, text: str, t: float, reply_to: str) -> tuple[LinkOrder, str]:
-        """Have links do what a person ordered, for messages sent at t (s of run time) or later; the order, in words.
+    def give(self, text: str, t: float, reply_to: str) -> tuple[LinkOrder, str, tuple[str, ...]]:
+        """Have links do what a person ordered, for messages sent at t (s of run time) or later.
 
         It is in force for the plant's own links, and told to who records; `send` tells the agents.
+
+        Returns
+        -------
+        tuple[LinkOrder, str, tuple[str, ...]]
+            The order, what it does in words, and the receivers of the links that it changes.
 
         Raises
         ------
@@ -46,11 +51,11 @@ class Ordering:
             If it is no order, or the run has no emulated links.
         """
         links = self._must_have_links()
-        said = links.told(text)
+        said, receivers = links.told(text, t)
         links.order(text, t)
         order = self._orders.give(text, t, reply_to)
         self._publish(self._keys.telemetry, encode(order))
-        return order, f"order {order.seq} to links: {said}, from t = {t:.2f} s on"
+        return order, said, receivers
 
     def send(self, names: Iterable[str], now: float) -> None:
         """Send to each of these agents the orders that it has not been sent, or not answered (s, driver's clock)."""

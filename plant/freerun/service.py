@@ -64,12 +64,12 @@ class Service:
         return f"switch {argument}: {verb} at t = {side.t:.2f} s"
 
     def _ordered(self, command: Command, now: float) -> dict[str, Any]:
-        """Number of an order and when it begins to hold (s), and who will answer: the agents that are there."""
+        """Number of an order, from when on it holds (s), what it does, and the agents that are there to be told."""
         side = self._side
         agents = [name for name in side.plant.inverters if name in side.plates]
         if command.verb == "link":
-            order = side.order(command.argument, command.reply_to, now)
-            return {"number": order.seq, "t": order.t, "asked": agents}
+            order, said, receivers = side.order(command.argument, command.reply_to, now)
+            return {"number": order.seq, "t": order.t, "asked": agents, "said": said, "receivers": receivers}
         side.ordering.check()
         return {"number": 0, "t": side.t, "asked": agents}
 

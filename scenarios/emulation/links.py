@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from netem.receiver import Arrival, Receiver
+from netem.spec.change import Change, schedule_of
 from netem.spec.fault import Fault
 from netem.spec.node import NodeFault
-from netem.spec.pattern import parse
+from netem.spec.pattern import Link, links_among, parse
 from scenarios.emulation.orders import Order
 from scenarios.emulation.report import LinkStand, encode_stands, parts
 from scenarios.emulation.setup import Setup
@@ -87,9 +88,10 @@ class EmulatedLinks:
         ValueError
             If it is no order.
         """
-        change = Order.of_text(text).at(t)
-        pattern = parse(change.on)
-        links = [src for src in self._senders if pattern.matches(src, self._name, self._microgrids)]
+        order = Order.of_text(text)
+        change = order.at(t)
+        links = [link.src for link in self._concerned(order, t) if link.dst == self._name]
+        self._changes.append(change)
         if not links:
             return ""
         self.clear.clear()
@@ -99,13 +101,29 @@ class EmulatedLinks:
             self._receiver.heal(change.on, t, change.kinds)
         return f"{', '.join(links)} -> {self._name}"
 
-    def told(self, text: str) -> str:
-        """Say an order in words; ValueError if it is none, or has mistakes."""
+    def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
+        """Say an order that is to hold from t on in words, and who receives over links that it changes.
+
+        Raises
+        ------
+        ValueError
+            If it is no order, or has mistakes.
+        """
         order = Order.of_text(text)
         mistakes = order.mistakes(self._microgrids)
         if mistakes:
             raise ValueError("; ".join(f"{path}: {what}" for path, what in mistakes))
-        return str(order)
+        links = self._concerned(order, t)
+        return order.in_words(links), tuple(dict.fromkeys(link.dst for link in links))
+
+    def _concerned(self, order: Order, t: float) -> list[Link]:
+        """Links of the whole run that an order changes at t (s of run time): a heal those that have a fault then."""
+        pattern, netem = parse(order.on), self._setup.netem
+        links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
+        if order.fault is not None:
+            return links
+        schedules = {link: schedule_of(link, netem, self._changes, self._microgrids) for link in links}
+        return [link for link in links if schedules[link].at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
         """From whom links have a fault at t (s of run time)."""
@@ -115,16 +133,17 @@ class EmulatedLinks:
         """How the links stand at t (s of run time) that do something, or once did: `LinkStand` of each sender."""
         counts, stands = self._receiver.counts(), {}
         for src in self._senders:
-            holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
-            book = counts.get(src)
-            if holds or (book is not None and book.sent):
-                stands[src] = LinkStand(holds=holds, counts=book)
+            if self._receiver.was_impaired(src, t):
+                holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
+                stands[src] = LinkStand(holds=holds, counts=counts.get(src))
         return encode_stands(stands)
 
     def restart(self) -> None:
         """Begin anew with what the scenario says: the run's time starts from 0 again."""
         setup = self._setup
         self.clear.clear()
+        self._changes: list[Change] = []
+        """What was ordered so far, whomever it concerns."""
         self._receiver = Receiver(self._name, setup.netem, setup.microgrids, keep_trace=setup.keep_trace)
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
 from netem.mistakes import Mistake, seconds
 from netem.spec.change import Change, Heal
 from netem.spec.fault import LONGEST_RUN, Fault
-from netem.spec.pattern import objections
+from netem.spec.pattern import Link, objections
 from scenarios.emulation.words import words
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
@@ -67,13 +67,30 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         >>> print(Order(fault=Fault(on="inv1 -> inv4", delay=0.1, loss=0.2), for_s=5.0))
         inv1 -> inv4: loss 0.2, delay 0.1 s, for 5 s
         >>> print(Order(heal=Heal(on=EVERYTHING, from_s=0.0)))
-        all links: healed
+        all links: heal
         """
         where = "all links" if self.on == EVERYTHING else self.on
         if self.fault is None:
-            return f"{where}: healed"
+            return f"{where}: heal"
         faults = [words(kind, model) for kind, model in self.fault.models().items()]
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
+
+    def in_words(self, impaired: Sequence[Link]) -> str:
+        """As people are told by whom it was given to, who knows which of its links have a fault when it begins to hold.
+
+        Examples
+        --------
+        >>> heal = Order(heal=Heal(on="* <-> *", from_s=0.0))
+        >>> heal.in_words([Link("inv4", "inv7"), Link("inv7", "inv4"), Link("inv1", "inv4")])
+        'inv4 <-> inv7, inv1 -> inv4: healed'
+        >>> heal.in_words([])
+        '* <-> *: no link has a fault, so nothing was healed'
+        """
+        if self.fault is not None:
+            return str(self)
+        if not impaired:
+            return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, so nothing was healed"
+        return f"{_listed(impaired)}: healed"
 
     def to_text(self) -> str:
         """As it travels."""
@@ -88,3 +105,16 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f"no order to links: {error}") from None
         order.on  # noqa: B018  that it is one of the two
         return order
+
+
+MOST_NAMED = 8
+"""So many links are named; a partition of nine inverters hurts 36."""
+
+
+def _listed(links: Sequence[Link]) -> str:
+    """Links for people, those that have a fault both ways as one."""
+    both = {link for link in links if Link(link.dst, link.src) in links}
+    first = [link for link in links if link not in both or links.index(link) < links.index(Link(link.dst, link.src))]
+    named = [f"{link.src} {'<->' if link in both else '->'} {link.dst}" for link in first]
+    more = len(named) - MOST_NAMED
+    return ", ".join(named) if more <= 0 else f"{', '.join(named[:MOST_NAMED])} and {more} more"

@@ -197,8 +197,8 @@ def _give(
     with visit_to(run, connect, wait) as visit:
         setup, agent = links_of_run(visit)
         check(order, setup)
-        outcome = give(visit, order, setup)
-    typer.echo(f"{order}; from t = {outcome.t:.2f} s on")
+        outcome = give(visit, order)
+    typer.echo(f"{outcome.said}; from t = {outcome.t:.2f} s on")
     if outcome.acknowledged:
         typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
     if outcome.absent:

@@ -10,7 +10,6 @@ import msgspec
 
 from agents.config import AgentConfig
 from netem.mistakes import Mistake
-from netem.spec.pattern import links_among, parse
 from scenarios.emulation.orders import Order
 from scenarios.emulation.report import LinkStand, decode_stands
 from scenarios.emulation.setup import Setup
@@ -30,6 +29,8 @@ class _Taken(msgspec.Struct, frozen=True):
     number: int
     t: float
     asked: tuple[str, ...]
+    said: str = ""
+    receivers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +39,8 @@ class Outcome:
 
     t: float
     """From when on it holds (s of run time)."""
+    said: str
+    """What it does, in words: a heal names only links that had a fault."""
     acknowledged: tuple[str, ...]
     """Receivers that have taken it."""
     silent: tuple[str, ...]
@@ -76,16 +79,15 @@ def _refuse(mistakes: Iterable[Mistake]) -> None:
         raise UsageError("; ".join(wrong))
 
 
-def give(visit: Visit, order: Order, setup: Setup) -> Outcome:
+def give(visit: Visit, order: Order) -> Outcome:
     """Give an order and wait until every receiver that it concerns has taken it, or for `ACKNOWLEDGED` seconds."""
-    pattern, names = parse(order.on), tuple(setup.microgrids)
-    receivers = {link.dst for link in links_among(names) if pattern.matches(*link, setup.microgrids)}
-    concerned = [name for name in (*names, PLANT) if name in receivers]
-    taken, answers = _ask(visit, "link", order.to_text(), concerned)
+    taken, answers = _ask(visit, "link", order.to_text())
+    concerned = taken.receivers
     there = [name for name in concerned if name == PLANT or name in taken.asked]
     deaf = {name: answers[name].text for name in there if name in answers and not answers[name].ok}
     return Outcome(
         t=taken.t,
+        said=taken.said,
         acknowledged=tuple(name for name in there if name == PLANT or (name in answers and name not in deaf)),
         silent=tuple(name for name in there if name != PLANT and name not in answers),
         absent=tuple(name for name in concerned if name not in there),
@@ -95,7 +97,7 @@ def give(visit: Visit, order: Order, setup: Setup) -> Outcome:
 
 def stands(visit: Visit) -> tuple[float, dict[tuple[str, str], LinkStand], tuple[str, ...]]:
     """How all links stand that do something or once did: run time (s), links, and receivers that did not answer."""
-    taken, answers = _ask(visit, "links", "", None)
+    taken, answers = _ask(visit, "links", "")
     found: dict[tuple[str, str], LinkStand] = {}
     for name, answer in answers.items():
         if answer.ok:
@@ -104,10 +106,8 @@ def stands(visit: Visit) -> tuple[float, dict[tuple[str, str], LinkStand], tuple
     return taken.t, found, tuple(name for name in taken.asked if name not in answers)
 
 
-def _ask(
-    visit: Visit, verb: Verb, argument: str, concerned: Iterable[str] | None
-) -> tuple[_Taken, dict[str, LinkAnswer]]:
-    """Give the plant a command; what it answers, and what they whom it concerns do, all if that is None."""
+def _ask(visit: Visit, verb: Verb, argument: str) -> tuple[_Taken, dict[str, LinkAnswer]]:
+    """Give the plant a command; return its answer, and those of the receivers concerned, or of all to a question."""
     command = Command(sender="visitor", incarnation=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=visit.id)
     visit.publish(visit.keys.command, encode(command))
     taken: _Taken | None = None
@@ -127,7 +127,8 @@ def _ask(
                 taken = msgspec.json.decode(message.text, type=_Taken)
                 end = monotonic() + ACKNOWLEDGED
         if taken is not None:
-            asked = (*taken.asked, PLANT) if concerned is None else [name for name in concerned if name in taken.asked]
+            order = taken.number > 0
+            asked = [name for name in taken.receivers if name in taken.asked] if order else [*taken.asked, PLANT]
             if answers.keys() >= set(asked):
                 break
     if taken is None:
