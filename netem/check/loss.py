@@ -1,21 +1,16 @@
-r"""Losses of a link against its chain: how many, and how long the bursts.
+r"""Losses of a link against its law: how many, how many bursts, how many bursts of one message.
 
-For a chain with transitions P, stationary law pi and losses l (D1 = diag(l), D0 = 1 - D1):
-
-- the share of n messages that is lost has mean :math:`\pi D_1 1` and variance
-  :math:`\frac1n (\gamma_0 + 2 \sum_k (1 - k/n) \gamma_k)` with :math:`\gamma_k = \pi D_1 P^k D_1 1 - (\pi D_1 1)^2`;
-  without memory that is the binomial law, and its exact test is used;
-- a burst is l messages long with probability :math:`a (P D_1)^{l-1} P D_0 1 / (a 1)`, :math:`a = \pi D_0 P D_1`, which
-  for Gilbert's case is geometric with r.
+All three are counted exactly as they are distributed: without memory by the binomial law, else along the chain
+(`netem.check.count_law`), gaps in the messages' numbers and starts of the chain included. So the tests hold at any
+number of messages, for rare and for long bursts.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy import stats
 
+from netem.check.count_law import Array, blocks, law, mean, tail
 from netem.check.rows import UNSEEN, Messages
 from netem.models.chain import RESTART
 from netem.models.loss import Bernoulli, LossModel
@@ -24,14 +19,14 @@ Finding = tuple[str, str, str, int, float | None]
 """What, configured, realised, n, p."""
 
 FEWEST = 50
-"""Fewer messages, bursts or pairs are not tested: nothing could be said of them."""
+"""Fewer messages are not tested: hardly anything could be said of them."""
 
-FEWEST_EXPECTED = 5.0
-"""Chi-square needs so many in each class."""
+FEWEST_BURSTS = 5.0
+"""Bursts are only tested where as many are expected. What is found must not decide it: the test would be biased."""
 
 
 def check_loss(sent: Messages, model: LossModel) -> list[Finding]:
-    """Number of losses and length of bursts."""
+    """Number of losses and of bursts."""
     met = sent.those(~np.isin(sent.reason, list(UNSEEN)) & ~np.isinf(sent.delay))
     n, lost = len(met.seq), met.reason == "loss"
     configured = f"{model.rate:.4g}"
@@ -40,73 +35,32 @@ def check_loss(sent: Messages, model: LossModel) -> list[Finding]:
     realised = f"{lost.mean():.4g}"
     if isinstance(model, Bernoulli):
         return [("loss", configured, realised, n, float(stats.binomtest(int(lost.sum()), n, model.p).pvalue))]
-    spread = _spread(model, n)
-    p = float(2 * stats.norm.sf(abs(lost.mean() - model.rate) / spread)) if spread else float(lost.mean() == model.rate)
-    return [("loss", configured, realised, n, p), _bursts(met.seq, lost, model)]
+    parts = blocks(met.seq)
+    found = ("loss", configured, realised, n, tail(int(lost.sum()), *law("losses", model, parts)))
+    begun, alone = count_bursts(met.seq, lost)
+    return [
+        found,
+        _bursts("bursts", begun, law("bursts", model, parts)),
+        _bursts("bursts of one message", alone, law("single", model, parts)),
+    ]
 
 
-def _spread(model: LossModel, n: int) -> float:
-    """Standard deviation of the lost share of n messages."""
-    P, pi, loss = np.array(model.transitions), np.array(model.stationary), np.array(model.loss_in_state)
-    weights, later = pi * loss, loss.copy()
-    total = model.rate * (1 - model.rate)
-    for k in range(1, min(n, RESTART)):
-        later = P @ later
-        covariance = weights @ later - model.rate**2
-        total += 2 * (1 - k / n) * covariance
-        if abs(covariance) < 1e-12:
-            break
-    return float(np.sqrt(max(total, 0.0) / n))
+def _bursts(what: str, found: int, expected: tuple[int, Array]) -> Finding:
+    told = mean(*expected)
+    if told < FEWEST_BURSTS:
+        return (what, f"{told:.3g}", f"{found}; too few are expected to tell", found, None)
+    return (what, f"{told:.4g}", f"{found}", found, tail(found, *expected))
 
 
-def _bursts(seq: np.ndarray, lost: np.ndarray, model: LossModel) -> Finding:
-    """Chi-square of the lengths of bursts that begin and end within what was seen."""
-    lengths: list[int] = []
-    length = 0  # of the burst so far; 0 outside of one, and in one of which the beginning was not seen
-    for (before, was_lost), (number, is_lost) in pairwise(zip(seq.tolist(), lost.tolist(), strict=True)):
-        if number != before + 1:
-            length = 0
-        elif is_lost:
-            length += bool(length) or not was_lost
-        else:
-            lengths += [length] if length else []
-            length = 0
-    share = _burst_law(model)
-    mean = float(np.arange(1, len(share) + 1) @ share)
-    configured, n = f"mean {mean:.3g} messages", len(lengths)
-    if n < FEWEST:
-        return ("burst length", configured, f"too few bursts to tell: {n}", n, None)
-    observed = np.bincount(np.minimum(lengths, len(share)), minlength=len(share) + 1)[1:].astype(float)
-    observed, expected = _classes(observed, share * n)
-    p = float(stats.chisquare(observed, expected).pvalue) if len(observed) > 1 else None
-    return ("burst length", configured, f"mean {np.mean(lengths):.3g} messages", n, p)
+def count_bursts(seq: np.ndarray, lost: np.ndarray) -> tuple[int, int]:
+    """Bursts of which the beginning was seen, and those of them that were one message long, which came through after.
 
-
-def _burst_law(model: LossModel) -> np.ndarray:
-    """Probability of each length from 1 on; the last one takes all longer ones."""
-    P, pi, D1 = np.array(model.transitions), np.array(model.stationary), np.diag(model.loss_in_state)
-    alive = pi @ (np.eye(len(pi)) - D1) @ P @ D1
-    if alive.sum() <= 0.0:
-        return np.ones(1)
-    alive = alive / alive.sum()
-    share: list[float] = []
-    while alive.sum() > 1e-9 and len(share) < 10_000:
-        after = alive @ P @ D1
-        share.append(alive.sum() - after.sum())
-        alive = after
-    return np.array([*share, max(1.0 - sum(share), 0.0)])
-
-
-def _classes(observed: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Neighbouring lengths together, until each class has enough."""
-    sums: list[list[float]] = [[0.0, 0.0]]
-    for one, other in zip(observed, expected, strict=True):
-        if sums[-1][1] >= FEWEST_EXPECTED:
-            sums.append([0.0, 0.0])
-        sums[-1][0] += one
-        sums[-1][1] += other
-    if len(sums) > 1 and sums[-1][1] < FEWEST_EXPECTED:
-        rest = sums.pop()
-        sums[-1] = [sums[-1][0] + rest[0], sums[-1][1] + rest[1]]
-    both = np.array(sums)
-    return both[:, 0], both[:, 1] * both[:, 0].sum() / both[:, 1].sum()
+    Examples
+    --------
+    >>> number, fate = np.arange(10), np.array([1, 1, 0, 1, 0, 1, 1, 0, 0, 1], dtype=bool)
+    >>> count_bursts(number, fate)
+    (3, 1)
+    """
+    joined = (np.diff(seq) == 1) & (seq[1:] % RESTART != 0)
+    begins = ~lost[:-1] & lost[1:] & joined
+    return int(begins.sum()), int((begins[:-1] & ~lost[2:] & joined[1:]).sum())

@@ -25,7 +25,7 @@ class Row(NamedTuple):
     dst: str
     """Who received."""
     what: str
-    """What was tested, e.g. "loss" or "burst length"."""
+    """What was tested, e.g. "loss" or "bursts"."""
     configured: str
     """What the entry says."""
     realised: str

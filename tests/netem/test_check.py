@@ -69,7 +69,7 @@ WRONG: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     ),
     "trace": (SOUND["trace"], {"delay": Trace(delays_s=(0.1, 0.05, 0.2))}, "delay"),
     "bernoulli": (SOUND["bernoulli"], {"loss": 0.13}, "loss"),
-    "bursts": ({"loss": 0.25}, {"loss": GilbertElliott(p=0.1, r=0.3)}, "burst length"),
+    "bursts": ({"loss": 0.25}, {"loss": GilbertElliott(p=0.1, r=0.3)}, "bursts"),
     "gilbert": (SOUND["gilbert"], {"loss": GilbertElliott(p=0.1, r=0.3)}, "loss"),
     "duplicate": (SOUND["duplicate"], {"duplicate": 0.14}, "duplicate"),
     "corrupt": (SOUND["corrupt"], {"corrupt": 0.14}, "corrupt"),
