@@ -59,6 +59,8 @@ class Picture:
         self._row: tuple[float, ...] = ()
         self._t: float | None = None
         self._told: float | None = None
+        self._end: str | None = None
+        """Once the run has ended, why it broke; empty if it did not."""
         self._life = 0
         """Which life of the plant it is of."""
         self._pacing: Pacing | None = None
@@ -99,6 +101,7 @@ class Picture:
                 self._standing = None
             self._life = message.incarnation
         self._inverters, self._t, self._told = message.inverters, message.t, now
+        self._end = message.outcome if message.final else None
         self._pacing = message.pacing or self._pacing
         self._impaired = message.impaired
         if message.rows:
@@ -119,22 +122,25 @@ class Picture:
         now : float
             The visitor's clock (s).
         """
-        pace = self._pace()
-        if self._told is not None and now - self._told > SILENT:
-            pace = f"the plant has been silent for {now - self._told:.0f} s"
+        pace, current = self._pace(), True
+        if self._end is not None:
+            pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
+        elif self._told is not None and now - self._told > SILENT:
+            pace, current = f"the plant has been silent for {now - self._told:.0f} s", False
         names = dict.fromkeys((*self.inverters, *in_order(present)))
         return Look(
             run=self._run,
             t=self._t,
             pace=pace,
-            impaired=self._impaired,
-            lines=tuple(self._line(name, name in present, now) for name in names),
+            impaired=self._impaired if current else (),
+            lines=tuple(self._line(name, name in present, current, now) for name in names),
             events=tuple(line_of(event) for event in self._events),
         )
 
-    def _line(self, name: str, present: bool, now: float) -> Line:
+    def _line(self, name: str, present: bool, current: bool, now: float) -> Line:
+        """One inverter; what the plant told of it only if that is current."""
         f = P = Q = V = P_set = V_set = None
-        if name in self._inverters and self._row:
+        if current and name in self._inverters and self._row:
             start = 1 + _PER_INVERTER * self._inverters.index(name)
             f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
         plate = self._plates.get(name)

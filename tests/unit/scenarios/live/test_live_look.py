@@ -3,6 +3,7 @@
 import io
 
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 
 from agents.config import AgentConfig, Control
@@ -87,6 +88,45 @@ def test_a_frozen_agent_is_silent() -> None:
 def test_a_silent_plant_is_told() -> None:
     """Old numbers are not shown as if they were new."""
     assert picture().look({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
+
+
+def numbers(line: Line) -> set[float | None]:
+    """What the plant tells of an inverter."""
+    return {line.f, line.P, line.P_set, line.P_share, line.Q, line.V, line.V_set}
+
+
+def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> None:
+    """With the last telemetry powers, pace and impaired links are gone; when it ended, and why it broke, is there."""
+    ended, broke = picture(), picture()
+    ended.telemetry(replace(told(2.2), final=True, impaired=("inv1",)), now=10.2)
+    broke.telemetry(replace(told(2.2), final=True, outcome="the deadline of inv1 passed"), now=10.2)
+    look = ended.look((), now=10.3)
+
+    assert [numbers(line) for line in look.lines] == [{None}, {None}]
+    assert (look.t, look.pace, look.impaired) == (2.2, "the run has ended", ())
+    assert plain(look).splitlines()[2].split() == ["inv1", *"-" * 13, "no", "agent"]
+    assert broke.look((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
+
+
+def test_numbers_of_a_silent_plant_are_not_shown() -> None:
+    """A plant that was killed has told no end: its numbers go when it has been silent, and come back with the next."""
+    seen = picture()
+    before, silent = seen.look({"inv1"}, now=11.4).lines[0], seen.look({"inv1"}, now=11.6).lines[0]
+    seen.telemetry(told(0.2, life=2), now=20.0)
+
+    assert before.P == 300.0
+    assert numbers(silent) == {None}
+    assert seen.look((), now=20.0).lines[0].P == 300.0
+
+
+def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
+    """The end belongs to the former plant's life."""
+    seen = picture()
+    seen.telemetry(replace(told(2.2), final=True), now=10.2)
+    seen.telemetry(told(0.2, life=2), now=20.0)
+
+    assert seen.look((), now=20.0).pace.startswith("pace: 100.00 %")
+    assert seen.look((), now=20.0).lines[0].P == 300.0
 
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
