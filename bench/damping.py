@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from plant.config import GflParameters, PlantSettings, SwitchEvent
 from plant.dynamics import PlantError
-from plant.feeder import Plant
+from plant.feeder import Plant, raise_for_trip
 from plant.network import Network
 from plant.tables import read_feeder
 
@@ -48,6 +48,7 @@ def ripple(removed: tuple[str, ...], switches: tuple[str, ...], gfl: GflParamete
         plant = Plant(Network(feeder), PlantSettings(events=events, gfl=gfl), 0.02, 0.02)
         for _ in range(300):
             plant.advance()
+        raise_for_trip(plant.take_events())
     except PlantError:
         return "no solution"
     rows = np.array(plant.take_rows())

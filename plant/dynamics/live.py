@@ -14,6 +14,9 @@ from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
 TOLERANCE = 1e-11
 """Largest change of a voltage in a network solution's last iteration (pu of the highest nominal)."""
 
+KEPT = 64
+"""Factored networks that are kept, 1 MB each: enough for all that is scheduled, bounded in a run of many switchings."""
+
 
 class LiveNetwork:
     """The network between the inverters, from one switching to the next.
@@ -60,6 +63,8 @@ class LiveNetwork:
             circuit = self._unsourced[circuit]
         key = circuit, units.connected.tobytes()
         if key not in self._reductions:
+            if len(self._reductions) == KEPT:
+                del self._reductions[next(iter(self._reductions))]
             self._reductions[key] = Reduction(circuit, units.y_f, units.forming, units.connected)
         return self._reductions[key]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from plant.dynamics import Trip
+from plant.dynamics import PlantError, Trip
 from plant.network import Network
 from wire.messages import PlantEvent
 
@@ -27,6 +27,13 @@ class Closing(NamedTuple):
     """Angle between the two sides before (deg, 0 to 180)."""
     in_phase: bool
     """Whether the angle was within the window of a synchronism check."""
+
+
+def raise_for_trip(events: Iterable[PlantEvent]) -> None:
+    """Raise PlantError if a trip is among these events, for whoever wants numbers of a plant that is whole."""
+    for event in events:
+        if event.kind == "trip":
+            raise PlantError(f"at t = {event.t:g} s {event.text}")
 
 
 def trip_event(

@@ -13,7 +13,7 @@ from plant.build import build_plant
 from plant.config import PlantConfig
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
-from plant.feeder import GRID, Plant
+from plant.feeder import GRID, Plant, raise_for_trip
 from scenarios.predict.times import LoadStep
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
@@ -75,6 +75,7 @@ def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) 
                     plant.connect(name, name in event.join)
                 on = (on - set(event.leave)) | set(event.join)
             plant.advance()
+        raise_for_trip(plant.take_events())
         after = _carried(plant, rating, on)
         roster = tuple(name for name in plant.inverters if name in on)
         for members, (load, connected) in after.items():

@@ -11,7 +11,7 @@ from plant.build import build_plant
 from plant.config import PlantConfig
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
-from plant.feeder import Plant
+from plant.feeder import Plant, raise_for_trip
 from scenarios.predict.loads import LoadError
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
@@ -83,3 +83,4 @@ def plant_in_first_window(scenario: Scenario, config: PlantConfig) -> Plant:
 def _rest(plant: Plant, ticks: int) -> None:
     for _ in range(ticks):
         plant.advance()
+    raise_for_trip(plant.take_events())

@@ -20,6 +20,7 @@ import numpy as np
 from agents.law import towards
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
+from plant.feeder import raise_for_trip
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.loads import LoadError
 from scenarios.predict.sensitivity import STEP, plant_in_first_window
@@ -70,6 +71,7 @@ def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
                     read = moved.measure()
                     told = [[read[of].Q / scale[of][0], read[of].V / scale[of][1]] for of in names]
                     steps[k, :, :, column] += sign * np.array(told).T / (2.0 * STEP)
+                raise_for_trip(moved.take_events())
     except PlantError as error:
         raise LoadError(f"on droop alone: {error}") from error
     pulses = np.diff(steps, axis=0)

@@ -55,6 +55,8 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
     """Of the bytes that history.csv would have."""
     links_sha256: str = ""
     """Of all verdicts of the emulated links; "" without."""
+    trips: str = ""
+    """Who tripped, when and why; "" when nobody did. What is measured is of those that are left."""
     link_warnings: str = ""
     """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
     measures: dict[str, float | None] = {}
@@ -94,6 +96,7 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
         status="ran",
         sha256=recorded.sha256,
         links_sha256=links.sha256 if links.counts else "",
+        trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
         link_warnings=_warnings(plant.links, links),
         measures=measures | _accounts(links),
     )

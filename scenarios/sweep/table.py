@@ -22,7 +22,7 @@ from scenarios.sweep.words import unit_of
 
 FILE = "results.parquet"
 
-FATE = ("status", "why", "link_warnings", "history_sha256", "links_sha256")
+FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256")
 """Columns between parameters and indexes."""
 
 
@@ -30,7 +30,7 @@ def table_of(plan: Plan, done: Mapping[int, Done]) -> pa.Table:
     """Rows of the runs that are done.
 
     Columns: `sample`, `case`, `seed`, the parameters by their path, `status` ("ran" or "broke"), `why`,
-    `link_warnings`, `history_sha256`, `links_sha256`, the indexes as "WINDOW.INDEX", and over emulated links
+    `trips`, `link_warnings`, `history_sha256`, `links_sha256`, the indexes as "WINDOW.INDEX", and over emulated links
     `links_sent`, `links_delivered`, `links_dropped`. The metadata holds the sweep file, the base scenario with all
     defaults, and the versions; each column's has its unit.
     """
@@ -46,6 +46,7 @@ def table_of(plan: Plan, done: Mapping[int, Done]) -> pa.Table:
             columns[name] = _column([row.shown[name] for row in rows])
     columns["status"] = pa.array([end.status for end in ends], pa.string())
     columns["why"] = pa.array([end.why or None for end in ends], pa.string())
+    columns["trips"] = pa.array([end.trips or None for end in ends], pa.string())
     columns["link_warnings"] = pa.array([end.link_warnings or None for end in ends], pa.string())
     columns["history_sha256"] = pa.array([end.sha256 or None for end in ends], pa.string())
     columns["links_sha256"] = pa.array([end.links_sha256 or None for end in ends], pa.string())

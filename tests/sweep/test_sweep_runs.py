@@ -7,9 +7,10 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pyarrow as pa
@@ -18,6 +19,9 @@ import pytest
 from scipy.stats import binomtest
 
 from plant.build import build_plant
+from plant.dynamics import Circuit
+from plant.dynamics.live import LiveNetwork
+from plant.dynamics.reduction import Reduction
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.folder import FolderError
 from scenarios.results.record import Tape
@@ -37,7 +41,7 @@ BREAKING = """
 "plant.gfm.k_iv" = [5.86, 1e5, 5.86]
 "plant.gfl.X_f_pu" = [0.15, 0.15, 0.001]
 """
-"""Only the first reaches its end: then the plant has no solution, and then its parameters contradict each other."""
+"""The first is sound; then controllers are unstable and inverters trip; then the parameters contradict each other."""
 
 
 def done(path: Path, folder: Path, **how: object) -> Summary:
@@ -130,13 +134,14 @@ def test_runs_that_break_are_rows_that_say_why(sweep_file: Write, tmp_path: Path
     table: pa.Table = pq.read_table(summary.table)
     column = table.to_pydict()
 
-    assert column["status"] == ["ran", "broke", "broke"]
-    assert column["why"][0] is None
-    assert "the network solution did not converge" in column["why"][1]
+    assert column["status"] == ["ran", "ran", "broke"]
+    assert column["why"][:2] == [None, None]
+    assert column["trips"][::2] == [None, None]
+    assert "tripped" in column["trips"][1]
     assert "the current controller would diverge" in column["why"][2]
     assert [value is None for value in column["event1.MPSI"]] == [False, True, True]
-    assert [value is None for value in column["history_sha256"]] == [False, True, True]
-    assert sum(summary.broke.values()) == 2
+    assert [value is None for value in column["history_sha256"]] == [False, False, True]
+    assert sum(summary.broke.values()) == 1
 
 
 def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_path: Path) -> None:
@@ -190,6 +195,32 @@ def test_a_copied_plant_gives_the_bytes_of_a_new_one() -> None:
         hashes.add(tape.finish(1.5, plant.record_step).sha256)
 
     assert len(hashes) == 1
+
+
+def test_a_copied_plant_factors_no_network_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was factored ahead for the switchings of a kept plant serves its copies: a hit for each."""
+    config = configs(*load_scenario("islanding"), "IV")[0]
+    plant_at_start(config)
+    factored: list[Circuit] = []
+    asked: list[Circuit] = []
+
+    def count(made: list[Circuit], method: Callable[..., Any]) -> Callable[..., Any]:
+        def counting(self: Any, circuit: Circuit, *rest: Any) -> Any:
+            made.append(circuit)
+            return method(self, circuit, *rest)
+
+        return counting
+
+    monkeypatch.setattr(Reduction, "__init__", count(factored, Reduction.__init__))
+    monkeypatch.setattr(LiveNetwork, "reduced", count(asked, LiveNetwork.reduced))
+    switchings = len(config.settings.events)
+    for _ in range(2):
+        plant = plant_at_start(config)
+        for _ in range(round(7.0 / config.T_c)):
+            plant.advance()
+
+    assert switchings > 0
+    assert (len(factored), len(asked)) == (0, 2 * switchings)
 
 
 def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_path: Path) -> None:
