@@ -18,6 +18,7 @@ from scenarios.results import metrics
 from scenarios.results.history import Floats, History, Plates
 from scenarios.results.metrics import Window
 from scenarios.results.settling import Settling, settling
+from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
 from scenarios.spec.configs import F_NOM
 from scenarios.spec.moves import inverters_of
@@ -60,7 +61,7 @@ class Told:
     def mean(self, x: Floats, case: str, end: float) -> float:
         """Mean (of what x is) over the 0.2 s before a time (s), as steady values are measured."""
         t = self.t(case)
-        return float(x[(t >= end - metrics.STEADY - 1e-9) & (t < end - 1e-9)].mean())
+        return float(x[(t >= end - STEADY - 1e-9) & (t < end - 1e-9)].mean())
 
     def fleet(self, case: str) -> Fleet:
         """The inverters under the rule of a case."""

@@ -77,7 +77,7 @@ class Reproduction:
     def within(self) -> tuple[int, int, int]:
         """How many of the tables' numbers are within their tolerance, are judged, and are not judged."""
         cells = [(cell, result.found) for result in self.results for table in result.tables for cell in table.cells]
-        judged = [cell.within(found.value(cell)) for cell, found in cells if cell.tolerance.value is not None]
+        judged = [found.within(cell) for cell, found in cells if cell.tolerance.value is not None]
         return sum(map(bool, judged)), len(judged), len(cells) - len(judged)
 
 
@@ -103,9 +103,10 @@ def metrics_json(whole: Reproduction) -> str:
             "island": cell.island,
             "quantity": cell.quantity,
             "paper": cell.paper,
-            "ours": result.found.value(cell),
+            "ours": None if result.found.reason(cell) else result.found.value(cell),
+            **({"reason": reason} if (reason := result.found.reason(cell)) else {}),
             "tolerance": cell.tolerance.value,
-            "within": cell.within(result.found.value(cell)),
+            "within": result.found.within(cell),
         }
         for result in whole.results
         for table in result.tables

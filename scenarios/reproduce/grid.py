@@ -62,5 +62,7 @@ def tolerances(table: PaperTable) -> list[str]:
 def _entry(cell: Cell, result: Result) -> Entry:
     ours = result.found.value(cell)
     digits = cell.digits + 1
+    if reason := result.found.reason(cell):
+        return Entry(f"{cell.paper:.{cell.digits}f}", reason.partition(":")[0], "-", result.found.within(cell))
     off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
     return Entry(f"{cell.paper:.{cell.digits}f}", f"{ours:.{digits}f}", f"{off:+.{digits}f}", cell.within(ours))

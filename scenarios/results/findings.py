@@ -24,6 +24,17 @@ SHARED = ("MPSI", "MQSI", "t_restore_s")
 """Measures that mean nothing over several islands at once."""
 
 
+def label(measure: str) -> str:
+    """Name of a measure for people.
+
+    Examples
+    --------
+    >>> label("f_error_Hz"), label("MPSI")
+    ('abs(f-60)', 'MPSI')
+    """
+    return {"f_error_Hz": "abs(f-60)", "p": "P"}.get(measure, measure)
+
+
 @dataclass(frozen=True, kw_only=True)
 class GraphRun:
     """One run of the experiment with random communication graphs."""
@@ -63,6 +74,32 @@ class Findings:
         if cell.island:
             steady = self.islands[cell.case][cell.event][cell.island]
         return float(getattr(steady, cell.quantity))
+
+    def reason(self, cell: Cell) -> str:
+        """Why our number there is no steady value; "" where it is one."""
+        steady = self.results[cell.case][cell.event]
+        if cell.island:
+            steady = self.islands[cell.case][cell.event][cell.island]
+        return steady.reasons.get(cell.quantity, "")
+
+    def within(self, cell: Cell) -> bool | None:
+        """Whether our number there is near enough to the paper's, and steady; None where it is not judged."""
+        return cell.within(float("nan") if self.reason(cell) else self.value(cell))
+
+    def unsteady(self, cases: Sequence[str], events: Sequence[str], measures: Sequence[str]) -> list[str]:
+        """Reasons why some of these measures are no steady values, with their places; islands each for itself."""
+        found = []
+        for case in cases:
+            for event in events:
+                apart = self.islands.get(case, {}).get(event, {})
+                parts = {f", island of {name}": steady for name, steady in apart.items()}
+                for where, steady in (parts or {"": self.results[case][event]}).items():
+                    found += [
+                        f"case {case}, {event}{where}: {label(name)} {steady.reasons[name]}"
+                        for name in measures
+                        if name in steady.reasons
+                    ]
+        return found
 
     def has(self, cell: Cell) -> bool:
         """Whether there is such a number."""

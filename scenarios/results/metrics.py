@@ -1,22 +1,21 @@
 """The paper's measures of a run: abs(f - 60), MPSI (16), MQSI (17), V_error, and the time to restore.
 
-Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end.
+Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end; where
+they are not steady, or no numbers, a reason stands beside them.
 Powers enter per unit of each inverter's own rating (the paper writes kW in (9) and pu elsewhere). An inverter that is
 off the network takes no part: each row is measured over those that are present in it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.results.history import Flags, Floats, History, Plates
-
-STEADY = 0.2
-"""Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
+from scenarios.results.steadiness import Ends, ends_of, reason
 
 F_BAND, MPSI_BAND = 0.01, 0.01
 """Frequency (Hz) and MPSI below which a microgrid counts as restored."""
@@ -44,6 +43,8 @@ class Steady:
     t_load_s: float | None = None
     """Time (s) from the event until the inverters' total real power is within 2 % of its steady value for good: until
     those that remain carry the load of one that left. None if never."""
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """Why a measure is no steady value, by its name; what is not named is one (`scenarios.results.steadiness`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,19 +181,53 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
     f_error = mean_over(np.abs(history.f[:, plates.GFM] - f_nom), history.present[:, plates.GFM])
     sharing = MPSI(history, plates)
     inside = between(history.t, window)
-    steady = inside & (history.t >= window.end - STEADY - 1e-9)
+    ends = ends_of(history.t, inside, window.start, window.end)
+    steady = ends.steady
     restored = f_in_band(history, plates, f_nom) & (sharing < MPSI_BAND)
     total = history.P.sum(axis=1)
-    carried = np.abs(total - total[steady].mean()) <= LOAD_BAND * abs(total[steady].mean())
+    carried = np.abs(total - _mean(total[steady])) <= LOAD_BAND * abs(_mean(total[steady]))
+    voltage, vars_ = V_error(history, plates), MQSI(history, plates)
     return Steady(
-        f_error_Hz=float(f_error[steady].mean()),
-        MPSI=float(sharing[steady].mean()),
-        V_error=float(V_error(history, plates)[steady].mean()),
-        MQSI=float(MQSI(history, plates)[steady].mean()),
+        f_error_Hz=_mean(f_error[steady]),
+        MPSI=_mean(sharing[steady]),
+        V_error=_mean(voltage[steady]),
+        MQSI=_mean(vars_[steady]),
         t_restore_s=for_good(history.t[inside], restored[inside], window.start),
-        p=dict(zip(plates.names, (history.P[steady].mean(axis=0) / plates.s).tolist(), strict=True)),
+        p={name: _mean(history.P[steady, i] / plates.s[i]) for i, name in enumerate(plates.names)},
         t_load_s=for_good(history.t[inside], carried[inside], window.start),
+        reasons=_reasons(history, plates, ends, sharing, voltage, vars_),
     )
+
+
+def _reasons(
+    history: History, plates: Plates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
+) -> dict[str, str]:
+    """Why measures are no steady values, by name."""
+    present, forming = history.present, plates.GFM
+    there = bool(present[ends.steady].any(axis=1).all())
+    dead = "de-energised: no inverter is on the network"
+    leaderless = "no grid-forming inverter is on the network" if forming.any() else "there is no grid-forming inverter"
+    shared = "nothing shared: the total is 0" if there else dead
+    names = np.array(plates.names)
+    found = {
+        "f_error_Hz": reason(
+            "f_error_Hz",
+            np.where(present, history.f, np.nan)[:, forming],
+            ends,
+            f"no leader: {leaderless}",
+            tuple(names[forming]) if forming.sum() > 1 else (),
+        ),
+        "MPSI": reason("MPSI", sharing, ends, shared),
+        "V_error": reason("V_error", voltage, ends, dead),
+        "MQSI": reason("MQSI", vars_, ends, shared),
+        "p": reason("p", history.P / plates.s, ends, dead, plates.names),
+    }
+    return {name: text for name, text in found.items() if text}
+
+
+def _mean(x: Floats) -> float:
+    """Mean; not a number where there is nothing."""
+    return float(x.mean()) if x.size else float("nan")
 
 
 def between(t: Floats, window: Window) -> NDArray[np.bool_]:

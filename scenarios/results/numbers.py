@@ -14,6 +14,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from scenarios.results.findings import SHARED, Findings
+from scenarios.results.steadiness import BOUNDS
 from scenarios.spec import Scenario
 from wire.messages import Pacing
 
@@ -46,7 +47,7 @@ def metrics_json(
     links_sha256: Mapping[str, str] = MappingProxyType({}),
     by_hand: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
-    """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) is null.
+    """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) or not steady is null.
 
     Pacing is in s of wall time.
 
@@ -66,6 +67,8 @@ def metrics_json(
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
         for label, islands in found.islands.get(case, {}).items():
             cases[case][label] |= dict.fromkeys(SHARED)
+            cases[case][label].get("reasons", {}).pop("MPSI", None)
+            cases[case][label].get("reasons", {}).pop("MQSI", None)
             cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
         cases[case]["history_sha256"] = sha256[case]
         if case in links_sha256:
@@ -80,5 +83,19 @@ def metrics_json(
 
 
 def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
-    measures = {name: value for name, value in steady.items() if name != "p"}
-    return {name: value if value is not None and math.isfinite(value) else None for name, value in measures.items()}
+    reasons: Mapping[str, str] = steady["reasons"]
+    found: dict[str, Any] = {
+        name: value if value is not None and math.isfinite(value) and name not in reasons else None
+        for name, value in steady.items()
+        if name not in ("p", "reasons")
+    }
+    told = {name: f"{text}{_last_mean(name, steady)}" for name, text in reasons.items()}
+    return found | ({"reasons": told} if told else {})
+
+
+def _last_mean(name: str, steady: Mapping[str, Any]) -> str:
+    """What the last 0.2 s came to, for a measure that is a number without being steady."""
+    value = steady[name]
+    if not isinstance(value, float) or not math.isfinite(value):
+        return ""
+    return f"; last mean {value:.4g} {BOUNDS[name].unit}".rstrip()

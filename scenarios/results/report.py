@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,9 +11,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from scenarios.results.claims import Verdict
-from scenarios.results.findings import SHARED, Findings
+from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.metrics import Steady
-from scenarios.results.paper_tables import DIGITS, HEADINGS, paper_cell, tables_of
+from scenarios.results.paper_tables import DIGITS, HEADINGS, UNITS, paper_cell, tables_of
+from scenarios.results.steadiness import STEADY
 from scenarios.results.tolerances import Quantity
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
@@ -133,7 +135,12 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
         title=f"{title} after each event{against}",
         header=tuple(header),
         rows=tuple(rows),
-        legend="-: where there are several islands, each shares for itself; see its own row" if apart else "",
+        legend="\n".join(
+            [
+                *(["-: where there are several islands, each shares for itself; see its own row"] if apart else []),
+                *_reasons(report, quantities),
+            ]
+        ),
     )
 
 
@@ -153,9 +160,7 @@ def _row(
             continue
         values, mixed = steady[event], not island and report.found.apart(case, event)
         row += [
-            "-"
-            if mixed and name in SHARED
-            else _cell(report.experiment, case, event, name, getattr(values, name), island)
+            "-" if mixed and name in SHARED else _cell(report.experiment, case, event, name, values, island)
             for name in quantities
         ]
         if quantities[0] == "f_error_Hz":
@@ -164,13 +169,35 @@ def _row(
     return tuple(row)
 
 
-def _cell(experiment: str, case: str, event: str, quantity: Quantity, ours: float, island: str) -> str:
-    """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough."""
+def _cell(experiment: str, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
+    """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough.
+
+    What is not steady is no number: its reason's first words stand there, and all of it below the table.
+    """
     paper = paper_cell(experiment, case, event, quantity, island) if experiment else None
-    text = f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
+    ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
+    text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
     if paper is None:
         return text
-    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if paper.within(ours) is False else ''}"
+    off = paper.within(math.nan if reason else ours) is False
+    return f"{text} | {paper.paper:.{paper.digits}f}{' !' if off else ''}"
+
+
+def _reasons(report: Report, quantities: tuple[Quantity, ...]) -> list[str]:
+    """A line for every number that is not shown, with what the last 0.2 s came to."""
+    lines = []
+    for case, steady in report.found.results.items():
+        for event, whole in steady.items():
+            apart = report.found.islands.get(case, {}).get(event, {})
+            parts = {"": whole} | {f", island of {name}": values for name, values in apart.items()}
+            for where, values in parts.items():
+                for name in quantities:
+                    if name not in values.reasons or (apart and not where and name in SHARED):
+                        continue
+                    mean = getattr(values, name)
+                    last = "" if math.isnan(mean) else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
+                    lines.append(f"case {case}, {event}{where}: {label(name)} {values.reasons[name]}{last}")
+    return lines
 
 
 def _plain_grid(grid: Grid) -> str:

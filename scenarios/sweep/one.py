@@ -61,6 +61,7 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
     """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
     measures: dict[str, float | None] = {}
     """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
+    "event1.steady", 1 where all of them are steady values, else 0;
     and over all emulated links how many messages fared how, e.g. "links_dropped"."""
 
 
@@ -90,7 +91,9 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
     with np.errstate(all="ignore"):  # what is no number is told as such
         for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
             steady, settled = (of(history, plates, window, F_NOM) for of in (metrics.measure, settling))
-            measures |= flat(window.label, asdict(steady) | asdict(settled))
+            numbers = asdict(steady) | asdict(settled)
+            reasons = numbers.pop("reasons")
+            measures |= flat(window.label, numbers | {"steady": float(not reasons)})
     return Done(
         number=number,
         status="ran",

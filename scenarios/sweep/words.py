@@ -15,6 +15,7 @@ WORDS = {
     "t_share_s": "time to share power (s)",
     "f_swing_Hz": "swing of f at the end (Hz)",
     "V_swing_pu": "swing of V at the end (pu)",
+    "steady": "steady at the end (1: yes, 0: no)",
     "graph.links": "links",
     "graph.lambda_2": "algebraic connectivity, lambda_2",
 }

@@ -177,7 +177,11 @@ def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_pa
     row = table.to_pylist()[1]
 
     assert row["history_sha256"] == metrics["history_sha256"]
-    assert {name: row[f"event1.{name}"] for name in metrics["event1"]} == metrics["event1"]
+    reasons = metrics["event1"].pop("reasons", {})
+    assert {name: row[f"event1.{name}"] for name in metrics["event1"] if name not in reasons} == {
+        name: value for name, value in metrics["event1"].items() if name not in reasons
+    }
+    assert row["event1.steady"] == float(not reasons)
     assert (row["sample"], row["case"], row["seed"], row["gains.k_p"]) == (1, "IV", 1, 0.0011)
     assert table.schema.field("event1.t_restore_s").metadata == {b"unit": b"s"}
     assert b"gains.k_p" in table.schema.metadata[b"gridpeers.sweep"]

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from scenarios.results.metrics import STEADY, Window, windows
+from scenarios.results.metrics import Window, windows
+from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
 from scenarios.spec.model import Event
 from wire.messages import PlantEvent

@@ -18,6 +18,9 @@ from scenarios.results.tolerances import Number, Quantity
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
 
+Measure = Quantity | Literal["p"]
+"""A steady value: a column of the paper's tables, or the powers of the inverters."""
+
 Judge = Callable[[Findings], tuple[bool, str]]
 """Whether it holds, and what we found, with units."""
 
@@ -33,6 +36,8 @@ class Claim:
     source: str
     """Where the paper says it."""
     judge: Judge
+    measures: tuple[Measure, ...]
+    """Steady values that it is judged by: it does not pass while one of them is not steady, or no number."""
     cases: tuple[str, ...] = ()
     """Cases that must have been run."""
     events: tuple[str, ...] = ()
@@ -69,6 +74,10 @@ def _verdict(claim: Claim, found: Findings) -> Verdict:
     holds, text = claim.judge(found)
     if not holds and claim.known_miss:
         return Verdict(claim=claim, status="MISS", found=text)
+    unsteady = found.unsteady(claim.cases, claim.events, claim.measures)
+    if holds and unsteady:
+        more = f", and {len(unsteady) - 1} more" if len(unsteady) > 1 else ""
+        return Verdict(claim=claim, status="FAIL", found=f"{text}, but {unsteady[0]}{more}")
     return Verdict(claim=claim, status="PASS" if holds else "FAIL", found=text)
 
 
@@ -97,6 +106,7 @@ def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim
         cases=tuple(dict.fromkeys(cell.case for cell in cells)),
         events=tuple(dict.fromkeys(cell.event for cell in cells)),
         judge=compare,
+        measures=(quantity,),
     )
 
 

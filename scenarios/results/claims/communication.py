@@ -67,6 +67,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=ROWS,
         events=(EVENT,),
         judge=_MQSI_order,
+        measures=("MQSI",),
     ),
     Claim(
         name="re_tuning_pays",
@@ -76,6 +77,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=(UNTUNED, "reduced"),
         events=(EVENT,),
         judge=_re_tuning,
+        measures=("MQSI",),
     ),
     Claim(
         name="adaptive_alpha_pays",
@@ -85,6 +87,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=("reduced", ADAPTIVE),
         events=(EVENT,),
         judge=_adaptive,
+        measures=("MQSI", "V_error"),
     ),
     Claim(
         name="same_steady_state",
@@ -94,6 +97,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=ROWS,
         events=(EVENT,),
         judge=_same_end,
+        measures=("f_error_Hz", "MPSI"),
     ),
     Claim(
         name="reduced_is_slower",
@@ -103,6 +107,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=("full", "reduced"),
         events=(EVENT,),
         judge=_slower(EVENT),
+        measures=(),
         known_miss="islanding starts from equal powers, so nearly nothing is left to share and the frequency decides, "
         "which fewer neighbours hold back less; from unequal powers it does hold, see next (docs/reproduction.md)",
     ),
@@ -114,6 +119,7 @@ COMMUNICATION: tuple[Claim, ...] = (
         cases=("full", "reduced"),
         events=(RETURN,),
         judge=_slower(RETURN),
+        measures=(),
     ),
 )
 """Claims of reduced communication and link failure."""

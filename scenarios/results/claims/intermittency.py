@@ -66,6 +66,7 @@ INTERMITTENCY: tuple[Claim, ...] = (
         cases=CUT,
         events=(CLOUDS,),
         judge=_at_the_limit,
+        measures=("p",),
     ),
     Claim(
         name="others_take_over",
@@ -75,6 +76,7 @@ INTERMITTENCY: tuple[Claim, ...] = (
         cases=CUT,
         events=(CLOUDS,),
         judge=_others_take_over,
+        measures=("f_error_Hz", "p"),
     ),
     Claim(
         name="MQSI_unmoved",
@@ -83,6 +85,7 @@ INTERMITTENCY: tuple[Claim, ...] = (
         cases=FEASIBLE,
         events=(CLOUDS,),
         judge=_MQSI_unmoved,
+        measures=("MQSI",),
     ),
     Claim(
         name="headroom_used_up",
@@ -92,6 +95,7 @@ INTERMITTENCY: tuple[Claim, ...] = (
         cases=(INFEASIBLE,),
         events=(CLOUDS,),
         judge=_infeasible,
+        measures=("p",),  # the frequency falls: that is the claim
     ),
 )
 """Claims of the intermittency experiment."""

@@ -67,6 +67,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("I", "II", "III", "IV"),
         events=EVENTS,
         judge=_only_IV_restores,
+        measures=("f_error_Hz",),
     ),
     Claim(
         name="IV_within_1_s",
@@ -76,6 +77,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("IV",),
         events=EVENTS,
         judge=_IV_within_1_s,
+        measures=(),
     ),
     Claim(
         name="GFL_idle",
@@ -85,6 +87,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("II", "III"),
         events=EVENTS,
         judge=_GFL_idle,
+        measures=("p",),
     ),
     Claim(
         name="MQSI_order",
@@ -94,6 +97,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("II", "III", "IV"),
         events=EVENTS,
         judge=_MQSI_order,
+        measures=("MQSI",),
     ),
     Claim(
         name="IV_shares_vars",
@@ -102,6 +106,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("IV",),
         events=EVENTS,
         judge=_IV_shares_vars,
+        measures=("MQSI",),
     ),
     Claim(
         name="IV_5_times_below_II_and_III",
@@ -110,6 +115,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("II", "III", "IV"),
         events=EVENTS,
         judge=_IV_5_times_below_II_and_III,
+        measures=("MQSI",),
     ),
     Claim(
         name="IV_MQSI_5_times_better_than_I",
@@ -119,6 +125,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("I", "IV"),
         events=EVENTS,
         judge=_IV_5_times_better_than_I("MQSI"),
+        measures=("MQSI",),
     ),
     Claim(
         name="IV_V_error_5_times_better_than_I",
@@ -128,6 +135,7 @@ ISLANDING: tuple[Claim, ...] = (
         cases=("I", "IV"),
         events=EVENTS,
         judge=_IV_5_times_better_than_I("V_error"),
+        measures=("V_error",),
         known_miss="with equal vars, the terminals of our feeder are 0.003 pu from nominal (docs/reproduction.md)",
     ),
 )

@@ -48,6 +48,7 @@ PLUG_N_PLAY: tuple[Claim, ...] = (
         cases=("IV",),
         events=(LEAVE,),
         judge=_others_carry,
+        measures=(),
     ),
     *(
         Claim(
@@ -58,6 +59,7 @@ PLUG_N_PLAY: tuple[Claim, ...] = (
             cases=("IV",),
             events=(event,),
             judge=_restored(event),
+            measures=(),
         )
         for event in (LEAVE, RETURN)
     ),
@@ -69,6 +71,7 @@ PLUG_N_PLAY: tuple[Claim, ...] = (
         cases=("IV",),
         events=(RETURN,),
         judge=_shares_again,
+        measures=("p",),
     ),
     Claim(
         name="voltage_likewise",
@@ -78,6 +81,7 @@ PLUG_N_PLAY: tuple[Claim, ...] = (
         cases=("IV",),
         events=(LEAVE, RETURN),
         judge=_voltage,
+        measures=("V_error",),
     ),
 )
 """Claims of the plug-n-play experiment."""

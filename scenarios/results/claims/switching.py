@@ -39,6 +39,7 @@ SWITCHING: tuple[Claim, ...] = (
         cases=("IV",),
         events=(EVENT,),
         judge=_three_islands,
+        measures=(),
     ),
     Claim(
         name="each_shares_its_own_load",
@@ -48,6 +49,7 @@ SWITCHING: tuple[Claim, ...] = (
         cases=("IV",),
         events=(EVENT,),
         judge=_own_level,
+        measures=("p",),
     ),
 )
 """Claims of microgrid switching."""

@@ -68,6 +68,7 @@ TOPOLOGY: tuple[Claim, ...] = (
         source=SOURCE,
         figure="topology",
         judge=_falls,
+        measures=(),
     ),
     Claim(
         name="steepest_at_few_links",
@@ -75,6 +76,7 @@ TOPOLOGY: tuple[Claim, ...] = (
         source=SOURCE,
         figure="topology",
         judge=_steepest_at_few,
+        measures=(),
     ),
     Claim(
         name="same_steady_state",
@@ -82,6 +84,7 @@ TOPOLOGY: tuple[Claim, ...] = (
         source=SOURCE,
         figure="topology",
         judge=_same_end,
+        measures=(),
     ),
     Claim(
         name="none_below_8",
@@ -89,6 +92,7 @@ TOPOLOGY: tuple[Claim, ...] = (
         source=SOURCE,
         figure="topology",
         judge=_none_below,
+        measures=(),
     ),
 )
 """Claims of the topologies."""

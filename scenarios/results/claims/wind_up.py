@@ -34,6 +34,7 @@ WIND_UP: tuple[Claim, ...] = (
         cases=CASES,
         events=(CLOUDS,),
         judge=_held_up,
+        measures=(),  # the frequency falls: that is the claim
     ),
     Claim(
         name="limits_restore_sooner",
@@ -43,6 +44,7 @@ WIND_UP: tuple[Claim, ...] = (
         cases=CASES,
         events=(SUN,),
         judge=_sooner,
+        measures=(),
     ),
 )
 """Claims of our experiment on wind-up."""

@@ -1,0 +1,121 @@
+"""Whether the values at the end of a window are steady, and the reason where they are not.
+
+A measure counts as steady when its mean over the last 0.2 s of the window differs from its mean over the 0.2 s before
+by no more than one unit of the last digit that the paper prints: 0.01 Hz, 0.01 (MPSI, MQSI), 0.001 pu (V_error), and
+0.01 pu for powers. So it moves by less than 0.05 Hz/s, 0.05 1/s, 0.005 pu/s, 0.05 pu/s. Above 0.2, where the paper's
+MQSI has values up to 2, 5 % of MQSI do. Within the last 0.2 s it may swing by five times as much: a ripple averages
+out, a limit cycle does not count. A window of less than 0.4 s is halved instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from scenarios.results.history import Flags, Floats
+
+STEADY = 0.2
+"""Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
+
+SWINGS = 5.0
+"""How many times more a measure may swing within `STEADY` than its mean may move."""
+
+FEWEST = 2
+"""Rows that each of the two means needs at least."""
+
+
+class Bound(NamedTuple):
+    """How far a steady measure may move."""
+
+    digit: float
+    """Largest change between two means, in its unit: one unit of the last digit that the paper prints."""
+    unit: str
+    """Unit, or ""."""
+    part: float = 0.0
+    """The same as a part of its value, where that is more."""
+
+    def of(self, value: float) -> float:
+        """The change allowed at a value."""
+        return max(self.digit, self.part * abs(value))
+
+
+BOUNDS: Mapping[str, Bound] = {
+    "f_error_Hz": Bound(0.01, "Hz"),
+    "MPSI": Bound(0.01, ""),
+    "V_error": Bound(0.001, "pu"),
+    "MQSI": Bound(0.01, "", part=0.05),
+    "p": Bound(0.01, "pu"),
+}
+"""Bounds by measure; frequency and power are looked at inverter by inverter."""
+
+
+class Ends(NamedTuple):
+    """Rows at the end of a window."""
+
+    start: float
+    end: float
+    """Of the window (s)."""
+    apart: float
+    """Time (s) between the middles of the last two parts."""
+    last: Flags
+    """Rows of the last part."""
+    before: Flags
+    """Rows of the part before it."""
+    steady: Flags
+    """Rows over which steady values are means: the last `STEADY`."""
+
+
+def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
+    """Rows at the end of a window that lasts from start to end (s) and has the rows inside."""
+    span = min(STEADY, 0.5 * (end - start))
+    last = inside & (t >= end - span - 1e-9)
+    before = inside & ~last & (t >= end - 2.0 * span - 1e-9)
+    apart = float(t[last].mean() - t[before].mean()) if last.any() and before.any() else span
+    return Ends(start, end, apart, last, before, inside & (t >= end - STEADY - 1e-9))
+
+
+def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
+    """Why a measure has no steady value; "" where it has.
+
+    Parameters
+    ----------
+    measure : str
+        A key of `BOUNDS`.
+    x : Floats
+        Its rows, shape (T,), or (T, M) for M inverters; not a number in rows where it has no value. An inverter that
+        is off the network for all of `ends.steady` is no column of it.
+    ends : Ends
+        Rows at the end of the window.
+    missing : str
+        Why a row has no value, e.g. "de-energised: no inverter is on the network".
+    names : tuple[str, ...], optional
+        Names of the columns, to tell which moves.
+    """
+    if not ends.steady.any():
+        return f"no samples: no row was recorded between {ends.start:g} s and {ends.end:g} s"
+    columns = x.reshape(len(x), -1)
+    valid = np.isfinite(columns[ends.steady])
+    if not valid.any(axis=1).any():
+        return missing
+    if not valid.any(axis=1).all():
+        return f"{missing} in a part of the last {STEADY:g} s"
+    if min(ends.last.sum(), ends.before.sum()) < FEWEST:
+        return f"not steady: {ends.last.sum() + ends.before.sum()} rows are too few to tell"
+    bound, found = BOUNDS[measure], []
+    unit = f" {bound.unit}".rstrip()
+    for i, column in enumerate(columns.T):
+        recent, earlier = column[ends.last], column[ends.before]
+        recent, earlier = recent[np.isfinite(recent)], earlier[np.isfinite(earlier)]
+        if not recent.size:
+            continue
+        of = f"{names[i]} " if names else ""
+        allowed, swing = bound.of(float(recent.mean())), float(np.ptp(recent))
+        change = float(recent.mean() - earlier.mean()) if earlier.size else 0.0
+        if abs(change) * STEADY > allowed * ends.apart * (1.0 + 1e-9):
+            per = f"{bound.unit or '1'}/s"
+            found.append((abs(change) / allowed, f"not steady: {of}still moves {change / ends.apart:+.2g} {per}"))
+        elif swing > SWINGS * allowed:
+            found.append((swing / allowed / SWINGS, f"not steady: {of}still swings by {swing:.2g}{unit}"))
+    return max(found, default=(0.0, ""))[1]
