@@ -67,8 +67,10 @@ class Connectivity:
             found.setdefault(root(node), []).append(node)
         return tuple(frozenset(nodes) for nodes in found.values())
 
-    def dead(self, closed: Collection[str], forming: Iterable[str]) -> tuple[frozenset[Node], ...]:
-        """Parts that nothing feeds.
+    def fed(
+        self, closed: Collection[str], forming: Iterable[str]
+    ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
+        """Parts that the substation or a grid-forming inverter feeds, and parts that nothing feeds.
 
         Parameters
         ----------
@@ -78,5 +80,6 @@ class Connectivity:
             Buses of the grid-forming inverters that are on the network.
         """
         feeding = [*forming, *([self._feeder.source.bus] if self._feeder.source else [])]
-        fed = {(bus, "A") for bus in feeding}
-        return tuple(part for part in self.parts(closed, feeding) if not part & fed)
+        alive = {(bus, "A") for bus in feeding}
+        parts = self.parts(closed, feeding)
+        return tuple(part for part in parts if part & alive), tuple(part for part in parts if not part & alive)

@@ -198,13 +198,23 @@ def check(
 ) -> None:
     """Check a scenario file and its feeder for mistakes.
 
-    All mistakes are told at once.
+    All mistakes are told at once. A file without any is tried: whether its feeder has an operating point to start from.
+    Notes tell what its events de-energise.
 
     Exit code: 0 it can be run, 2 it has mistakes.
 
     Example:  gridpeers check my-islanding.toml
     """
     spec, feeder = load(file)
+    require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
+
+    from scenarios.operating_point import start_problem
+    from scenarios.spec.supply import supply_notes
+
+    if problem := start_problem(spec, feeder):
+        fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
+    for note in supply_notes(spec, feeder):
+        typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {len(spec.cases)} case(s) {', '.join(spec.cases)}; {len(spec.events)} event(s); "
         f"{spec.time.end_s:g} s; {len(feeder.inverters)} inverters on {len(feeder.buses)} buses"

@@ -29,7 +29,9 @@ class BusTable:
         self._by_name: dict[str, Bus] = {}
         self._row_of: dict[str, Row] = {}
         table = Table(folder, "buses.csv", ("bus", "phases", "V_nom_kV_LL"), mistakes, required=True)
-        self._readable = table.readable
+        self._readable = table.readable and len(table) > 0
+        if table.readable and not len(table):
+            mistakes.append("buses.csv: has no rows; a feeder needs at least one bus")
         for row in table:
             name = row.text("bus")
             bus = Bus(

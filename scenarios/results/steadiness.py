@@ -63,6 +63,8 @@ class Ends(NamedTuple):
     """Rows of the last part."""
     before: Flags
     """Rows of the part before it."""
+    inside: Flags
+    """All rows of the window."""
     steady: Flags
     """Rows over which steady values are means: the last `STEADY`."""
 
@@ -73,7 +75,7 @@ def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
     last = inside & (t >= end - span - 1e-9)
     before = inside & ~last & (t >= end - 2.0 * span - 1e-9)
     apart = float(t[last].mean() - t[before].mean()) if last.any() and before.any() else span
-    return Ends(start, end, apart, last, before, inside & (t >= end - STEADY - 1e-9))
+    return Ends(start, end, apart, last, before, inside, inside & (t >= end - STEADY - 1e-9))
 
 
 def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
@@ -102,7 +104,7 @@ def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, 
     if not valid.any(axis=1).all():
         return f"{missing} in a part of the last {STEADY:g} s"
     if min(ends.last.sum(), ends.before.sum()) < FEWEST:
-        return f"not steady: {ends.last.sum() + ends.before.sum()} rows are too few to tell"
+        return f"not steady: {_rows(int(ends.inside.sum()), ends.end - ends.start)} too few to tell"
     bound, found = BOUNDS[measure], []
     unit = f" {bound.unit}".rstrip()
     for i, column in enumerate(columns.T):
@@ -119,3 +121,8 @@ def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, 
         elif swing > SWINGS * allowed:
             found.append((swing / allowed / SWINGS, f"not steady: {of}still swings by {swing:.2g}{unit}"))
     return max(found, default=(0.0, ""))[1]
+
+
+def _rows(count: int, length: float) -> str:
+    """So many rows of a window of a length (s), as the subject of a sentence."""
+    return f"1 row ({length:.3g} s) is" if count == 1 else f"{count} rows ({length:.3g} s) are"

@@ -14,6 +14,9 @@ from wire.nearest import suggestion
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
 
+PART_OF_T = 0.3
+"""Longest integration step, as a part of the inverters' shortest time constant: at 0.4 microgrid123 oscillates."""
+
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """What a run folder holds beside the folders of the cases."""
 
@@ -50,6 +53,24 @@ def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
                 f'event "{second.label}" follows "{first.label}" by {gap:g} s, so that no recorded row lies between '
                 f"them to measure; write them as one event, or lower record_s = {time.record_s:g} s",
             )
+
+
+def check_step(scenario: Scenario, mistakes: Mistakes) -> None:
+    """The integration step resolves every time constant of the inverters; if not, the numbers ring or run away."""
+    gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
+    of = {("plant.gfm", name): getattr(gfm, name) for name in ("T_p", "T_q", "T_v")}
+    of |= {("plant.gfl", name): getattr(gfl, name) for name in ("T_ff", "T_pf", "T_vf", "T_qf")}
+    if gfl.model == "current_source":
+        of["plant.gfl", "T_if"] = gfl.T_if
+    (table, name), least = min(of.items(), key=lambda item: item[1])
+    most, h = PART_OF_T * least, scenario.time.h_s
+    if mistakes.touch("time.h_s", f"{table}.{name}_s") or h <= most * (1.0 + 1e-9):
+        return
+    mistakes.add(
+        "time.h_s",
+        f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}]: what it computes would ring; "
+        f"at most {most:g} s, {PART_OF_T:g} of the shortest time constant",
+    )
 
 
 def check_names(scenario: Scenario, mistakes: Mistakes) -> None:

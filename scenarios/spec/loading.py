@@ -13,13 +13,14 @@ import msgspec
 from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, read_feeder
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
-from scenarios.spec.checks import check_cases, check_names, check_start, check_switches, check_times
+from scenarios.spec.checks import check_cases, check_names, check_start, check_step, check_switches, check_times
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.netem import check_netem, with_delays
 from scenarios.spec.reading import read_tables
+from scenarios.spec.supply import check_supply
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""
@@ -104,6 +105,7 @@ def check_tables(
     if not scenario.name:
         scenario = msgspec.structs.replace(scenario, name=path.stem)
     check_times(scenario, mistakes)
+    check_step(scenario, mistakes)
     check_names(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
@@ -114,6 +116,7 @@ def check_tables(
         check_limits(scenario, feeder, mistakes)
         check_start(scenario, feeder, mistakes)
         check_netem(scenario, feeder, mistakes)
+        check_supply(scenario, feeder, mistakes)
     return scenario, feeder
 
 

@@ -127,3 +127,10 @@ def test_the_feeders_that_come_with_the_package_are_plausible(feeder: str) -> No
     sets = [path.stem.removeprefix("loads_") for path in (DATA / feeder).glob("loads_*.csv")]
 
     assert all(read_feeder(feeder, load_set).buses for load_set in sets)
+
+
+def test_a_feeder_without_buses_is_told_once(folder: Path) -> None:
+    """An empty table of buses is one mistake, not one for every reference into it."""
+    (folder / "buses.csv").write_text("bus,phases,V_nom_kV_LL\n")
+
+    assert mistakes(folder) == ("buses.csv: has no rows; a feeder needs at least one bus",)

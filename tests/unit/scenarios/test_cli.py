@@ -65,13 +65,15 @@ def test_list_shows_the_catalogue() -> None:
 
 
 def test_check_says_that_a_file_can_be_run(elsewhere: Path) -> None:
-    """A good file is told in one line."""
+    """A good file is told in one line, after what its events mean for the feeder."""
     (elsewhere / "mine.toml").write_text(ISLANDING)
 
     code, text = invoke("check", "mine.toml")
 
     assert code == 0
-    assert text == "mine.toml: can be run: 4 case(s) I, II, III, IV; 2 event(s); 7 s; 9 inverters on 134 buses\n"
+    note, line = text.splitlines()
+    assert note.startswith('NOTE  event "event2" at 4 s de-energises 18 buses ')
+    assert line == "mine.toml: can be run: 4 case(s) I, II, III, IV; 2 event(s); 7 s; 9 inverters on 134 buses"
 
 
 @pytest.mark.parametrize("topic", ["keys", "messages", "scenario"])
@@ -156,7 +158,7 @@ def test_a_run_fills_its_folder(elsewhere: Path) -> None:
 
 
 def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
-    """Exactly these keys, numbers where numbers are promised, null where nothing was restored."""
+    """Exactly these keys, numbers where numbers are promised, null where nothing was restored or a reason is told."""
     (elsewhere / "short.toml").write_text(SHORT)
 
     invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
@@ -171,9 +173,13 @@ def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
     assert found["cases"].keys() == {"I"}
     assert found["cases"]["I"].keys() == {"event1", "history_sha256"}
     measures = found["cases"]["I"]["event1"]
+    reasons = measures.pop("reasons")  # the window is too short for all to be steady
+    assert reasons
     assert measures.keys() == {"f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s"}
     assert measures["t_restore_s"] is None
-    assert all(isinstance(value, float) for name, value in measures.items() if name != "t_restore_s")
+    nulls = {name for name, value in measures.items() if value is None}
+    assert nulls == {"t_restore_s", *(reasons.keys() & measures.keys())}
+    assert all(isinstance(value, float) for name, value in measures.items() if name not in nulls)
 
 
 def test_a_runs_copy_of_its_scenario_gives_the_same_bytes(elsewhere: Path) -> None:

@@ -320,6 +320,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
         islands, theirs = (of[label].pop("islands", {}) for of in (case, expected))
         assert list(islands) == list(theirs) == (["inv1", "inv4"] if label == "by hand at 2.5 s" else [])
         for ours, other in ((case[label], expected[label]), *((islands[name], theirs[name]) for name in islands)):
+            assert ours.pop("reasons", {}).keys() == other.pop("reasons", {}).keys()
             never = {name for name in other if other[name] is None}
             assert {name for name in ours if ours[name] is None} == never
             assert [ours[name] for name in other if name not in never] == pytest.approx(

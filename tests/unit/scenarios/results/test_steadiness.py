@@ -122,7 +122,7 @@ def test_a_window_of_too_few_rows_says_nothing_of_steadiness() -> None:
     """Two rows cannot tell a ramp from a value."""
     found = reasons(history(), start=1.0, end=1.03)
 
-    assert found["f_error_Hz"] == "not steady: 2 rows are too few to tell"
+    assert found["f_error_Hz"] == "not steady: 2 rows (0.03 s) are too few to tell"
 
 
 def ramping() -> tuple[Findings, Steady]:

@@ -32,6 +32,11 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
             "h_s = 0.003",
             r"time.h_s: 0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025",
         ),
+        (
+            "h_s = 0.002",
+            "h_s = 0.005",
+            r"time.h_s: 0.005 s is too long a step for T_p_s = 0.01 s of \[plant.gfm\]: .*; at most 0.003 s",
+        ),
         ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
         ("record_s = 0.01", "record_s = 0.005", r"time.record_s: 0.005 s is not a multiple of h_s = 0.002 s"),
         ("end_s = 7.0", "end_s = 7.01", r"time.end_s: 7.01 s is not a multiple of T_c_s = 0.02 s"),
