@@ -75,18 +75,12 @@ class Agent:
         """Whether the nameplate of an agent has been seen."""
         return name in self._known
 
-    def meet(self, nameplate: Nameplate) -> bool:
-        """Note who somebody is; False if a later life of it is known already.
-
-        What was heard of an earlier life is forgotten.
-        """
+    def meet(self, nameplate: Nameplate) -> None:
+        """Note who somebody is; what was heard of another life of it is forgotten."""
         known = self._known.get(nameplate.sender)
-        if known is not None and known.incarnation > nameplate.incarnation:
-            return False
-        if known is not None and known.incarnation < nameplate.incarnation:
+        if known is not None and known.incarnation != nameplate.incarnation:
             self._drop(nameplate.sender)
         self._known[nameplate.sender] = nameplate
-        return True
 
     def forget(self, name: str) -> None:
         """Forget who somebody is and what it said, as its process is gone."""
@@ -121,28 +115,10 @@ class Agent:
         name = self.config.name
         return in_neighbours(self.config.control, name, members) if name in members else ()
 
-    def judge(self, state: State) -> str:
-        """Why a neighbour's state cannot be used: "foreign", "unexpected", "ghost", "stale"; empty if it can.
-
-        Unexpected is one whose nameplate is not known, or not yet: after a cut states can come before it.
-        """
-        if state.sender == self.config.name:
-            return "foreign"
-        known = self._known.get(state.sender)
-        if known is None or state.incarnation > known.incarnation:
-            return "unexpected"
-        if state.incarnation < known.incarnation:
-            return "ghost"
-        last = self._heard.get(state.sender)
-        return "stale" if last is not None and state.seq <= last.seq else ""
-
-    def hear(self, state: State) -> str:
-        """Note a neighbour's state if it can be used; else return why not, as `judge` does."""
-        reason = self.judge(state)
-        if not reason:
-            self._heard[state.sender] = state
-            self._worth.arrived(state.sender)
-        return reason
+    def hear(self, state: State) -> None:
+        """Note the latest state of somebody whose nameplate is known. Who may speak, `wire.admission` has checked."""
+        self._heard[state.sender] = state
+        self._worth.arrived(state.sender)
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None

@@ -1,25 +1,22 @@
-"""What an agent's side of simulated and of wall-clock time have in common: who it is, its routes, its actions. Pure."""
+"""What an agent's side of simulated and of wall-clock time have in common: who it is, which plant it follows. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from math import inf
 
 from agents.agent import Agent
 from agents.config import AgentConfig
-from wire.actions import Action, Publish, Say
-from wire.codec import RejectedError, Rejects, decode, encode
-from wire.keys import Keys
+from wire.codec import RejectedError, decode, encode
+from wire.endpoint import Endpoint, Route
+from wire.keys import epoch_of
 from wire.links import Links
-from wire.messages import PLANT, AnyMessage, LinkReport
+from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, Stop
 
 REPORT_TICKS = 100
 """What emulated links did is sent every so many ticks."""
 
-Handler = Callable[[AnyMessage, bytes, float], None]
-"""Takes a message, its bytes, and the time."""
 
-
-class Side:
+class Side(Endpoint):
     """One agent on a wire.
 
     Parameters
@@ -30,11 +27,12 @@ class Side:
         Which process this is, unique in the run; part of the agent's token.
     links : Links or None
         What the links to it do to its messages.
+    rate : float, optional
+        Most messages of one sender per s of run time; see `wire.admission`.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None) -> None:
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(config.name)
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None, rate: float = inf) -> None:
+        super().__init__(config.name, config.run, rate)
         self.stopped = ""
         """Why it closes; empty as long as it goes on."""
         self.failed = ""
@@ -48,13 +46,10 @@ class Side:
         except RejectedError as rejected:
             raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
         self._links = links
-        self._actions: list[Action | Say] = []
-        self._routes: dict[str, tuple[str, Handler]] = {
-            self.keys.control: (PLANT, self._on_control),
-            self.keys.dismissal(config.name, instance): (PLANT, self._on_dismissal),
-            self.keys.measurement(config.name): (PLANT, self._on_measurement),
-        }
-        self._plant_incarnation = 0
+        self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
+        self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
+        self._plants: set[int] = set()
+        """Epochs of the plants whose tokens are there."""
 
     @property
     def token(self) -> str:
@@ -81,45 +76,48 @@ class Side:
         """Whether the driver should close."""
         return bool(self.stopped or self.failed)
 
-    def take_actions(self) -> list[Action | Say]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
     def work(self, now: float) -> bool:
         """Nothing: an agent computes when a message makes it possible, or its tick is due."""
         return False
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
-        if self.over:
-            return
-        try:
-            if key not in self._routes:
-                raise RejectedError("foreign", "nothing was asked for on this key")
-            sender, handler = self._routes[key]
-            message = decode(payload)
-            if message.sender != sender:
-                self._misled(sender, message.sender)
-                raise RejectedError("foreign", f"sender {message.sender}, {sender} was expected")
-            handler(message, payload, now)
-            self._used(message, now)
-        except RejectedError as rejected:
-            self.rejects.add(rejected.kind, key, rejected.text)
+    # ---------------------------------------------------------------- the plant
 
-    def _misled(self, expected: str, sender: str) -> None:
-        """Note a message that came under another's key."""
+    def _plant_appeared(self, part: str) -> None:
+        """Note the token of a plant."""
+        if (epoch := epoch_of(part)) is not None:
+            self._plants.add(epoch)
+            self.plant_seen = True
 
-    def _used(self, message: AnyMessage, now: float) -> None:
-        """Note a message that was of use."""
+    def _plant_vanished(self, part: str) -> bool:
+        """Note that the token of a plant is gone; whether the agent is without a plant now."""
+        if (epoch := epoch_of(part)) not in self._plants:
+            return False
+        self._plants.discard(epoch)
+        followed = self.admission.epoch(PLANT)
+        if followed == epoch:
+            self.admission.release(PLANT)
+        return followed == epoch or not self._plants
 
-    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
+    def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
+        """Follow the plant that speaks first of those whose tokens are there, until its token is gone."""
+        epoch = message.incarnation
+        if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
+            self.admission.bind(PLANT, epoch)
+            self._follow(epoch)
+        super()._admit(route, message, now)
+
+    def _follow(self, epoch: int) -> None:
+        """Note that the plant of this epoch is followed from now on."""
+
+    def _on_own_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
+        if message.to != self._name:
+            raise RejectedError("unexpected", f"the measurement of {message.to}")
+        self._on_measurement(message, payload, now)
+
+    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
         raise NotImplementedError
 
-    def _on_dismissal(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        raise NotImplementedError
-
-    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
+    def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         raise NotImplementedError
 
     def _report_links(self, *, final: bool = False) -> None:
@@ -136,6 +134,3 @@ class Side:
                 final=final and data is parts[-1],
             )
             self._publish(self.keys.report(self._name), encode(report))
-
-    def _publish(self, key: str, payload: bytes) -> None:
-        self._actions.append(Publish(key, payload))

@@ -219,6 +219,11 @@ class Receiver:
 
     # ---------------------------------------------------------------- what was
 
+    @property
+    def dropped(self) -> int:
+        """Messages that were not delivered and never will be, of all senders."""
+        return sum(sum(inbound.ledger.dropped.values()) for inbound in self._links.values())
+
     def counts(self) -> dict[str, LinkCounts]:
         """How the messages of each sender fared."""
         flying = [entry[2] for entry in (*self._heap, *self._kept)]

@@ -1,19 +1,22 @@
-"""What the plant's side of simulated and of wall-clock time have in common: its keys, its agents, its actions. Pure."""
+"""What the plant's side of simulated and of wall-clock time have in common: its keys, its agents, its reports. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
+from math import inf
 
 from plant.config import PlantConfig
 from plant.interface import PlantLike
 from plant.reporting import Reporter
 from plant.schedule import Schedule
-from wire.actions import Action, Publish, Say
+from wire.actions import Fetch
 from wire.clock import ticks_until, time_of
-from wire.codec import RejectedError, Rejects, encode
-from wire.keys import Keys, check_name
+from wire.codec import RejectedError, encode
+from wire.endpoint import Endpoint, Route
+from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Pacing, State, Stop
+from wire.messages import PLANT, LinkReport, Nameplate, Pacing, State, Stop
 from wire.printable import printable
 
 CLOSING = 2.0
@@ -24,7 +27,7 @@ LINK_TICKS = 100
 """What emulated links to the plant did is sent every so many ticks."""
 
 
-class Side:
+class Side(Endpoint):
     """The plant on a wire.
 
     Parameters
@@ -35,15 +38,16 @@ class Side:
         The plant at t = 0.
     links : Links or None
         What the links to the plant do to its messages.
+    rate : float, optional
+        Most messages of one sender per s of run time; see `wire.admission`.
     """
 
-    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None) -> None:
+    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:
+        super().__init__(PLANT, config.run, rate)
         for name in config.agents:
             check_name("agents", name)
             if name not in plant.inverters:
                 raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
-        self.keys = Keys(config.run)
-        self.rejects = Rejects(PLANT)
         self.outcome = ""
         """Why the run broke; empty while it goes well."""
         self.cause: RuntimeError | None = None
@@ -56,7 +60,6 @@ class Side:
         self.plates: dict[str, Nameplate] = {}
         self._links = links
         self._ticks = None if config.end is None else ticks_until(config.end, config.T_c)
-        self._actions: list[Action | Say] = []
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
         """All tokens of agents and recorders that are there now, refused ones too."""
@@ -64,13 +67,13 @@ class Side:
         self._reporter = Reporter(config.incarnation, plant)
         self._last_due = False
         """Whether the last telemetry is yet to be sent, though the run has ended."""
-        self._set_by: dict[str, int] = {}
-        """Number of the last state of each agent that a link let through."""
+        self._introduced: dict[str, str] = {}
+        """Of each agent whose epoch is known the instance that told it."""
 
     @property
     def token(self) -> str:
         """Key of the plant's liveliness token."""
-        return self.keys.alive_plant
+        return self.keys.alive_plant(self.config.incarnation)
 
     @property
     def watched(self) -> str:
@@ -82,11 +85,6 @@ class Side:
         """Run time the plant stands at (s)."""
         return time_of(self.tick, self.config.T_c)
 
-    def take_actions(self) -> list[Action | Say]:
-        """What is to be done now, in this order."""
-        actions, self._actions = self._actions, []
-        return actions
-
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
         """Tell one agent, or all, to close."""
         incarnation = self.config.incarnation
@@ -95,23 +93,40 @@ class Side:
         )
         self._publish(key, encode(stop))
 
-    def _publish(self, key: str, payload: bytes) -> None:
-        self._actions.append(Publish(key, payload))
+    # ---------------------------------------------------------------- agents
 
-    def _check_sender(self, expected: str, message: AnyMessage) -> None:
-        name, life = message.sender, message.incarnation
-        if name != expected:
-            raise RejectedError("foreign", f"sender {name}, {expected} was expected")
-        plate = self.plates.get(name)
-        if plate is None or life != plate.incarnation:
-            raise RejectedError("ghost", f"life {life} of {name} does not take part")
+    def _fetch_nameplate(self, name: str, instance: str) -> None:
+        """Ask the process that speaks for a name who it is."""
+        key = self.keys.nameplate(name, instance)
+        self._routes[key] = Route(name, (Nameplate,), partial(self._on_answer, instance), early=True)
+        self._actions.append(Fetch(key))
+
+    def _on_answer(self, instance: str, plate: Nameplate, payload: bytes, now: float) -> None:
+        name = plate.sender
+        if self.instances.get(name) != instance:
+            raise RejectedError("ghost", f"instance {instance} of {name} does not take part")
+        if name in self.plates:
+            if self.plates[name] != plate:
+                raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+            return
+        self._introduced[name] = instance
+        self.admission.bind(name, plate.incarnation)
+        self._on_nameplate(plate, now)
+
+    def _on_nameplate(self, plate: Nameplate, now: float) -> None:
+        """Take in an agent that has said who it is."""
+        raise NotImplementedError
+
+    def _gone(self, name: str, instance: str) -> None:
+        """Note that a process is gone: what still comes from it is a ghost's."""
+        self._routes.pop(self.keys.nameplate(name, instance), None)
+        if self._introduced.get(name) == instance:
+            del self._introduced[name]
+            self.admission.release(name)
 
     def _news(self, now: float) -> Iterable[State]:
-        """States that the emulated links have let through by now (s of run time) and that are news."""
-        for state in arrived(self._links, now, self.rejects):
-            if isinstance(state, State) and state.seq > self._set_by.get(state.sender, -1):
-                self._set_by[state.sender] = state.seq
-                yield state
+        """States that the emulated links have let through by now (s of run time) and that are of use."""
+        return (state for state in arrived(self._links, now, self.rejects, self.admission) if isinstance(state, State))
 
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
         raise NotImplementedError
@@ -140,10 +155,6 @@ class Side:
         """Pass on what an agent's links did; it closes once it knows that its last report is here."""
         self._publish(self.keys.telemetry, payload)
         if report.final:
-            try:
-                check_name("instance", report.instance)
-            except ValueError as error:
-                raise RejectedError("garbled", str(error)) from None
             self.stop(self.keys.dismissal(report.sender, report.instance), "its report is here")
 
     def _report_links(self, *, last: bool = False) -> None:

@@ -33,7 +33,7 @@ KINDS = {
     "not finite": "a number in it is NaN or infinite",
     "implausible": "a value in it is beyond what can be, or contradicts another",
     "foreign": "on a key of another run, or not sent by whom the key says",
-    "ghost": "from an earlier life of its sender",
+    "ghost": "from another life of its sender than the one that counts",
     "stale": "about a tick or a roster that is over",
     "unexpected": "well-formed, but not for here and now",
     "failed": "an error of ours came up while it was handled, see its traceback",

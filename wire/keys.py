@@ -19,7 +19,7 @@ LATEST_ONLY = ("measurement", "state", "status")
 """Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
 
 
-ANY_ALIVE_PLANT = "gridpeers/*/alive/plant"
+ANY_ALIVE_PLANT = "gridpeers/*/alive/plant/*"
 """Tokens of the plants of all runs: who is told a wrong run name is told the right ones."""
 
 
@@ -76,7 +76,6 @@ class Keys:
         self.control = f"{self._root}/control"
         self.telemetry = f"{self._root}/telemetry"
         self.command = f"{self._root}/command"
-        self.alive_plant = f"{self._root}/alive/plant"
         self.any_alive = f"{self._root}/alive/**"
 
     def measurement(self, inverter: str) -> str:
@@ -127,6 +126,10 @@ class Keys:
         """Who one instance is; answered on request."""
         return f"{self._root}/nameplate/{inverter}/{instance}"
 
+    def alive_plant(self, epoch: int | str) -> str:
+        """Token of a plant, in its epoch."""
+        return f"{self._root}/alive/plant/{epoch}"
+
     def alive_agent(self, inverter: str, instance: str) -> str:
         """Token of an agent."""
         return f"{self._root}/alive/agent/{inverter}/{instance}"
@@ -138,13 +141,27 @@ class Keys:
     def parts(self, key: str) -> tuple[str, ...]:
         """Split a key of this run into what stands behind ``gridpeers/<run>/``; empty for any other key.
 
+        So it is for a key with anything in it that is no name: anybody can hold a token, and call it what he likes.
+
         Examples
         --------
         >>> Keys("demo").parts("gridpeers/demo/alive/agent/inv3/a1")
         ('alive', 'agent', 'inv3', 'a1')
         """
         root = self._root + "/"
-        return tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
+        parts = tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
+        return parts if all(map(_NAME.fullmatch, parts)) else ()
+
+
+def epoch_of(part: str) -> int | None:
+    """The epoch that the last part of a plant's token says; None if it is no epoch that a message could have.
+
+    Examples
+    --------
+    >>> epoch_of("1763778000000"), epoch_of("late"), epoch_of("9" * 30)
+    (1763778000000, None, None)
+    """
+    return int(part) if re.fullmatch("[0-9]{1,16}", part) and int(part) < 2**53 else None
 
 
 def run_of_plant(key: str) -> str:
@@ -152,11 +169,11 @@ def run_of_plant(key: str) -> str:
 
     Examples
     --------
-    >>> run_of_plant("gridpeers/demo/alive/plant")
+    >>> run_of_plant("gridpeers/demo/alive/plant/1")
     'demo'
     """
     match key.split("/"):
-        case ("gridpeers", run, "alive", "plant"):
+        case ("gridpeers", run, "alive", "plant", _) if _NAME.fullmatch(run):
             return run
     return ""
 
@@ -167,14 +184,14 @@ def describe() -> tuple[KeySpec, ...]:
 
     def row(key: str, kind: str, message: str, sender: str, listener: str, when: str) -> KeySpec:
         expression = key.replace("RUN", "<run>").replace("INV", "<inverter>").replace("INSTANCE", "<instance>")
-        expression = expression.replace("NAME", "<recorder>").replace("ASKER", "<id>")
+        expression = expression.replace("EPOCH", "<epoch>").replace("NAME", "<recorder>").replace("ASKER", "<id>")
         return KeySpec(expression=expression, kind=kind, message=message, sender=sender, listener=listener, when=when)
 
     agent, instance = "INV", "INSTANCE"
     return (
         row(
-            keys.alive_plant, "token", "-", "plant", "agents, recorders",
-            "as long as the plant's session lives; declared after its subscribers",
+            keys.alive_plant("EPOCH"), "token", "-", "plant", "agents, recorders",
+            "as long as the plant's session lives; declared after its subscribers; says the epoch of its messages",
         ),
         row(
             keys.alive_agent(agent, instance), "token", "-", "agent", "plant, other agents",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence, Set
 from typing import Protocol
 
+from wire.admission import Admission
 from wire.codec import RejectedError, Rejects, decode
 from wire.messages import AnyMessage
 
@@ -32,6 +33,11 @@ class Links(Protocol):
     @property
     def clear(self) -> Set[str]:
         """Senders whose messages `offer` is known not to take: asked of every message, so no call."""
+        ...
+
+    @property
+    def dropped(self) -> int:
+        """Messages that the links have lost, of all senders."""
         ...
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> bool:
@@ -119,12 +125,21 @@ def is_taken(links: Links | None, message: AnyMessage, payload: bytes, at: float
     return links.offer(message.sender, message.seq, message.t, at, payload)
 
 
-def arrived(links: Links | None, now: float, rejects: Rejects) -> Iterator[AnyMessage]:
-    """What the links have let through by now (s of run time); what they have garbled is counted and dropped."""
+def arrived(links: Links | None, now: float, rejects: Rejects, admission: Admission) -> Iterator[AnyMessage]:
+    """What the links have let through by now (s of run time) and is of use.
+
+    What they have garbled is counted and dropped; what was overtaken on the way, and what the dead once said, is only
+    dropped: links that delay do that to sound messages.
+    """
     if links is None:
         return
     for arrival in links.due(now):
         try:
-            yield decode(arrival.payload)
+            message = decode(arrival.payload)
+            if message.sender != arrival.src:
+                raise RejectedError("foreign", f"sender {message.sender}")
         except RejectedError as rejected:
             rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
+            continue
+        if admission.passes(message):
+            yield message

@@ -19,6 +19,8 @@ plant holds for it. An agent that finds itself woken late (frozen, or starved) d
 
 from __future__ import annotations
 
+from functools import partial
+
 from msgspec.structs import replace
 
 from agents.config import AgentConfig
@@ -30,7 +32,8 @@ from agents.freerun.roll_call import RollCall
 from agents.freerun.tally import Phase, Tally
 from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
-from wire.codec import RejectedError, encode
+from wire.codec import encode
+from wire.endpoint import Route
 from wire.links import Links, arrived, is_taken
 from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
 from wire.timer import Timer
@@ -41,6 +44,9 @@ STATUS_PERIOD = 0.5
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
 take what was sent last with it."""
+
+FASTER = 2.0
+"""So many times as often as itself an agent believes others to send at most."""
 
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""
@@ -62,9 +68,12 @@ class FreeAgent(Side):
     def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        super().__init__(config, instance, links)
+        super().__init__(config, instance, links, rate=FASTER / config.T_c)
+        self._followed = 0
+        """Epoch of the plant that was followed last; 0 before the first."""
         self._orders = Orders(config.name, config.incarnation, links)
-        self._routes[self.keys.order(config.name)] = (PLANT, self._on_order)
+        self._routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
+        self._routes[self.keys.order(config.name)] = Route(PLANT, (LinkOrder,), self._on_order)
         self.phase: Phase = "seeking"
         self.astray = False
         """Whether it closes only to begin again with a new session."""
@@ -77,7 +86,7 @@ class FreeAgent(Side):
         self._give_up: float | None = None
         self.heard = Heard(config.speed)
         """What came, and how old it is."""
-        self._peers = Peers(self._agent)
+        self._peers = Peers(self._agent, self.admission)
         self._roll_call = RollCall(config.name, self.heard, self._peers)
         self._leaving = ""
         """Why it leaves, once the plant has been told."""
@@ -89,7 +98,8 @@ class FreeAgent(Side):
         """Know nothing of the others, as before the first session."""
         self.phase = "seeking"
         self._routes = dict(self._first_routes)
-        self._plant_there = False
+        self._plants.clear()
+        self.admission.release(PLANT)
         self._awaited: tuple[str, ...] = ()
         """For whom the plant said last that it waits."""
         self._run_time = 0.0
@@ -142,7 +152,7 @@ class FreeAgent(Side):
         skipped = self._cadence.take(now)
         if self._leaving:
             self._left += 1
-            if self._left * self._cadence.period >= LEAVING or not self._plant_there:
+            if self._left * self._cadence.period >= LEAVING or not self._plants:
                 self.stopped = self._leaving
             return
         if self._give_up is not None and not self.plant_seen and now >= self._give_up:
@@ -182,7 +192,7 @@ class FreeAgent(Side):
         name, life = self._name, self._config.incarnation
         message = Leave(sender=name, incarnation=life, seq=self.tally.sent, t=self.heard.t)
         self._publish(self.keys.leave(name), encode(message))
-        if self._plant_there:
+        if self._plants:
             self._leaving = reason
         else:
             self.stopped = reason
@@ -195,8 +205,8 @@ class FreeAgent(Side):
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared."""
         match self.keys.parts(key):
-            case ("alive", "plant"):
-                self._plant_there = self.plant_seen = True
+            case ("alive", "plant", epoch):
+                self._plant_appeared(epoch)
                 self._roll_call.plant_seen(now)
                 if self.phase == "seeking":
                     self.phase = "waiting"
@@ -208,10 +218,9 @@ class FreeAgent(Side):
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
         match self.keys.parts(key):
-            case ("alive", "plant"):
-                self._plant_there = False
+            case ("alive", "plant", epoch) if self._plant_vanished(epoch):
                 self._hold("the plant is gone; holds, and seeks it again")
-                self.phase = "seeking"
+                self.phase = "waiting" if self._plants else "seeking"
             case ("alive", "agent", name, instance) if self._peers.vanished(name, instance):
                 self._routes.pop(self.keys.nameplate(name, instance), None)
                 self.heard.forget(name)
@@ -220,7 +229,7 @@ class FreeAgent(Side):
 
     def _fetch_nameplate(self, name: str, instance: str) -> None:
         key = self.keys.nameplate(name, instance)
-        self._routes[key] = (name, self._on_nameplate)
+        self._routes[key] = Route(name, (Nameplate,), partial(self._on_nameplate, instance), early=True)
         self._actions.append(Fetch(key))
 
     def _ask_again(self, *names: str) -> None:
@@ -234,7 +243,7 @@ class FreeAgent(Side):
         for name in self._peers.neighbours:
             key = self.keys.state(name)
             if key not in self._routes:
-                self._routes[key] = (name, self._on_state)
+                self._routes[key] = Route(name, (State,), self._on_state)
                 self._actions.append(Listen(key))
 
     def _hold(self, why: str) -> None:
@@ -251,20 +260,23 @@ class FreeAgent(Side):
     def _used(self, message: AnyMessage, now: float) -> None:
         self.tally.used += 1
 
-    def _misled(self, expected: str, sender: str) -> None:
-        """Note a message that came under another's key; many of them prove that key numbers are confused."""
-        if self._roll_call.crossed() and not self.astray:
-            self._go_astray(f"messages of {sender} come under the key of {expected}")
+    def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
+        if self.admission.lives(message):
+            self._roll_call.crossed(message.sender, expected, now)
 
-    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
+    def _follow(self, epoch: int) -> None:
+        """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
+        if self._followed not in (0, epoch):
+            self._hold("the plant has a new life; starts from what it measures")
+            self._orders.restart()
+            self.heard.forget(PLANT)
+        self._followed = epoch
+
+    def _on_control(self, message: Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Waiting):
-            self._check_life(message)
             self._roll_call.plant_seen(now)
             self._awaited = message.waits_for
-            return
-        if not isinstance(message, Stop):
-            raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
-        if message.refused:
+        elif message.refused:
             self.failed = message.reason
         elif self._leaving:
             self.stopped = self._leaving
@@ -273,63 +285,47 @@ class FreeAgent(Side):
 
     _on_dismissal = _on_control
 
-    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        if not isinstance(message, Measurement) or message.to != self._name:
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
-        self._check_life(message)
-        self.heard.came(message, now)
+    def _came(self, message: State | Measurement, now: float) -> None:
+        """Note what came off the wire, and how many did not."""
+        self.tally.lost += self.admission.take(message)
+        self.heard.came(message.sender, now)
+
+    def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
+        self._came(message, now)
         self._cadence.measured(now)
         self._run_time, self._awaited = message.t, ()
-        if not is_taken(self._links, message, payload, now * self._config.speed):
-            self.heard.keep(message, now)
+        self._use(message, payload, now)
 
-    def _check_life(self, message: AnyMessage) -> None:
-        """Refuse what an earlier plant said; of another one, begin anew."""
-        life = self._plant_incarnation
-        if message.incarnation < life:
-            raise RejectedError("ghost", f"life {message.incarnation} of the plant, now it lives {life}")
-        if message.incarnation > life:
-            if life:
-                self._hold("the plant has a new life; starts from what it measures")
-                self._orders.restart()
-            self._plant_incarnation = message.incarnation
-            self.heard.forget(PLANT)
-
-    def _on_order(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        if not isinstance(message, LinkOrder):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a LinkOrder")
-        self._check_life(message)
+    def _on_order(self, message: LinkOrder, payload: bytes, now: float) -> None:
         answer = self._orders.take(message, self._run_time)
         if answer is not None:
             self._publish(self.keys.obeyed(self._name), encode(answer))
 
-    def _take_arrived(self, now: float) -> None:
-        """Use what the emulated links have let through by now; what was overtaken is of no use."""
-        for message in arrived(self._links, now * self._config.speed, self.rejects):
-            if isinstance(message, Measurement):
-                if message.incarnation == self._plant_incarnation:
-                    self.heard.keep(message, now)
-            elif isinstance(message, State) and self._peers.has_met(message.sender) and not self._agent.hear(message):
-                self.heard.keep(message, now)
-
-    def _on_nameplate(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        if not isinstance(message, Nameplate):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Nameplate")
-        self._peers.meet(message)
+    def _on_nameplate(self, instance: str, message: Nameplate, payload: bytes, now: float) -> None:
+        self._peers.meet(instance, message)
         self._listen()
 
-    def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        if not isinstance(message, State):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
-        reason = self._agent.judge(message)
-        if reason:
-            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
-        self.heard.came(message, now)
+    def _on_state(self, message: State, payload: bytes, now: float) -> None:
+        self._came(message, now)
         if self._links is not None and not self.heard.has(PLANT):
             return  # the plant tells what was ordered before it sends a measurement: till then no link is known
-        if not is_taken(self._links, message, payload, now * self._config.speed):
+        self._use(message, payload, now)
+
+    def _use(self, message: State | Measurement, payload: bytes, now: float) -> None:
+        """Use a message, unless an emulated link takes it, and perhaps lets it through later."""
+        if not is_taken(self._links, message, payload, now * self._config.speed) and self.admission.passes(message):
+            self._keep(message, now)
+
+    def _take_arrived(self, now: float) -> None:
+        """Use what the emulated links have let through by now."""
+        for message in arrived(self._links, now * self._config.speed, self.rejects, self.admission):
+            if isinstance(message, State | Measurement):
+                self._keep(message, now)
+
+    def _keep(self, message: State | Measurement, now: float) -> None:
+        if isinstance(message, State):
             self._agent.hear(message)
-            self.heard.keep(message, now)
+        self.heard.keep(message, now)
 
     # ---------------------------------------------------------------- ticks
 
@@ -338,7 +334,7 @@ class FreeAgent(Side):
         return tuple(name for name in self._peers.neighbours if self.heard.age(name, now) <= limit)
 
     def _tick(self, now: float) -> None:
-        if not self._plant_there:
+        if self.admission.epoch(PLANT) is None:
             return  # what the dead plant said last would still look fresh
         measurement = self.heard.measured(now, self._config.max_age)
         if measurement is None:
@@ -368,6 +364,7 @@ class FreeAgent(Side):
             neighbours=self._peers.neighbours,
             in_sums=self._in_sums,
             rejected=sum(self.rejects.counts.values()),
+            dropped=0 if self._links is None else self._links.dropped,
             impaired=() if self._links is None else self._links.impaired(self._run_time),
         )
         self._publish(self.keys.status(self._name), encode(status))

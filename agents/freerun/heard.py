@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from wire.codec import RejectedError
-from wire.messages import AnyMessage, Measurement, State
+from wire.messages import Measurement, State
 
 
 class Heard:
@@ -20,7 +19,7 @@ class Heard:
 
     >>> heard = Heard(speed=1.0)
     >>> state = State(sender="inv2", incarnation=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0, island="")
-    >>> heard.came(state, now=10.0)
+    >>> heard.came("inv2", now=10.0)
     >>> heard.keep(state, now=10.0)
     >>> heard.age("inv2", now=10.25), heard.age("inv3", now=10.25)
     (0.25, inf)
@@ -32,31 +31,17 @@ class Heard:
 
     def __init__(self, speed: float) -> None:
         self._speed = speed
-        self.lost = 0
-        """Messages that did not come, as the numbers of those that did show."""
-        self._came: dict[str, tuple[int, float]] = {}
-        """Number of the last message of each that came off the wire, and when."""
+        self._came: dict[str, float] = {}
+        """When the last message of each came off the wire."""
         self._kept: dict[str, tuple[State, float]] = {}
         """Last state of each agent that the links let through, and when."""
         self.measurement: Measurement | None = None
         """The own measurement that counts: the last that the link from the plant let through."""
         self._measured_at = 0.0
 
-    def came(self, message: AnyMessage, now: float) -> None:
-        """Note what came off the wire, and how many did not.
-
-        Raises
-        ------
-        RejectedError
-            If a later one of the same sender has come before.
-        """
-        name, seq = message.sender, message.seq
-        if name in self._came:
-            last = self._came[name][0]
-            if seq <= last:
-                raise RejectedError("stale", f"{type(message).__name__}({seq}) of {name} after {last}")
-            self.lost += seq - last - 1
-        self._came[name] = seq, now
+    def came(self, name: str, now: float) -> None:
+        """Note that something came off the wire from somebody."""
+        self._came[name] = now
 
     def has(self, name: str) -> bool:
         """Whether anything has come from somebody."""
@@ -64,13 +49,13 @@ class Heard:
 
     def silence(self, name: str, now: float) -> float:
         """Time (s, wall) since something came from somebody; infinite if nothing has."""
-        return now - self._came[name][1] if name in self._came else float("inf")
+        return now - self._came[name] if name in self._came else float("inf")
 
     def keep(self, message: State | Measurement, now: float) -> None:
-        """Note what may be used: a state, or the own measurement if it is later than the last."""
+        """Note what may be used: a state, or the own measurement."""
         if isinstance(message, State):
             self._kept[message.sender] = message, now
-        elif self.measurement is None or message.seq > self.measurement.seq:
+        else:
             self.measurement, self._measured_at = message, now
 
     @property
@@ -98,7 +83,7 @@ class Heard:
         self._kept.pop(name, None)
 
     def forget_all(self) -> None:
-        """Forget everybody, but not how many messages were lost."""
+        """Forget everybody."""
         self._came.clear()
         self.drop()
 

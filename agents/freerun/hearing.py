@@ -18,9 +18,6 @@ one in which nothing was ever as it should be."""
 LONGEST = 60.0
 """Longest patience (s, wall): a path that stays cut must not keep an agent busy with sessions."""
 
-CROSSED = 10
-"""Messages under another's key after which the same is done, without waiting, whether or not the plant is seen."""
-
 
 class Hearing:
     """Whether the session brings what it should.
@@ -42,7 +39,6 @@ class Hearing:
         """Whether everybody was heard who should be, and oneself, at some time of this session."""
         self._patience = patience
         self._since: dict[str, float] = {}
-        self._crossed = 0
 
     def next(self) -> Hearing:
         """That of the next session: more patient, if this one never was whole.
@@ -59,8 +55,3 @@ class Hearing:
         """Note who is silent now and should not be; the first of whom this has lasted too long, else nothing."""
         self._since = {name: self._since.get(name, now) for name in silent}
         return next((name for name, since in self._since.items() if now - since >= self._patience), "")
-
-    def crossed(self) -> bool:
-        """Note a message that came under another's key; whether that proves key numbers to be confused."""
-        self._crossed += 1
-        return self._crossed == CROSSED

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from agents.agent import Agent
 from agents.freerun.claims import Claims
+from wire.admission import Admission
 from wire.codec import RejectedError
 from wire.messages import Nameplate
 
@@ -17,6 +18,8 @@ class Peers:
     ----------
     agent : Agent
         The own one, who is told of each nameplate and applies the run's rule to them.
+    admission : Admission
+        Told in which epoch each of the others speaks.
 
     Examples
     --------
@@ -25,22 +28,22 @@ class Peers:
     ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="all", graph="full"), deadline=10.0,
     ...     connect=())
     >>> agent = Agent(config)
-    >>> peers = Peers(agent)
+    >>> peers = Peers(agent, Admission())
     >>> peers.appeared("inv2", "a"), list(peers.unknown)
     (True, [('inv2', 'a')])
     >>> from msgspec.structs import replace
-    >>> peers.meet(replace(agent.nameplate, sender="inv2"))
+    >>> peers.meet("a", replace(agent.nameplate, sender="inv2"))
     >>> peers.neighbours, list(peers.unknown)
     (('inv2',), [])
     >>> peers.vanished("inv2", "a"), peers.neighbours
     (True, ())
     """
 
-    def __init__(self, agent: Agent) -> None:
-        self._agent = agent
+    def __init__(self, agent: Agent, admission: Admission) -> None:
+        self._agent, self._admission = agent, admission
         self._claims = Claims()
-        self._met: set[str] = set()
-        """Names whose nameplate is known."""
+        self._met: dict[str, Nameplate] = {}
+        """The nameplate of each, once it is known."""
         self.neighbours: tuple[str, ...] = ()
         """Whom the rule names among those that have been met."""
 
@@ -56,18 +59,24 @@ class Peers:
         self._apply_rule()
         return True
 
-    def meet(self, plate: Nameplate) -> None:
-        """Note who somebody is.
+    def meet(self, instance: str, plate: Nameplate) -> None:
+        """Note who somebody is, as its process has answered; that is learnt once.
 
         Raises
         ------
         RejectedError
-            If a later life of it is known already.
+            If another process counts, or this one has said something else before.
         """
         name = plate.sender
-        if not self._agent.meet(plate):
-            raise RejectedError("ghost", f"life {plate.incarnation} of {name}, which has a later one")
-        self._met.add(name)
+        if self._claims.instance(name) != instance:
+            raise RejectedError("ghost", f"{name} is spoken for by another process")
+        if name in self._met:
+            if self._met[name] != plate:
+                raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+            return
+        self._met[name] = plate
+        self._agent.meet(plate)
+        self._admission.bind(name, plate.incarnation)
         self._apply_rule()
 
     def has_met(self, name: str) -> bool:
@@ -86,7 +95,8 @@ class Peers:
         self._claims, self.neighbours = Claims(), ()
 
     def _forget(self, name: str) -> None:
-        self._met.discard(name)
+        self._met.pop(name, None)
+        self._admission.release(name)
         self._agent.forget(name)
 
     def _apply_rule(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 from agents.freerun.heard import Heard
 from agents.freerun.hearing import Hearing
@@ -31,12 +32,15 @@ class RollCall:
         self._ran = False
         """Whether it has ever been in touch with a plant; before that, silence proves nothing."""
         self._hearing = Hearing()
+        self._crossed: dict[str, tuple[str, float]] = {}
+        """Whose messages came under another's key: under whose, and when the last (s)."""
         self._seen = float("-inf")
         """When the plant was last known to be there, though it measures nothing yet (s)."""
 
     def next_session(self) -> None:
         """Begin anew, with the patience of the session that follows."""
         self._hearing = self._hearing.next()
+        self._crossed.clear()
 
     def plant_seen(self, now: float) -> None:
         """Note that the plant is there (s): it has appeared, or says that it waits for agents."""
@@ -55,15 +59,24 @@ class RollCall:
         silent = self._silent(roster, now)
         self._hearing.whole |= roster is not None and not silent
         lost = self._hearing.lost(silent, now)
+        for name in silent:
+            key, at = self._crossed.get(name, ("", -inf))
+            if self._ran and now - at <= SILENT:
+                return f"messages of {name} come under the key of {key}"
         if lost in ("", PLANT):
             return lost and "nothing comes from the plant"
         if lost == self._name:
             return "the plant is heard, but does not hear this agent"
         return f"the plant hears {lost}, but nothing comes from it here"
 
-    def crossed(self) -> bool:
-        """Note a message that came under another's key; whether that proves key numbers to be confused."""
-        return self._hearing.crossed() and self._ran
+    def crossed(self, name: str, key: str, now: float) -> None:
+        """Note a message that came under another's key (s).
+
+        By itself that proves nothing: anybody may publish it. But if its sender is silent under its own key, although
+        the plant hears it, the key numbers of the session are confused: nobody else can bring that about, and it need
+        not be waited for any longer.
+        """
+        self._crossed[name] = key, now
 
     def _silent(self, roster: Sequence[str] | None, now: float) -> tuple[str, ...]:
         """The plant, a neighbour that the plant hears, or oneself, by the plant."""

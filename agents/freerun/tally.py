@@ -25,6 +25,8 @@ class Tally:
     """States sent; the number of the next."""
     used: int = 0
     """Messages that came in and were used."""
+    lost: int = 0
+    """Messages that did not come off the wire, as the numbers of those that did show."""
     lateness: float = 0.0
     """Longest delay of a tick behind its time since the last status (s of wall time)."""
 
@@ -44,6 +46,7 @@ class Tally:
         neighbours: tuple[str, ...],
         in_sums: tuple[str, ...],
         rejected: int,
+        dropped: int,
         impaired: tuple[str, ...],
     ) -> AgentStatus:
         """How the agent fares now (s on its clock); see `AgentStatus`."""
@@ -69,7 +72,7 @@ class Tally:
             received=self.used,
             sent=self.sent,
             rejected=rejected,
-            lost=heard.lost,
+            lost=min(self.lost + dropped, 2**53 - 1),
             ticks=self.ticks,
             missed=self.missed,
             lateness=lateness,

@@ -22,6 +22,8 @@ the culprit. Receivers only enqueue, without bound, so nobody blocks a sender.
 
 from __future__ import annotations
 
+from functools import partial
+
 from msgspec.structs import replace
 
 from agents.agent import Agent
@@ -32,6 +34,7 @@ from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen
 from wire.clock import time_of
 from wire.codec import RejectedError, encode
+from wire.endpoint import Route
 from wire.links import Links, arrived, is_taken
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
@@ -60,8 +63,9 @@ class AgentSide(Side):
         super().__init__(config, instance, links)
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate))
+        self._routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._patience = Patience(config.name, PATIENCE * config.deadline)
-        self._introductions = Introductions(self._agent, instance)
+        self._introductions = Introductions(self._agent, instance, self.admission)
         self._turn = Turn()
         self._roster: tuple[str, ...] = ()
         """That of the last tick."""
@@ -120,8 +124,8 @@ class AgentSide(Side):
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared."""
         match self.keys.parts(key):
-            case ("alive", "plant"):
-                self.plant_seen = True
+            case ("alive", "plant", epoch):
+                self._plant_appeared(epoch)
                 # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
                 self._patience.rest()
             case ("alive", "agent", name, instance) if name != self._name:
@@ -130,9 +134,11 @@ class AgentSide(Side):
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
         match self.keys.parts(key):
-            case ("alive", "plant") if self._ending:
+            case ("alive", "plant", epoch) if not self._plant_vanished(epoch):
+                pass  # another one, which nobody follows
+            case ("alive", "plant", _) if self._ending:
                 self.stopped = self._ending
-            case ("alive", "plant") if not self.over:
+            case ("alive", "plant", _) if not self.over:
                 tick = "" if self._turn.tick is None else f" at tick {self._turn.tick}"
                 self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
             case ("alive", "agent", name, instance):
@@ -146,28 +152,15 @@ class AgentSide(Side):
     def _used(self, message: AnyMessage, now: float) -> None:
         self._patience.heard(message.sender, message.seq, now)
 
-    def _check_plant(self, message: AnyMessage) -> None:
-        if message.incarnation < self._plant_incarnation:
-            raise RejectedError(
-                "ghost", f"life {message.incarnation} of the plant, now it lives {self._plant_incarnation}"
-            )
-        self._plant_incarnation = message.incarnation
-
-    def _on_control(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        self._check_plant(message)
+    def _on_control(self, message: Prepare | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
             self._end(message.reason, now)
-        elif isinstance(message, Prepare):
+        else:
             steps = self._introductions.prepare(message)
             self._patience.renew(now)
             self._do(steps, now)
-        else:
-            raise RejectedError("unexpected", f"a {type(message).__name__} from the plant")
 
-    def _on_dismissal(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        self._check_plant(message)
-        if not isinstance(message, Stop):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Stop")
+    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
         if message.refused:
             self.failed = message.reason
         else:
@@ -197,7 +190,7 @@ class AgentSide(Side):
                     self._ask(peer)
                 case Hear(name):
                     key = self.keys.state(name)
-                    self._routes[key] = (name, self._on_state)
+                    self._routes[key] = Route(name, (State,), self._on_state)
                     self._actions.append(Listen(key))
                 case Confirm(roster):
                     self._patience.renew(now)
@@ -207,48 +200,38 @@ class AgentSide(Side):
 
     def _ask(self, peer: Peer) -> None:
         key = self.keys.nameplate(*peer)
-        self._routes[key] = (peer.name, lambda message, payload, now: self._on_nameplate(peer, message, now))
+        self._routes[key] = Route(peer.name, (Nameplate,), partial(self._on_nameplate, peer), early=True)
         self._actions.append(Fetch(key))
 
-    def _on_nameplate(self, peer: Peer, message: AnyMessage, now: float) -> None:
-        if not isinstance(message, Nameplate):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a Nameplate")
+    def _on_nameplate(self, peer: Peer, message: Nameplate, payload: bytes, now: float) -> None:
         self._do(self._introductions.answered(peer, message), now)
 
     # ---------------------------------------------------------------- ticks
 
-    def _on_measurement(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        self._check_plant(message)
-        if not isinstance(message, Measurement) or message.to != self._name:
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of the own Measurement")
+    def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if not self._introductions.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         self._turn.grant(message)
-        if not is_taken(self._links, message, payload, message.t):
+        if not is_taken(self._links, message, payload, message.t) and self.admission.passes(message):
             self._sensed = message
         self._patience.renew(now)
         self._compute(now)
 
-    def _on_state(self, message: AnyMessage, payload: bytes, now: float) -> None:
-        if not isinstance(message, State):
-            raise RejectedError("unexpected", f"a {type(message).__name__} instead of a State")
-        reason = self._agent.judge(message)
-        if reason:
-            raise RejectedError(reason, f"State({message.seq}) of life {message.incarnation} of {message.sender}")
+    def _on_state(self, message: State, payload: bytes, now: float) -> None:
         if self._turn.take(message, payload):
             self._hear(message, payload)
             self._compute(now)
 
     def _hear(self, state: State, payload: bytes) -> None:
-        if not is_taken(self._links, state, payload, state.t):
+        if not is_taken(self._links, state, payload, state.t) and self.admission.passes(state):
             self._agent.hear(state)
 
     def _take_arrived(self, t: float) -> None:
-        """Use what the emulated links have let through by t (s); what was overtaken is of no use."""
-        for message in arrived(self._links, t, self.rejects):
+        """Use what the emulated links have let through by t (s)."""
+        for message in arrived(self._links, t, self.rejects, self.admission):
             if isinstance(message, State):
                 self._agent.hear(message)
-            elif isinstance(message, Measurement) and (self._sensed is None or message.seq > self._sensed.seq):
+            elif isinstance(message, Measurement):
                 self._sensed = message
 
     def _compute(self, now: float) -> None:

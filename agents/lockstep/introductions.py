@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from agents.agent import Agent
 from agents.topology import is_pairwise
+from wire.admission import Admission
 from wire.codec import RejectedError
 from wire.messages import Nameplate, Prepare
 
@@ -57,6 +58,8 @@ class Introductions:
         Who is introduced to the others; it keeps their nameplates, and its rule says whom to listen to.
     instance : str
         Its process.
+    admission : Admission
+        Told in which epoch each of the others speaks.
 
     Examples
     --------
@@ -65,7 +68,8 @@ class Introductions:
     ...     return Agent(AgentConfig(run="demo", name=name, kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
     ...         f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="all", graph="full"),
     ...         deadline=10.0, connect=()))
-    >>> introductions, other, plate = Introductions(agent("inv1"), "a"), Peer("inv2", "b"), agent("inv2").nameplate
+    >>> introductions = Introductions(agent("inv1"), "a", Admission())
+    >>> other, plate = Peer("inv2", "b"), agent("inv2").nameplate
     >>> introductions.appeared(other)
     [Ask(peer=Peer(name='inv2', instance='b'))]
     >>> introductions.answered(other, plate)
@@ -79,8 +83,8 @@ class Introductions:
     [Confirm(roster=0)]
     """
 
-    def __init__(self, agent: Agent, instance: str) -> None:
-        self._agent = agent
+    def __init__(self, agent: Agent, instance: str, admission: Admission) -> None:
+        self._agent, self._admission = agent, admission
         self._own = Peer(agent.config.name, instance)
         self._pairwise = is_pairwise(agent.config.control)
         self.roster: int | None = None
@@ -90,6 +94,10 @@ class Introductions:
         self._members: dict[str, str] = {}
         """Names on that roster, and their instances."""
         self._asked: set[Peer] = set()
+        self._plates: dict[Peer, Nameplate] = {}
+        """What each peer said of itself, once and for all."""
+        self._believed: dict[str, Peer] = {}
+        """Of each name the one that is taken to speak for it."""
         self._known: dict[Peer, bool] = {}
         """Peers whose nameplate is known; True once they have proven to hear our subscription."""
         self._proving: set[Peer] = set()
@@ -112,6 +120,10 @@ class Introductions:
         self._asked.discard(peer)
         self._known.pop(peer, None)
         self._proving.discard(peer)
+        self._plates.pop(peer, None)
+        if self._believed.get(peer.name) == peer:
+            del self._believed[peer.name]
+            self._admission.release(peer.name)
 
     def answered(self, peer: Peer, plate: Nameplate) -> list[Step]:
         """Take a nameplate.
@@ -119,19 +131,29 @@ class Introductions:
         Raises
         ------
         RejectedError
-            If a later life of this agent is known already: a ghost.
+            If it contradicts what this peer has said before, or its token is gone.
         """
         steps: list[Step] = []
+        if peer not in self._asked:
+            raise RejectedError("ghost", f"the nameplate of {peer.name}, whose token is gone")
+        if self._plates.setdefault(peer, plate) != plate:
+            raise RejectedError("implausible", f"{peer.name} is not what it was; a nameplate never changes")
         if peer in self._proving:
             self._proving.discard(peer)
             self._known[peer] = True
         elif peer not in self._known:
-            if not self._agent.meet(plate):
-                raise RejectedError("ghost", f"life {plate.incarnation} of {peer.name}, which has a later one")
             self._known[peer] = False
-            if self._pairwise and self._agent.in_neighbours((self._own.name, peer.name)):
-                steps += self._listen_to(peer)
+            if peer.name not in self._members or self._member(peer.name) in (peer, *self._gone):
+                self._believe(peer)
+                if self._pairwise and self._agent.in_neighbours((self._own.name, peer.name)):
+                    steps += self._listen_to(peer)
         return steps + self._get_ready()
+
+    def _believe(self, peer: Peer) -> None:
+        """Take it that this process speaks for its name: until a roster names another one."""
+        plate, self._believed[peer.name] = self._plates[peer], peer
+        self._agent.meet(plate)
+        self._admission.bind(peer.name, plate.incarnation)
 
     def prepare(self, message: Prepare) -> list[Step]:
         """Get ready for a roster.
@@ -139,16 +161,17 @@ class Introductions:
         Raises
         ------
         RejectedError
-            If it is garbled, not newer than the last one, or without this process.
+            If it is not newer than the last one, or without this process.
         """
-        if len(message.instances) != len(message.roster):
-            raise RejectedError("garbled", f"{len(message.roster)} names but {len(message.instances)} instances")
         if self.roster is not None and message.seq <= self.roster:
             raise RejectedError("stale", f"roster {message.seq}, {self.roster} is known")
         members = dict(zip(message.roster, message.instances, strict=True))
         if members.get(self._own.name) != self._own.instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")
         self.roster, self._members, self.ready = message.seq, members, False
+        for peer in map(self._member, members):
+            if peer in self._plates:
+                self._believe(peer)
         return self._get_ready()
 
     def missing(self) -> list[str]:

@@ -28,10 +28,10 @@ from plant.freerun.silence import Silence
 from plant.interface import LivePlant
 from plant.reporting import measurement_of
 from plant.side import CLOSING, LINK_TICKS, Side
-from wire.actions import Fetch, Say
+from wire.actions import Say
 from wire.clock import time_of
-from wire.codec import RejectedError, decode, encode
-from wire.keys import check_name
+from wire.codec import encode
+from wire.endpoint import ANYBODY, Route
 from wire.links import Links, is_taken
 from wire.messages import (
     PLANT,
@@ -62,6 +62,9 @@ AGAIN = 1.0
 WAITING = 0.5
 """Time (s, wall) between two words of a plant that waits for agents to those that are there."""
 
+FASTER = 2.0
+"""So many times as often as itself the plant believes agents to send at most."""
+
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
@@ -80,9 +83,9 @@ class FreePlant(Side):
     """
 
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
-        super().__init__(config, plant, links)
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
+        super().__init__(config, plant, links, rate=FASTER / config.T_c)
         self.phase: Phase = "gathering"
         self.plant = plant
         self.pacer = Pacer(config.T_c / config.speed, 0.0)
@@ -96,19 +99,18 @@ class FreePlant(Side):
         self._word = Timer(WAITING, 0.0)
         self._service = Service(self)
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
-        self._obeyed_keys = {self.keys.obeyed(name): name for name in plant.inverters}
-        self._state_keys = {self.keys.state(name): name for name in plant.inverters}
-        self._status_keys = {self.keys.status(name): name for name in plant.inverters}
-        self._report_keys = {self.keys.report(name) for name in plant.inverters}
-        self._leave_keys = {self.keys.leave(name): name for name in plant.inverters}
+        keys = self.keys
+        for name in plant.inverters:
+            self._routes[keys.state(name)] = Route(name, (State,), self._on_state)
+            self._routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
+            self._routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
+            self._routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            self._routes[keys.obeyed(name)] = Route(name, (LinkAnswer,), self._on_obeyed)
+        self._routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        self.subscriptions = tuple(self._routes)
+        """Keys to subscribe to before the token is declared."""
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
-        each = (*self._state_keys, *self._status_keys, *self._leave_keys, *self._report_keys, *self._obeyed_keys)
-        return *each, self.keys.command
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -188,7 +190,7 @@ class FreePlant(Side):
 
     def _ask(self, name: str, now: float) -> None:
         self._asked[name] = now
-        self._actions.append(Fetch(self.keys.nameplate(name, self.instances[name])))
+        self._fetch_nameplate(name, self.instances[name])
 
     def _ask_again(self, now: float) -> None:
         """Ask for the nameplates that have not come."""
@@ -214,50 +216,35 @@ class FreePlant(Side):
             self.phase = "over"
 
     def _drop(self, name: str) -> None:
-        del self.instances[name]
+        self._gone(name, self.instances.pop(name))
         self.ordering.forget(name)
         self._heard.forget(name)
         self._silence.forget(name)
-        for known in (self.plates, self._asked, self._set_by):
+        for known in (self.plates, self._asked):
             known.pop(name, None)
 
     # ---------------------------------------------------------------- messages
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped."""
-        try:
-            message = decode(payload)
-            name = message.sender
-            if key in self._state_keys and isinstance(message, State):
-                self._check_sender(self._state_keys[key], message)
-                self._heard.came(message, now)
-                self._silence.heard(name, self.tick)
-                if not is_taken(self._links, message, payload, now * self.config.speed):
-                    self._heard.keep(message)
-            elif key in self._status_keys and isinstance(message, AgentStatus):
-                if name in self.plates:  # one comes earlier now and then
-                    self._check_sender(self._status_keys[key], message)
-                    self._silence.reported(message, self.tick)
-            elif key in self._report_keys and isinstance(message, LinkReport):
-                self._publish(self.keys.telemetry, payload)
-            elif key in self._obeyed_keys and isinstance(message, LinkAnswer):
-                self._check_sender(self._obeyed_keys[key], message)
-                self.ordering.answered(name, message)
-            elif key in self._leave_keys and isinstance(message, Leave):
-                self._check_sender(self._leave_keys[key], message)
-                self._on_leave(name, now)
-            elif key == self.keys.command and isinstance(message, Command):
-                self._on_command(message, now)
-            elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self.instances.get(name, "")):
-                self._on_nameplate(message, now)
-            else:
-                raise RejectedError("foreign", f"a {type(message).__name__} of {name}")
-        except RejectedError as rejected:
-            self.rejects.add(rejected.kind, key, rejected.text)
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        self.admission.take(state)
+        self._heard.came(state.sender, now)
+        self._silence.heard(state.sender, self.tick)
+        if not is_taken(self._links, state, payload, now * self.config.speed) and self.admission.passes(state):
+            self._heard.keep(state)
+
+    def _on_status(self, status: AgentStatus, payload: bytes, now: float) -> None:
+        if self.admission.lives(status):  # one comes before its nameplate now and then
+            self._silence.reported(status, self.tick)
+
+    def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
+        self._publish(self.keys.telemetry, payload)
+
+    def _on_obeyed(self, answer: LinkAnswer, payload: bytes, now: float) -> None:
+        self.ordering.answered(answer.sender, answer)
 
     def _on_nameplate(self, plate: Nameplate, now: float) -> None:
         name = plate.sender
-        if self.phase not in ("gathering", "running") or name in self.plates:
+        if self.phase not in ("gathering", "running"):
             return
         self.plates[name] = plate
         self._silence.joined(name, self.tick)
@@ -266,18 +253,15 @@ class FreePlant(Side):
         self.ordering.send(self.plates, now)
         self._gather(now)
 
-    def _on_leave(self, name: str, now: float) -> None:
+    def _on_leave(self, leave: Leave, payload: bytes, now: float) -> None:
+        name = leave.sender
         self.stop(self.keys.dismissal(name, self.instances[name]), f"{name} has left")
         self._drop(name)
         if self.phase in ("gathering", "running"):
             self._connect(name, False, now)
             self._note(name, f"{name} left; its inverter is off the network")
 
-    def _on_command(self, command: Command, now: float) -> None:
-        try:
-            check_name("reply_to", command.reply_to)
-        except ValueError as error:
-            raise RejectedError("garbled", str(error)) from None
+    def _on_command(self, command: Command, payload: bytes, now: float) -> None:
         answer = self._service.serve(command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
         if answer.ok and command.verb == "link":
@@ -413,8 +397,7 @@ class FreePlant(Side):
             return False
         self._step_due = False
         for state in self._news(now * self.config.speed):
-            if state.sender in self.plates:
-                self._heard.keep(state)
+            self._heard.keep(state)
         for state in self._heard.take():
             self.plant.hold(state.sender, state.P_set, state.V_set)
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wire.codec import RejectedError
 from wire.messages import State
 
 HEARD = 1.0
@@ -19,7 +18,7 @@ class Heard:
     >>> heard = Heard()
     >>> for seq in (7, 8):
     ...     state = State(sender="inv2", incarnation=1, seq=seq, t=0.5, P_set=0.0, V_set=0.0, Q=0.0, island="")
-    ...     heard.came(state, now=10.0)
+    ...     heard.came("inv2", now=10.0)
     ...     heard.keep(state)
     >>> [state.seq for state in heard.take()], heard.take()
     ([8], ())
@@ -28,23 +27,14 @@ class Heard:
     """
 
     def __init__(self) -> None:
-        self._came: dict[str, tuple[int, float]] = {}
-        """Number of the last state of each agent that came off the wire, and when."""
+        self._came: dict[str, float] = {}
+        """When the last state of each agent came off the wire."""
         self._kept: dict[str, State] = {}
         """Those that the links let through and that are not held yet."""
 
-    def came(self, state: State, now: float) -> None:
-        """Note what came off the wire.
-
-        Raises
-        ------
-        RejectedError
-            If a later one of the same agent has come before.
-        """
-        last = self._came.get(state.sender, (-1, 0.0))[0]
-        if state.seq <= last:
-            raise RejectedError("stale", f"State({state.seq}) of {state.sender} after {last}")
-        self._came[state.sender] = state.seq, now
+    def came(self, name: str, now: float) -> None:
+        """Note that a state came off the wire."""
+        self._came[name] = now
 
     def keep(self, state: State) -> None:
         """Note a state that is to be held at the next step, instead of any before."""
@@ -57,7 +47,7 @@ class Heard:
 
     def roster(self, names: Iterable[str], now: float) -> tuple[str, ...]:
         """Whom of these the plant has heard of late."""
-        return tuple(name for name in names if name in self._came and now - self._came[name][1] < HEARD)
+        return tuple(name for name in names if name in self._came and now - self._came[name] < HEARD)
 
     def forget(self, name: str) -> None:
         """Forget an agent that is gone."""

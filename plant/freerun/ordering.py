@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from plant.freerun.orders import Orders
-from wire.codec import RejectedError, encode
-from wire.keys import Keys, check_name
+from wire.codec import encode
+from wire.keys import Keys
 from wire.links import Links
 from wire.messages import PLANT, LinkAnswer, LinkOrder
 
@@ -104,8 +104,4 @@ class Ordering:
         return self._links
 
     def _pass_on(self, answer: LinkAnswer) -> None:
-        try:
-            check_name("reply_to", answer.reply_to)
-        except ValueError as error:
-            raise RejectedError("garbled", str(error)) from None
         self._publish(self._keys.answer(answer.reply_to), encode(answer))

@@ -23,10 +23,10 @@ from plant.lockstep.roster import Ask, Break, Connect, Dismiss, Note, Refuse, Ro
 from plant.lockstep.waiting import Phase, Waiting
 from plant.reporting import measurement_of
 from plant.side import CLOSING, LINK_TICKS, Side
-from wire.actions import Fetch
-from wire.codec import RejectedError, decode, encode
+from wire.codec import encode
+from wire.endpoint import Route
 from wire.links import Links, is_taken
-from wire.messages import LinkReport, Nameplate, PlantEvent, Ready, State
+from wire.messages import AnyMessage, LinkReport, Nameplate, PlantEvent, Ready, State
 from wire.patience import Awaited
 
 TELEMETRY_TICKS = 10
@@ -57,9 +57,12 @@ class PlantSide(Side):
         self._waiting = Waiting(config.agents, config.recorders, self._roster, config.deadline)
         self._states: dict[str, State] = {}
         everyone = self._roster.everyone
-        self._state_keys = {self.keys.state(name): name for name in everyone}
-        self._ready_keys = {self.keys.ready(name): name for name in everyone}
-        self._report_keys = {self.keys.report(name) for name in everyone}
+        for name in everyone:
+            self._routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
+            self._routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
+            self._routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+        self.subscriptions = tuple(self._routes)
+        """Keys to subscribe to before the token is declared."""
         self._measurement_keys = {name: self.keys.measurement(name) for name in everyone}
 
     # ---------------------------------------------------------------- what the driver needs
@@ -68,11 +71,6 @@ class PlantSide(Side):
     def phase(self) -> Phase:
         """What the plant waits for."""
         return self._waiting.phase
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
-        return *self._state_keys, *self._ready_keys, *self._report_keys
 
     @property
     def publications(self) -> tuple[str, ...]:
@@ -141,7 +139,10 @@ class PlantSide(Side):
         match self.keys.parts(key):
             case ("alive", "recorder", name):
                 self._recorders.discard(name)
-            case ("alive", "agent", name, instance) if self.instances.get(name) == instance:
+            case ("alive", "agent", name, instance) if self.instances.get(name) != instance:
+                self._gone(name, instance)
+            case ("alive", "agent", name, instance):
+                self._gone(name, instance)
                 steps = self._roster.died(name, t=self.t, begun=self._waiting.begun)
                 if self.phase not in ("closing", "over"):
                     self.reproducible = False
@@ -154,29 +155,23 @@ class PlantSide(Side):
 
     # ---------------------------------------------------------------- messages
 
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped."""
-        try:
-            message = decode(payload)
-            name = message.sender
-            if key in self._state_keys and isinstance(message, State):
-                self._check_sender(self._state_keys[key], message)
-                self._waiting.state(message, self.tick)
-                if not is_taken(self._links, message, payload, message.t):
-                    self._states[name] = message
-            elif key in self._ready_keys and isinstance(message, Ready):
-                self._check_sender(self._ready_keys[key], message)
-                self._waiting.ready(message)
-            elif key in self._report_keys and isinstance(message, LinkReport):
-                self._forward(message, payload)
-            elif isinstance(message, Nameplate) and key == self.keys.nameplate(name, self.instances.get(name, "")):
-                self.plates[name] = message
-                self._gather(now)
-            else:
-                raise RejectedError("foreign", f"a {type(message).__name__} of {name}")
-            self._waiting.heard(name, message.seq, now)
-        except RejectedError as rejected:
-            self.rejects.add(rejected.kind, key, rejected.text)
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self._waiting.heard(message.sender, message.seq, now)
+
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        self._waiting.state(state, self.tick)
+        if not is_taken(self._links, state, payload, state.t) and self.admission.passes(state):
+            self._states[state.sender] = state
+
+    def _on_ready(self, ready: Ready, payload: bytes, now: float) -> None:
+        self._waiting.ready(ready)
+
+    def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
+        self._forward(report, payload)
+
+    def _on_nameplate(self, plate: Nameplate, now: float) -> None:
+        self.plates[plate.sender] = plate
+        self._gather(now)
 
     # ---------------------------------------------------------------- work
 
@@ -219,11 +214,10 @@ class PlantSide(Side):
         for step in steps:
             match step:
                 case Ask(name, instance):
-                    self._actions.append(Fetch(self.keys.nameplate(name, instance)))
+                    self._fetch_nameplate(name, instance)
                 case Refuse(name, instance, reason):
                     self.stop(self.keys.dismissal(name, instance), reason, refused=True)
                 case Dismiss(name, instance, reason):
-                    self._set_by.pop(name, None)
                     if instance:
                         self.stop(self.keys.dismissal(name, instance), reason)
                 case Note(name, text):

@@ -44,7 +44,8 @@ class EmulatedLinks:
         self._senders = tuple(src for src in (*setup.microgrids, PLANT) if src != name)
         self.clear: set[str] = set()
         """Senders whose messages `offer` is known not to take."""
-        self.restart()
+        self._dropped_before = 0
+        self._begin()
         self._spells: dict[str, list[_Spell]] = {}
         self._paused: Counter[str] = Counter()
         """Messages of each sender that it never sent, as it was paused: only the lock-step needed them."""
@@ -68,6 +69,11 @@ class EmulatedLinks:
                 at += spell.until - t
         self._receiver.offer(src, seq, t, at, payload)
         return True
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were lost here, since the process began: a restart does not bring them back."""
+        return self._dropped_before + self._receiver.dropped
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out what has arrived by now (s of run time)."""
@@ -140,6 +146,10 @@ class EmulatedLinks:
 
     def restart(self) -> None:
         """Begin anew with what the scenario says: the run's time starts from 0 again."""
+        self._dropped_before = self.dropped
+        self._begin()
+
+    def _begin(self) -> None:
         setup = self._setup
         self.clear.clear()
         self._changes: list[Change] = []

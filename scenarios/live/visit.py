@@ -8,7 +8,7 @@ from types import TracebackType
 
 from scenarios.live.place import Place, UsageError, accepting
 from wire.driver.session import Session
-from wire.keys import ANY_ALIVE_PLANT, Keys, run_of_plant
+from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
 
 VISITOR = "visitor"
 
@@ -46,8 +46,8 @@ class Visit:
         self._open()
 
     def _open(self) -> None:
-        self.plant = False
-        """Whether the plant's token is there."""
+        self.epochs: set[int] = set()
+        """Epochs of the plants of this run whose tokens are there."""
         self.agents: dict[str, set[str]] = {}
         """Tokens of agents: inverter -> its instances."""
         self._runs.clear()
@@ -69,6 +69,11 @@ class Visit:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._session.close()
+
+    @property
+    def plant(self) -> bool:
+        """Whether the plant's token is there."""
+        return bool(self.epochs)
 
     @property
     def id(self) -> str:
@@ -101,8 +106,8 @@ class Visit:
         if run:
             (self._runs.add if there else self._runs.discard)(run)
         match self.keys.parts(key):
-            case ("alive", "plant"):
-                self.plant = there
+            case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None:
+                (self.epochs.add if there else self.epochs.discard)(epoch)
             case ("alive", "agent", name, instance) if there:
                 self.agents.setdefault(name, set()).add(instance)
             case ("alive", "agent", name, instance):

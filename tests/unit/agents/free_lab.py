@@ -45,9 +45,9 @@ class Lab:
                 assert isinstance(action, Say)
                 self.said.append(action.text)
 
-    def token(self, name: str, instance: str = "a", *, gone: bool = False) -> None:
-        """A token comes or goes; of an agent, its nameplate is answered."""
-        key = KEYS.alive_plant if name == "plant" else KEYS.alive_agent(name, instance)
+    def token(self, name: str, instance: str = "a", *, gone: bool = False, epoch: int = 1) -> None:
+        """A token comes or goes; that of the plant has an epoch."""
+        key = KEYS.alive_plant(epoch) if name == "plant" else KEYS.alive_agent(name, instance)
         (self.side.vanished if gone else self.side.appeared)(key, self.now)
         self.do()
 

@@ -171,7 +171,7 @@ def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
     assert lab.decided() == []
     lab.go(0.5)
     assert lab.status().phase == "seeking"
-    lab.token("plant")
+    lab.token("plant", epoch=2)
     lab.measure(0, incarnation=2, P_set=33e3)
     lab.measure(501)
     lab.go(T_C)
@@ -197,6 +197,7 @@ def test_woken_late_it_drops_what_it_knew() -> None:
 def test_it_leaves_properly() -> None:
     """Leave goes out, of itself or at the plant's word; it closes when the plant answers; refused, it just closes."""
     asked, stopped, refused = running(), running(), Lab()
+    refused.token("plant")
     asked.side.leave("asked to leave: SIGTERM")
     asked.do()
     stop = Stop(sender="plant", incarnation=1, seq=0, t=0.0, reason="inv1 was stopped by command")
@@ -237,7 +238,7 @@ def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
         lab.state("inv2", seq)
     lab.measure(3)
 
-    assert lab.side.heard.lost == 2 + 2
+    assert lab.side.tally.lost == 2 + 2
 
 
 def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
@@ -251,3 +252,63 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
 
     assert lab.fetched.count(KEYS.nameplate("inv2", "a")) == 3
     assert lab.listened == [KEYS.state("inv2")]
+
+
+def test_a_plant_whose_clock_lags_is_followed_once_the_old_token_is_gone() -> None:
+    """Its epoch is lower than its predecessor's, whose last words count for nothing from then on."""
+    lab = Lab()
+    lab.token("plant", epoch=900)
+    lab.measure(500, incarnation=900)
+    lab.go(0.0)
+    lab.token("plant", epoch=40)
+    lab.measure(0, incarnation=40, P_set=33e3)
+    lab.measure(501, incarnation=900)
+    lab.go(T_C)
+    before = [state.P_set for state in lab.decided()]
+    lab.token("plant", epoch=900, gone=True)
+    lab.measure(502, incarnation=900)
+    lab.measure(1, incarnation=40, P_set=33e3)
+    lab.go(T_C)
+
+    assert before == [50e3, 50e3]
+    assert [state.P_set for state in lab.decided()] == [33e3]
+    assert lab.side.rejects.counts == {"ghost": 2}
+
+
+def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
+    """A ghost's Stop, or one in an epoch that no token has, is dropped under either key."""
+    lab = running()
+    for key in (KEYS.control, KEYS.dismissal("inv1", "me")):
+        for epoch in (0, 2):
+            lab.hear(key, Stop(sender="plant", incarnation=epoch, seq=0, t=0.0, reason="enough", refused=True))
+        lab.hear(key, Stop(sender="inv2", incarnation=1, seq=0, t=0.0, reason="enough", refused=True))
+    lab.go(T_C)
+
+    assert not lab.side.over
+    assert lab.side.rejects.counts == {
+        "ghost": 4,
+        "foreign": 2,
+    }
+    assert len(lab.decided()) == 1
+
+
+def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
+    """The last line of defence: an error of ours is counted and logged once, with its traceback; the agent goes on."""
+    lab = running("inv2")
+
+    def broken(*_: object) -> None:
+        raise KeyError("\x1b[31m")
+
+    lab.side._routes[KEYS.state("inv2")] = lab.side._routes[KEYS.state("inv2")]._replace(handle=broken)
+    for k in range(1, 4):
+        lab.state("inv2", k)
+    lab.measure(1)
+    lab.go(T_C)
+    (line,) = lab.side.rejects.take_lines()
+
+    assert lab.side.rejects.counts == {"failed": 3}
+    assert "KeyError" in line
+    assert "Traceback (most recent call last)" in line
+    assert "in broken" in line
+    assert "\x1b" not in line
+    assert len(lab.decided()) == 1

@@ -215,7 +215,7 @@ def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pul
     side = FreeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
     keys = side.keys
     side.start(0.0)
-    side.appeared(keys.alive_plant, 0.0)
+    side.appeared(keys.alive_plant(1), 0.0)
     side.appeared(keys.alive_agent("inv2", "a"), 0.0)
     side.received(keys.nameplate("inv2", "a"), encode(Agent(agent_config("inv2")).nameplate), 0.0)
     side.received(keys.state("inv2"), encode(state("inv2", 0)), 0.0)

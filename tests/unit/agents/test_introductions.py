@@ -13,6 +13,7 @@ from agents.agent import Agent
 from agents.config import Control, GraphRule
 from agents.lockstep.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
 from tests.toy.toy_configs import agent_config
+from wire.admission import Admission
 from wire.codec import RejectedError
 from wire.messages import Nameplate, Prepare
 
@@ -22,7 +23,7 @@ NAMES = ("inv1", "inv2", "inv3", "inv4")
 
 def introductions(graph: GraphRule = "full") -> Introductions:
     """Those of inv1, whose process is "a"."""
-    return Introductions(Agent(agent_config("inv1", Control(secondary="all", graph=graph))), "a")
+    return Introductions(Agent(agent_config("inv1", Control(secondary="all", graph=graph))), "a", Admission())
 
 
 def plate(name: str, life: int = 1) -> Nameplate:
@@ -135,13 +136,48 @@ def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
     assert made.answered(B, plate("inv2")) == [Confirm(1)]
 
 
-def test_an_earlier_life_is_a_ghost() -> None:
-    """A nameplate older than the one that is known is refused."""
-    made, ghost = met(B), Peer("inv2", "old")
-    made.appeared(ghost)
+def test_what_a_process_says_of_itself_is_learnt_once() -> None:
+    """Somebody who answers in its place with another nameplate is not believed, and proves nothing."""
+    made = introductions()
+    made.appeared(B)
+    made.answered(B, plate("inv2"))
 
-    with pytest.raises(RejectedError, match="life 0 of inv2") as refused:
-        made.answered(ghost, plate("inv2", life=0))
+    with pytest.raises(RejectedError, match="a nameplate never changes") as refused:
+        made.answered(B, replace(plate("inv2"), P_rated=1.0))
+    assert refused.value.kind == "implausible"
+    assert made.prepare(prepare(0, B)) == []
+    assert made.answered(B, plate("inv2")) == [Confirm(0)]
+
+
+def test_a_namesake_changes_nothing() -> None:
+    """Of two processes of one name the one on the roster speaks, whatever the other says of itself, before or after."""
+    agent, admission = Agent(agent_config("inv1")), Admission()
+    made, early, late = Introductions(agent, "a", admission), Peer("inv2", "early"), Peer("inv2", "late")
+    for peer, life in ((early, 8), (B, 5)):
+        made.appeared(peer)
+        made.answered(peer, plate("inv2", life))
+    made.appeared(Peer("inv3", "c"))
+    made.answered(C, plate("inv3"))
+    for peer in (B, C):
+        made.answered(peer, plate(peer.name, 5 if peer == B else 1))
+    made.prepare(prepare(0, B, C))
+    made.appeared(late)
+    made.answered(late, replace(plate("inv2", 9), P_rated=1.0))
+    assert (made.ready, admission.epoch("inv2")) == (True, 5)
+
+    made.vanished(late)
+    made.vanished(early)
+    assert admission.epoch("inv2") == 5
+
+
+def test_a_nameplate_that_comes_after_its_token_is_gone_is_a_ghosts() -> None:
+    """Nobody is there any more for whom it could speak."""
+    made = introductions()
+    made.appeared(B)
+    made.vanished(B)
+
+    with pytest.raises(RejectedError) as refused:
+        made.answered(B, plate("inv2"))
     assert refused.value.kind == "ghost"
 
 

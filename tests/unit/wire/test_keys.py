@@ -28,12 +28,12 @@ def test_every_name_that_is_accepted_makes_a_key(name: str) -> None:
 def test_wildcards_cover_their_keys() -> None:
     """Whoever watches `any_alive` sees every token, and nothing else."""
     keys = Keys("demo")
-    tokens = (keys.alive_plant, keys.alive_agent("inv1", "a1"), keys.alive_recorder("fleet"))
+    tokens = (keys.alive_plant(1), keys.alive_agent("inv1", "a1"), keys.alive_recorder("fleet"))
     pattern = zenoh.KeyExpr(keys.any_alive)
 
     assert all(pattern.intersects(zenoh.KeyExpr(token)) for token in tokens)
     assert not pattern.intersects(zenoh.KeyExpr(keys.state("inv1")))
-    assert not pattern.intersects(zenoh.KeyExpr(Keys("other").alive_plant))
+    assert not pattern.intersects(zenoh.KeyExpr(Keys("other").alive_plant(1)))
 
 
 def test_parts_are_those_of_the_own_run_only() -> None:

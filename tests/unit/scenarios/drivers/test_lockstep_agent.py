@@ -13,7 +13,7 @@ def two_agents() -> tuple[AgentSide, list[bytes]]:
     agent, keys = AgentSide(agent_config("inv1"), "a"), AgentSide(agent_config("inv1"), "a").keys
     other = AgentSide(agent_config("inv2"), "b")
     agent.start(0.0)
-    agent.appeared(keys.alive_plant, 0.0)
+    agent.appeared(keys.alive_plant(1), 0.0)
     agent.appeared(other.token, 0.0)
     agent.received(*other.nameplate, 0.0)
     agent.received(*other.nameplate, 0.0)

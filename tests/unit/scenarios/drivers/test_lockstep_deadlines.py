@@ -68,8 +68,8 @@ def test_a_plant_that_still_compiles_is_waited_for() -> None:
     """Once its token is seen there is no deadline until it calls; its death ends the wait."""
     agent = AgentSide(agent_config("inv1"), "a")
     agent.start(0.0)
-    agent.appeared(agent.keys.alive_plant, 1.0)
+    agent.appeared(agent.keys.alive_plant(1), 1.0)
 
     assert agent.until is None
-    agent.vanished(agent.keys.alive_plant, 2.0)
+    agent.vanished(agent.keys.alive_plant(1), 2.0)
     assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"

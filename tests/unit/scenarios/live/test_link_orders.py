@@ -220,6 +220,8 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
     lab.measure(0)
     lab.go(0.0)
     first = lab.status().impaired
+    lab.token("plant", gone=True)
+    lab.token("plant", epoch=2)
     lab.measure(0, incarnation=2)
     order(lab, 2, 0.0, life=1)
     lab.go(0.5)

@@ -23,7 +23,7 @@ class Clock:
         end = self.now + seconds
         due = [t for t in self._comes if t <= end]
         self.now = min(due) if due else end
-        return [("appeared", Keys(self._comes.pop(self.now)).alive_plant, b"", self.now)] if due else []
+        return [("appeared", Keys(self._comes.pop(self.now)).alive_plant(1), b"", self.now)] if due else []
 
 
 @pytest.fixture
