@@ -70,7 +70,8 @@ class Reporter:
         self._incarnation, self._plant = incarnation, plant
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
-        self._seq = 0
+        self.seq = 0
+        """Number of the next Telemetry, or of the one that is being sent."""
         self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
         """The latest events, for who comes late."""
 
@@ -96,6 +97,7 @@ class Reporter:
         pacing: Pacing | None = None,
         awaited: tuple[str, ...] = (),
         impaired: tuple[str, ...] = (),
+        others: int = 0,
     ) -> Iterator[Telemetry]:
         """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
         inverters = self._plant.inverters
@@ -108,7 +110,7 @@ class Reporter:
             yield Telemetry(
                 sender=PLANT,
                 incarnation=self._incarnation,
-                seq=self._seq,
+                seq=self.seq,
                 t=t,
                 inverters=inverters,
                 rows=tuple(part),
@@ -119,7 +121,9 @@ class Reporter:
                 pacing=pacing,
                 awaited=() if rows else awaited,
                 impaired=impaired,
+                others=others,
             )
-            self._seq += 1
+            others = 0
+            self.seq += 1
             if not rows:
                 return

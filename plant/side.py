@@ -171,6 +171,7 @@ class Side(Endpoint):
         awaited: tuple[str, ...] = (),
         pacing: Pacing | None = None,
         impaired: tuple[str, ...] = (),
+        others: int = 0,
     ) -> None:
         """Send rows and events, and who is to be started."""
         messages = self._reporter.report(
@@ -181,6 +182,7 @@ class Side(Endpoint):
             pacing=pacing,
             awaited=awaited,
             impaired=impaired,
+            others=others,
         )
         for message in messages:
             self._publish(self.keys.telemetry, encode(message))

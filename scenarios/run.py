@@ -21,6 +21,8 @@ from plant.freerun.pacing import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.emulation.setup import Setup
+from scenarios.live.numbers.departures import Compared, compare
+from scenarios.live.show.events import line_of
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
@@ -134,20 +136,53 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     events = came[list(came)[-1]]  # in wall-clock time each case has its own
     found = find(scenario, request.feeder, plates, histories, came)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
-    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256))
+    compared = _compared(request, recorded)
+    unlike = {
+        case: {"disturbed": one.disturbed, "departures": _lines(one)}
+        for case, one in compared.items()
+        if one.departures
+    }
+    disturbed = any(one.disturbed for one in compared.values())
+    notes += [
+        f"case {case}: {', '.join(one.disturbed)}: not what the scenario means by it, which does not tell of: "
+        f"{'; '.join(_lines(one)[:3])} (all in metrics.json)"
+        for case, one in compared.items()
+        if one.disturbed
+    ]
+    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike))
     _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     report = Report(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         found=found,
-        verdicts=judge(found, CLAIMS[scenario.paper]) if scenario.paper else (),
-        experiment=scenario.paper,
+        verdicts=judge(found, CLAIMS[scenario.paper]) if scenario.paper and not disturbed else (),
+        experiment="" if disturbed else scenario.paper,
         notes=[*notes, *_notes(recorded, request.clock)],
         folder=shown(folder) + "/",
     )
     write_whole(folder / "report.txt", plain(report))
     set_status(folder, "complete")
     return report
+
+
+def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Compared]:
+    """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
+    if request.clock == "simulated":
+        return {}
+    scenario = request.scenario
+    return {
+        case: compare(
+            msgspec.structs.replace(scenario, cases={case: scenario.cases[case]}),
+            request.feeder,
+            record.events,
+            record.ended,
+        )
+        for case, record in recorded.items()
+    }
+
+
+def _lines(compared: Compared) -> list[str]:
+    return [line_of(event).strip() for event in compared.departures]
 
 
 def _checked_links(links: str, record: LinkRecord, folder: Path) -> list[str]:
@@ -174,7 +209,7 @@ def _run_case(
 
         def note(telemetry: Telemetry) -> None:
             recorder(telemetry)
-            progress(case, recorder.rows[-1][0] if recorder.rows else 0.0, time.end_s)
+            progress(case, recorder.ended, time.end_s)
 
         progress(case, 0.0, time.end_s)
         try:

@@ -256,11 +256,11 @@ class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A person wants something of the plant (command line -> plant, wall-clock time)."""
 
-    verb: Literal["open", "close", "stop", "down", "status", "link", "links"]
+    verb: Literal["open", "close", "stop", "down", "status", "link", "links", "telemetry"]
     """Open or close a switch; have an agent leave; end the run; tell how it stands; order emulated links to do
-    something; ask all of them how they stand."""
+    something; ask all of them how they stand; publish telemetry again that a recorder has not got."""
     argument: Text = ""
-    """Name of the switch or of the agent; the order; empty for the others."""
+    """Name of the switch or of the agent; the order; number of the first Telemetry wanted; empty for the others."""
     reply_to: Name
     """Unique id of who asks: last part of the key of the `Answer`."""
 
@@ -271,7 +271,8 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
     ok: bool
     """Whether it was done."""
     text: Reply
-    """One sentence for a person; the answers to "status", "link", "links" are one JSON object each."""
+    """One sentence for a person; the answers to "status", "link", "links" are one JSON object each, that to "telemetry"
+    is the number of the first Telemetry that comes again."""
 
 
 class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -373,6 +374,9 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
     impaired: Names = ()
     """Agents between whom and the plant an emulated fault holds now; only in wall-clock time."""
+    others: Count = 0
+    """Messages of other types on this key since the Telemetry before; only in wall-clock time. So a recorder knows
+    whether it has got them all."""
 
     def __post_init__(self) -> None:
         _once("inverters", self.inverters)

@@ -21,6 +21,7 @@ from typing import Literal
 
 from plant.config import PlantConfig
 from plant.freerun.heard import Heard
+from plant.freerun.kept import KeptTelemetry
 from plant.freerun.ordering import Ordering
 from plant.freerun.pacing import Pacer
 from plant.freerun.service import Service
@@ -46,6 +47,7 @@ from wire.messages import (
     State,
     Waiting,
 )
+from wire.rate_limit import RateLimit
 from wire.timer import Timer
 
 Phase = Literal["gathering", "running", "closing", "over"]
@@ -97,7 +99,12 @@ class FreePlant(Side):
         self._step_due = False
         self._deadline = 0.0
         self._word = Timer(WAITING, 0.0)
+        self._warnings = RateLimit(burst=5)
         self._service = Service(self)
+        self.kept = KeptTelemetry()
+        """What recorders can have again."""
+        self._lost_recorders: set[str] = set()
+        """Recorders whose token went while the run went on, and has not come back."""
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         keys = self.keys
         for name in plant.inverters:
@@ -160,6 +167,8 @@ class FreePlant(Side):
 
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
+        for line in self._warnings.left_out():
+            self._tell_warning(line)
         self._say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
@@ -175,6 +184,9 @@ class FreePlant(Side):
             case ("alive", "recorder", name):
                 self._tokens.add(key)
                 self._recorders.add(name)
+                if name in self._lost_recorders:
+                    self._lost_recorders.discard(name)
+                    self._say(f"recorder {name} is back")
                 self._gather(now)
             case ("alive", "agent", name, instance):
                 self._tokens.add(key)
@@ -208,6 +220,9 @@ class FreePlant(Side):
         match self.keys.parts(key):
             case ("alive", "recorder", name):
                 self._recorders.discard(name)
+                if self.phase == "running" and name in self.config.recorders:
+                    self._lost_recorders.add(name)
+                    self._say(f"recorder {name} is out of reach; what it misses is kept for a while")
             case ("alive", "agent", name, instance) if self.instances.get(name) == instance:
                 self._drop(name)
                 if self.phase in ("gathering", "running"):
@@ -268,6 +283,8 @@ class FreePlant(Side):
             self.ordering.send(self.plates, now)
         elif answer.ok and command.verb == "links":
             self.ordering.ask(self.plates, self.t, command.reply_to)
+        if command.verb == "telemetry" and self.phase != "running":
+            self._publish_again(self.kept.take_all())
         if command.verb == "down":
             self.close("the run was ended by command", now)
 
@@ -369,16 +386,21 @@ class FreePlant(Side):
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
         if slipped:
-            self._warn(f"hopelessly late: the schedule was put off by {slipped:.3f} s of wall time")
+            self._warn(f"hopelessly late: the schedule was put off by {slipped:.3f} s of wall time", now)
         if not self.pacer.take_failure(of=self._ticks):
             return
         speed = self.config.speed
         text = f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores"
-        self._warn(text)
+        self._warn(text, now)
         if self.config.strict:
             self.abort(f"plant: {text}", now)
 
-    def _warn(self, text: str) -> None:
+    def _warn(self, text: str, now: float) -> None:
+        line = self._warnings.admit(text, now)
+        if line is not None:
+            self._tell_warning(line)
+
+    def _tell_warning(self, text: str) -> None:
         self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
         self._say(text)
 
@@ -396,6 +418,7 @@ class FreePlant(Side):
         if not self._step_due:
             return False
         self._step_due = False
+        self._publish_again(self.kept.take())
         for state in self._news(now * self.config.speed):
             self._heard.keep(state)
         for state in self._heard.take():
@@ -422,11 +445,31 @@ class FreePlant(Side):
         self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:.2f} s"))
         self._say(f"{text}, at t = {self.t:.2f} s")
 
+    def _publish(self, key: str, payload: bytes) -> None:
+        """Publish bytes; those for recorders are kept, and wait if others before them are published again."""
+        if key != self.keys.telemetry or self.kept.add(self._reporter.seq, payload):
+            super()._publish(key, payload)
+        elif self.phase != "running":
+            self._publish_again(self.kept.take_all())
+
+    def _all_have_gone(self) -> bool:
+        """Whether all tokens have; a recorder that is out of reach may yet come for what it has not got."""
+        return super()._all_have_gone() and not self._lost_recorders
+
+    def _publish_again(self, payloads: list[bytes]) -> None:
+        for payload in payloads:
+            super()._publish(self.keys.telemetry, payload)
+
     def _say(self, text: str) -> None:
         self._actions.append(Say(f"plant: {text}"))
 
     def _report(self, *, final: bool, awaited: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
         self._telemetry(
-            final=final, reproducible=False, awaited=awaited, pacing=self.pacer.report(), impaired=self.impaired
+            final=final,
+            reproducible=False,
+            awaited=awaited,
+            pacing=self.pacer.report(),
+            impaired=self.impaired,
+            others=self.kept.others(self._reporter.seq),
         )

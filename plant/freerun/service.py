@@ -29,7 +29,7 @@ class Service:
         """Do what is asked, but for "down", which is the plant's own; the answer says what became of it."""
         side = self._side
         try:
-            if side.phase not in ("gathering", "running"):
+            if side.phase not in ("gathering", "running") and command.verb != "telemetry":
                 raise ValueError("the run is ending")
             text = self._do(command, now)
             ok = True
@@ -50,6 +50,10 @@ class Service:
             return msgspec.json.encode(self._ordered(command, now)).decode()
         if verb == "status":
             return msgspec.json.encode(self.status()).decode()
+        if verb == "telemetry":
+            if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
+                raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
+            return str(side.kept.again_from(int(argument)))
         if verb == "down":
             return f"run {side.config.run} ends at t = {side.t:.2f} s"
         if verb == "stop":

@@ -82,7 +82,8 @@ class Silence:
         if status.sender not in self._joined:
             return
         if status.phase != "running":
-            self._holding.add(status.sender)
+            if tick >= self._joined[status.sender] + self._settling:  # before, it waits for its first measurement
+                self._holding.add(status.sender)
             return
         unheard, before = {}, self._unheard.get(status.sender, {})
         for name, age in zip(status.neighbours, status.ages, strict=False):

@@ -18,10 +18,8 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
-from wire.codec import RejectedError, Rejects, decode
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
+from scenarios.drivers.telemetry_client import TelemetryClient, Word
+from wire.messages import PLANT, LinkOrder, LinkReport, PlantEvent, Telemetry
 
 RECORDER = "fleet"
 """Name of the fleet's recorder in its run."""
@@ -34,6 +32,9 @@ LEAVING = 2.5
 
 AFTERMATH = 0.3
 """The same when the run broke: who died of it is noticed in this time, the others are ended."""
+
+STOOD_STILL = 1.0
+"""Time (s) by which a wait may be longer than asked for before this process counts as having stood still itself."""
 
 _EXIT, _WORD = "exit/", "word/"
 
@@ -97,28 +98,25 @@ def run_processes(
     if sorted(order) != sorted([PLANT, *first]):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
-    keys = Keys(plant_config.run)
-    session = Session(RECORDER, connect=(endpoint,), gossip=False, clock=plant_config.clock)
+    client = TelemetryClient(RECORDER, plant_config.run, endpoint, plant_config.clock)
     try:
 
         def start(name: str, life: int) -> Child:
-            return _start(name, life, plant_config, agents, endpoint, log_dir, plant_command, session)
+            return _start(name, life, plant_config, agents, endpoint, log_dir, plant_command, client)
 
-        watch = _Watch(session, plant_config, on_telemetry, on_links, on_status or (lambda word: None), start)
-        session.subscribe(keys.telemetry)
-        session.hold_token(keys.alive_recorder(RECORDER))
+        watch = _Watch(client, plant_config, on_telemetry, on_links, on_status or (lambda word: None), start)
         with Children() as children:
             for name in order:
                 children.add(start(name, 1))
             if on_start is not None:
                 on_start(children)
             watch.until_the_end(children)
-            session.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
+            client.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
             children.wait(AFTERMATH if watch.broke else LEAVING)
             watch.note_failures(children)
         return watch.outcome()
     finally:
-        session.close()
+        client.close()
 
 
 def _start(
@@ -129,13 +127,13 @@ def _start(
     endpoint: str,
     log_dir: Path,
     plant_command: Sequence[str],
-    session: Session,
+    client: TelemetryClient,
 ) -> Child:
     def on_exit(child: Child) -> None:
-        session.inbox.put(("word", f"{_EXIT}{child.pid}", b""))
+        client.say(f"{_EXIT}{child.pid}")
 
     def on_word(word: str) -> None:
-        session.inbox.put(("word", _WORD + word, b""))
+        client.say(_WORD + word)
 
     log = log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
     if name == PLANT:
@@ -150,7 +148,7 @@ class _Watch:
 
     def __init__(
         self,
-        session: Session,
+        client: TelemetryClient,
         config: PlantConfig,
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
@@ -161,7 +159,7 @@ class _Watch:
         self._start = start
         self._awaited: set[str] = set()
         """Agents that the scenario lets join, and whose process is yet to be started."""
-        self._inbox, self._T_c = session.inbox, config.T_c
+        self._client, self._T_c = client, config.T_c
         self._wall = config.clock == "wall"
         self._misfortunes = Misfortunes(config.links if self._wall else "", config.speed)
         self._patience = 1.5 * config.deadline + 1.0
@@ -169,7 +167,6 @@ class _Watch:
         if self._wall:
             self._patience += config.wait_for_agents + 2.0 * config.T_c / config.speed
         self._on_telemetry, self._on_links, self._on_status = on_telemetry, on_links, on_status
-        self._rejects = Rejects(RECORDER)
         self._began = self._started = self._ended_at = monotonic()
         self._standing = False
         self._last: Telemetry | None = None
@@ -183,20 +180,25 @@ class _Watch:
         since = self._began
         while not self._ended:
             patience = self._patience if self._standing else BUILD_DEADLINE
-            events = self._inbox.take(1, min(patience, self._misfortunes.wait))
-            if events:
-                since = monotonic()
-            elif monotonic() - since >= patience:
+            limit = min(patience, self._misfortunes.wait)
+            asked = monotonic()
+            items = self._client.take(limit)
+            now = monotonic()
+            if items or now - asked > limit + STOOD_STILL:  # who has stood still itself has not waited
+                since = now
+            elif now - since >= patience:
                 report = children[PLANT].report(self._when)
                 self._break(f"nothing was heard of the plant for {patience:g} s, so the run was ended: {report}")
-            for kind, key, payload, _ in events:
-                if kind == "message":
-                    self._take(key, payload)
-                elif key.startswith(_EXIT):
-                    self._note_exit(next(child for child in children if str(child.pid) == key.removeprefix(_EXIT)))
+            for item in items:
+                if not isinstance(item, Word):
+                    self._take(item)
+                elif item.text.startswith(_EXIT):
+                    self._note_exit(
+                        next(child for child in children if str(child.pid) == item.text.removeprefix(_EXIT))
+                    )
                 else:
-                    self._standing = self._standing or key == _WORD + READY
-                    self._on_status(key.removeprefix(_WORD))
+                    self._standing = self._standing or item.text == _WORD + READY
+                    self._on_status(item.text.removeprefix(_WORD))
             self._start_the_awaited(children)
             self._misfortunes.strike(children)
         self._misfortunes.end(children)
@@ -210,16 +212,10 @@ class _Watch:
             self._awaited.discard(name)
             children.add(self._start(name, len(lives) + 1))
 
-    def _take(self, key: str, payload: bytes) -> None:
-        try:
-            telemetry = decode(payload)
-            if isinstance(telemetry, LinkReport):
-                self._on_links(telemetry)
-                return
-            if not isinstance(telemetry, Telemetry):
-                raise RejectedError("unexpected", f"a {type(telemetry).__name__} instead of Telemetry")
-        except RejectedError as rejected:
-            self._rejects.add(rejected.kind, key, rejected.text)
+    def _take(self, telemetry: Telemetry | LinkReport | LinkOrder) -> None:
+        if isinstance(telemetry, LinkReport):
+            self._on_links(telemetry)
+        if not isinstance(telemetry, Telemetry):
             return
         if self._last is None:
             self._started = monotonic()
@@ -270,7 +266,7 @@ class _Watch:
             broke=self.broke,
             reproducible=self._last is not None and self._last.reproducible and not self.broke,
             events=tuple(self._events),
-            notes=(*self._notes.values(), *self._rejects.take_lines()),
+            notes=(*self._notes.values(), *self._client.rejects.take_lines()),
             ticks=self._ticks,
             start_s=started - self._began,
             run_s=self._ended_at - started,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Collection
 from pathlib import Path
 from time import monotonic
 
+from scenarios.drivers.telemetry_client import TelemetryClient, Word
 from scenarios.live.book import Book
 from scenarios.live.show.events import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
-from wire.codec import RejectedError, decode
-from wire.driver.session import Session
-from wire.keys import Keys
 from wire.messages import LinkOrder, LinkReport, Pacing, Telemetry
+from wire.rate_limit import RateLimit
 
 _STOP = "stop"
+
+_ON = "; the run goes on without it"
 
 
 class Chronicle:
@@ -55,9 +57,8 @@ class Chronicle:
         book: Book | None = None,
         on_whole: Callable[[Recorded, Pacing | None], None] | None = None,
     ) -> None:
-        keys = Keys(run)
         self._tell, self._untold, self._book, self._on_whole = tell, untold, book, on_whole
-        self._recorder = None if folder is None else Recorder(folder)
+        self._recorder = None if folder is None else Recorder(folder, gaps=True)
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far."""
         self.t = 0.0
@@ -68,10 +69,8 @@ class Chronicle:
         """Whether the last telemetry is in."""
         self.lost = ""
         """What could not be recorded, and why; "" if there was nothing of the kind."""
-        self._trouble = ""
-        self._session = Session(self.NAME, connect=(endpoint,), gossip=False, clock="wall")
-        self._session.subscribe(keys.telemetry)
-        self._session.hold_token(keys.alive_recorder(self.NAME))
+        self._limit = RateLimit()
+        self._client = TelemetryClient(self.NAME, run, endpoint, "wall")
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
     def __enter__(self) -> Chronicle:
@@ -83,9 +82,11 @@ class Chronicle:
 
     def close(self) -> None:
         """Take in what has come, close the session, and give the files their names."""
-        self._session.inbox.put(("word", _STOP, b""))
+        self._client.say(_STOP)
         self._thread.join()
-        self._session.close()
+        self._client.close()
+        for line in (*self._limit.left_out(), *self._client.rejects.take_lines()):
+            self._tell(line)
         if self._book is not None:
             try:
                 for line in self._book.close(self.t):
@@ -94,74 +95,78 @@ class Chronicle:
                 self._lose(f"the record of links cannot be written: {error.strerror}")
         if self._recorder is not None:
             self._finish(self._recorder)
-        if self._trouble:
-            self._tell(self._trouble)
 
-    def _lose(self, why: str) -> None:
-        """Note why something is not recorded; the first reason is that of all others."""
-        self.lost = self._trouble = self.lost or why
+    def _lose(self, why: str, then: str = "") -> None:
+        """Tell why something is not recorded, and what follows; the first reason is that of the run, too."""
+        self._tell(why + then)
+        self.lost = self.lost or why
 
     def _finish(self, recorder: Recorder) -> None:
         """Give the files their names, and hand on the record; if it is not whole, they keep the partial ones."""
-        rows = recorder.rows
         try:
-            if len(rows) < 2:
-                self._trouble = self._trouble or "nothing was recorded, so there are no numbers"
+            if recorder.count < 2:
+                self._tell("nothing was recorded, so there are no numbers")
             elif not self.ended:
-                self._trouble = (
-                    self._trouble or f"the record ends at {rows[-1][0]:.2f} s: then no word came of the plant"
-                )
+                self._lose(f"the record ends at {recorder.ended:.2f} s: then no word came of the plant")
             else:
-                recorded = recorder.finish(rows[-1][0], round(rows[1][0] - rows[0][0], 9))
+                recorded = recorder.finish(recorder.ended, recorder.record_step)
                 if self._on_whole is not None:
                     self._on_whole(recorded, self.pacing)
             recorder.close()
         except RecordError as error:
-            self._trouble = str(error)
-            recorder.close()
+            self._lose(str(error))
+            self._abandon(recorder)
         except OSError as error:
             self._lose(f"the record cannot be written: {error.strerror}")
 
+    def _abandon(self, recorder: Recorder) -> None:
+        """Leave a record as it is; what cannot be written even then has been told."""
+        self._recorder = None
+        with contextlib.suppress(OSError):
+            recorder.close()
+
     def _follow(self) -> None:
         while not self.ended:
-            for kind, _, payload, _ in self._session.take(1, None):
-                if kind == "word":
+            for item in self._client.take(None):
+                if isinstance(item, Word):
                     return
-                if kind == "message" and not self._take(payload):
-                    return
-        self._session.close()  # with it goes the token: the plant knows that the last telemetry is here
+                self._take(item)
+        self._client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
-    def _take(self, payload: bytes) -> bool:
-        """Tell and write down one message; False if it cannot be gone on."""
-        try:
-            message = decode(payload)
-        except RejectedError:
-            return True
-        if isinstance(message, LinkReport | LinkOrder) and self._book is not None:
-            return self._noted(message)
+    def _take(self, message: Telemetry | LinkReport | LinkOrder) -> None:
+        """Tell and write down one message. What cannot be written any more ends its record, not the run."""
         if not isinstance(message, Telemetry):
-            return True
+            self._note_links(message)
+            return
         if message.rows:
             self.told_at = monotonic()
         self.t, self.pacing = message.t, message.pacing or self.pacing
         self.ended = message.final
         for event in message.events:
             if event.kind not in self._untold:
-                self._tell(line_of(event))
+                line = self._limit.admit(line_of(event), monotonic())
+                if line is not None:
+                    self._tell(line)
+        recorder = self._recorder
+        if recorder is None:
+            return
+        known = len(recorder.missing)
         try:
-            if self._recorder is not None:
-                self._recorder(message)
+            recorder(message)
         except (RecordError, OSError) as error:
-            self._lose(f"the record ends at {self.t:.2f} s: {getattr(error, 'strerror', None) or error}")
-            return False
-        return True
+            why = getattr(error, "strerror", None) or error
+            self._lose(f"the record ends at {recorder.ended:.2f} s: {why}", _ON)
+            self._abandon(recorder)
+        for before, after in recorder.missing[known:]:
+            self._tell(
+                f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant"
+            )
 
-    def _noted(self, message: LinkReport | LinkOrder) -> bool:
-        """Write down what was told of links; False if that is impossible."""
-        assert self._book is not None
+    def _note_links(self, message: LinkReport | LinkOrder) -> None:
+        if self._book is None:
+            return
         try:
             self._book(message)
         except OSError as error:
-            self._lose(f"the record of links ends at {self.t:.2f} s: {error.strerror}")
-            return False
-        return True
+            self._lose(f"the record of links ends at {self.t:.2f} s: {error.strerror}", _ON)
+            self._book = None

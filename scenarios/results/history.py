@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import InverterRow
-from scenarios.results.record import QUANTITIES, header
+from scenarios.results.record import QUANTITIES, RowFile, Rows, header
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -84,11 +84,19 @@ class History:
         )
 
     @classmethod
-    def of(cls, inverters: tuple[str, ...], rows: Sequence[Sequence[float]]) -> History:
-        """Arrays from recorded rows, see `wire.messages.Telemetry.rows`."""
-        table = np.array(rows, dtype=np.float64).reshape(len(rows), 1 + len(QUANTITIES) * len(inverters))
+    def of(cls, inverters: tuple[str, ...], rows: Rows) -> History:
+        """Arrays from recorded rows, see `wire.messages.Telemetry.rows`; one after the other, as they may be many."""
+        width = 1 + len(QUANTITIES) * len(inverters)
+        table = np.fromiter(_numbers(rows, width), np.float64, len(rows) * width).reshape(len(rows), width)
         f, P, Q, V, P_set, V_set = np.moveaxis(table[:, 1:].reshape(len(rows), len(inverters), len(QUANTITIES)), 2, 0)
         return cls(inverters=inverters, t=table[:, 0], f=f, P=P, Q=Q, V=V, P_set=P_set, V_set=V_set)
+
+
+def _numbers(rows: Rows, width: int) -> Iterator[float]:
+    for row in rows:
+        if len(row) != width:
+            raise ValueError(f"a row of a history has {len(row)} numbers instead of {width}: {row[:1]}")
+        yield from row
 
 
 def read_history(path: Path) -> History:
@@ -99,8 +107,10 @@ def read_history(path: Path) -> History:
     ValueError
         If its header is not that of a history.
     """
-    lines = path.read_text(encoding="ascii").splitlines()
-    names = tuple(column.removesuffix("_f_Hz") for column in lines[0].split(",") if column.endswith("_f_Hz"))
-    if tuple(lines[0].split(",")) != header(names):
-        raise ValueError(f"{path.name}: the first line is not the header of a history: {lines[0][:80]}")
-    return History.of(names, [tuple(map(float, line.split(","))) for line in lines[1:]])
+    with path.open(encoding="ascii") as file:
+        first = file.readline().rstrip("\n")
+        count = sum(1 for _ in file)
+    names = tuple(column.removesuffix("_f_Hz") for column in first.split(",") if column.endswith("_f_Hz"))
+    if tuple(first.split(",")) != header(names):
+        raise ValueError(f"{path.name}: the first line is not the header of a history: {first[:80]}")
+    return History.of(names, RowFile(path, count))

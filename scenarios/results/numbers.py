@@ -46,6 +46,7 @@ def metrics_json(
     pacing: Mapping[str, Pacing],
     links_sha256: Mapping[str, str] = MappingProxyType({}),
     by_hand: Mapping[str, Any] = MappingProxyType({}),
+    unlike: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> str:
     """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) or not steady is null.
 
@@ -61,6 +62,8 @@ def metrics_json(
         By case: hash of its history, how it kept real time, hash of all fates of messages; where there are any.
     by_hand : Mapping[str, Any], optional
         What a reader must know of a run that people had their hands in.
+    unlike : Mapping[str, Mapping[str, Any]], optional
+        By case: where a run in wall-clock time was not what its scenario says.
     """
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in found.results.items():
@@ -73,6 +76,7 @@ def metrics_json(
         cases[case]["history_sha256"] = sha256[case]
         if case in links_sha256:
             cases[case]["links_sha256"] = links_sha256[case]
+        cases[case] |= unlike.get(case, {})
         if case in pacing:
             cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
     scenario = ran.scenario

@@ -10,7 +10,7 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from types import TracebackType
 
 DEADLINE = 40.0
@@ -153,3 +153,11 @@ class Desk:
         """Run a command to its end; its exit status and what it printed."""
         terminal = self.open(*words, prefix=prefix)
         return terminal.end(), terminal.text
+
+
+def wait_for(file: Path, text: str) -> None:
+    """Wait until a file, as a log, has a text in it."""
+    end = monotonic() + DEADLINE
+    while not (file.exists() and text in file.read_text()):
+        assert monotonic() < end, f"{file} has no {text!r}"
+        sleep(0.02)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -94,15 +95,23 @@ def test_a_run_without_room_for_its_record_breaks_in_one_line(driver: str, tmp_p
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
 def test_a_run_by_hand_goes_on_without_its_record_and_says_so(desk: Desk) -> None:
-    """The plant serves others to its end; then exit status 3, why there are no numbers, and no process left."""
-    words = ("up", "calm.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
-    up = desk.open_bare(*words, "--speed", "20", "--for", "30", prefix=LIMITED)
+    """At once: from when on and why. What happens is told to the end; then exit status 3, and no process left."""
+    (desk.folder / "late.toml").write_text(
+        '[time]\nend_s = 60.0\n[[event]]\nlabel = "late"\nt_s = 30.0\nopen = ["13-152"]\n'
+        '[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
+    )
+    words = ("up", "late.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
+    up = desk.open_bare(*words, "--speed", "10", "--for", "40", prefix=LIMITED)
     for _ in range(9):
         up.expect("inv[1-9] joined")
     children = [int(pid) for pid in Path(f"/proc/{up.pid}/task/{up.pid}/children").read_text().split()]
+    stopped = float(up.expect(r"the record ends at (.*) s: File too large; the run goes on without it")[1])
+    up.expect(r"30\.00 s  switch 13-152 opened")
 
     assert up.end() == 3
     assert "Traceback" not in up.text
+    assert re.search(r"ended at t = 40\.00 s; \d+ of 2000 steps", up.text)
+    assert 0.0 < stopped < 40.0
     why = up.expect(r"gridpeers: (the record ends at .* s: File too large)")[1]
     assert (desk.folder / "here" / "status.txt").read_text() == f"broken: {why}\n"
     assert len(children) == 10

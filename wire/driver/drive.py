@@ -9,6 +9,7 @@ from typing import Protocol
 
 from wire.actions import Action, Fetch, Listen, Publish, Say
 from wire.codec import Rejects
+from wire.driver.log_limit import limit_log
 from wire.driver.session import Session
 
 
@@ -129,10 +130,13 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
         If a word to stop comes into the inbox.
     """
     take = session.take
+    limit = limit_log(log)
     now = monotonic()
     while True:
         perform(core.take_actions(), session, log)
         if core.over:
+            for line in limit.left_out():
+                log.info("%s", line)
             break
         if core.work(now):
             now = monotonic()

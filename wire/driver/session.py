@@ -93,6 +93,8 @@ class Session:
         Whether others are told to connect to this one. In wall-clock time whoever is not becomes the client of a router
         that answers: between two peers that know each other both directly and through a router, Zenoh changes the way
         of their declarations while these are on it, and loses some.
+    inbox : Inbox, optional
+        Takes what comes in; that of a former session, which this one takes the place of.
     meets_all : bool, optional
         Whether to connect to every peer, instead of the one with the greater id of each pair: for who does not listen.
 
@@ -111,6 +113,7 @@ class Session:
         gossip: bool = True,
         clock: Clock = "simulated",
         rendezvous: bool = False,
+        inbox: Inbox | None = None,
         meets_all: bool = False,
     ) -> None:
         os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
@@ -123,7 +126,7 @@ class Session:
             ) from None
         if "RUST_LOG" in os.environ:  # RUST_LOG=zenoh=debug shows what Zenoh does, in the process's log
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        self.inbox = Inbox()
+        self.inbox = inbox or Inbox()
         self._zenoh = zenoh
         self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}

@@ -62,7 +62,7 @@ class Account:
         """
         assert self._recorded is not None
         ran, case, recorded = self._ran, self._case, self._recorded
-        compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.rows[-1][0])
+        compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
         history, plates = self._columns(recorded)
         found = find_in({case: compared.opened.measured}, compared.happened, ran.feeder, plates, {case: history})
         report = Report(
@@ -84,6 +84,9 @@ class Account:
             "disturbed": compared.disturbed,
             "departures": _lines(compared),
         }
+        if recorded.missing:
+            by_hand["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
+            by_hand["unrecorded"] = [window.label for window in compared.unrecorded]
         write_whole(
             ran.folder / "metrics.json", metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand)
         )
@@ -129,11 +132,16 @@ class Account:
         if compared.by_hand:
             lines = [f"{label}: {what}" for label, what in compared.by_hand.items()]
             yield f"events that the scenario does not have: {_few(lines)}"
+        if self._recorded.missing:
+            spans = ", ".join(f"{before:.2f} and {after:.2f} s" for before, after in self._recorded.missing)
+            yield f"rows are missing between {spans}, as the record was out of the plant's reach"
+        if compared.unrecorded:
+            yield f"without rows where they are measured, so without numbers: {_named(compared.unrecorded)}"
         if windows.too_short:
             yield f"too short to be measured: {_named(windows.too_short)}"
         yield from late_moves(compared.measured, self._recorded.events)
         if compared.disturbed:
-            lines = _lines(compared, compared.measured.time.end_s)
+            lines = _lines(compared, compared.measured.time.end_s) or ["rows that are missing"]
             names = ", ".join(compared.disturbed)
             yield f"{names}: not what the scenario means by it, which does not tell of: {_few(lines)}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.opened import NEAR, Opened, events_by_hand, opened
 from scenarios.results.metrics import Window, windows
 from scenarios.results.moves import as_they_came
+from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
 from scenarios.spec.netem import netem_of
 from wire.messages import PlantEvent
@@ -39,7 +40,9 @@ class Compared:
     """What the scenario does not tell, in the order of time."""
     disturbed: tuple[str, ...]
     """Events of the scenario before the end of whose window, as it is meant, there was a departure: the plant
-    remembers whatever happened to it."""
+    remembers whatever happened to it. Also those in whose window rows are missing."""
+    unrecorded: tuple[Window, ...]
+    """Windows without numbers, as rows are missing at their end, where they are measured."""
 
 
 class _Due(NamedTuple):
@@ -57,7 +60,13 @@ class _Due(NamedTuple):
     """From when (s) on it has not."""
 
 
-def compare(scenario: Scenario, feeder: Feeder, events: Sequence[PlantEvent], ended: float) -> Compared:
+def compare(
+    scenario: Scenario,
+    feeder: Feeder,
+    events: Sequence[PlantEvent],
+    ended: float,
+    missing: Sequence[tuple[float, float]] = (),
+) -> Compared:
     """See how far a run by hand is what its scenario says.
 
     Parameters
@@ -70,6 +79,8 @@ def compare(scenario: Scenario, feeder: Feeder, events: Sequence[PlantEvent], en
         What the plant told.
     ended : float
         Time (s) of the last row.
+    missing : Sequence[tuple[float, float]], optional
+        Times (s) of the rows before and after each interval of which there are none.
     """
     every = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     switched = tuple(_switched(scenario, feeder, events))
@@ -79,6 +90,10 @@ def compare(scenario: Scenario, feeder: Feeder, events: Sequence[PlantEvent], en
     departures = tuple(sorted(found, key=lambda event: event.t))
     first = min((event.t for event in departures), default=ended)
     all_opened = opened(scenario, as_they_came(scenario, events), by_hand, ended)
+    unrecorded = tuple(
+        w for w in all_opened.measured if any(a < w.end and b > w.end - STEADY - NEAR for a, b in missing)
+    )
+    all_opened = replace(all_opened, measured=tuple(w for w in all_opened.measured if w not in unrecorded))
     known = {window.label for window in all_opened.measured}
     whole = max((number for number, window in enumerate(every, start=1) if window.label in known), default=0)
     # at the same moment, what people did comes first: the scenario's event is what was left behind
@@ -94,7 +109,13 @@ def compare(scenario: Scenario, feeder: Feeder, events: Sequence[PlantEvent], en
         opened=all_opened,
         by_hand={event.label: "; ".join(one.text for one in switched if one.t == event.t_s) for event in by_hand},
         departures=departures,
-        disturbed=tuple(window.label for window in every if window.label in known and first < window.end - NEAR),
+        disturbed=tuple(
+            window.label
+            for window in every
+            if window.label in known
+            and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
+        ),
+        unrecorded=unrecorded,
     )
 
 

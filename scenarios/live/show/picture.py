@@ -63,6 +63,8 @@ class Picture:
         """Once the run has ended, why it broke; empty if it did not."""
         self._life = 0
         """Which life of the plant it is of."""
+        self._latest = 0.0
+        """Run time of its latest telemetry (s)."""
         self._pacing: Pacing | None = None
         self._impaired: tuple[str, ...] = ()
         self._standing: Standing | None = None
@@ -99,7 +101,10 @@ class Picture:
             if self._life:
                 self._events.clear()
                 self._standing = None
-            self._life = message.incarnation
+            self._life, self._latest = message.incarnation, 0.0
+        if message.t < self._latest:
+            return  # published again for a recorder that has missed it
+        self._latest = message.t
         self._inverters, self._t, self._told = message.inverters, message.t, now
         self._end = message.outcome if message.final else None
         self._pacing = message.pacing or self._pacing

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import pytest
+from msgspec.structs import replace
 
 from plant.freerun.silence import Silence
 from tests.unit.plant.test_freerun_plant import KEYS, T_C, Lab, running
@@ -113,6 +114,24 @@ def test_neighbours_of_a_frozen_agent_are_not_told_of_too() -> None:
     all_tick(lab, 60, ("inv1", "inv3"))
 
     assert [text.split(":")[0] for _, text in told(lab)] == ["inv2 is silent"]
+
+
+@pytest.mark.parametrize(("at", "why"), [(2, "nothing comes from it"), (90, "it says that it has no measurement")])
+def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: int, why: str) -> None:
+    """Its status says so; but that of a start, when all wait for the first measurement, proves nothing."""
+    silence = Silence(max_age=0.25, T_c=0.02, period=0.02)
+    silence.joined("inv1", tick=0)
+    for tick in range(90):
+        silence.heard("inv1", tick)
+        if tick == at - 1:
+            silence.reported(replace(status("inv1", {}), phase="waiting"), tick)
+        assert list(silence.take(tick)) == []
+    if at == 90:
+        silence.reported(replace(status("inv1", {}), phase="waiting"), 100)
+
+    assert [text for tick in range(90, 120) for _, text in silence.take(tick)] == [
+        f"inv1 is silent: no state for 0.25 s, {why}"
+    ]
 
 
 def test_nothing_is_remembered_of_who_has_gone() -> None:

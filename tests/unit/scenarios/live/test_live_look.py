@@ -187,3 +187,13 @@ def test_impaired_links_are_shown_only_while_there_are_any() -> None:
     assert "impaired" not in plain(calm)
     assert plain(bad).splitlines()[0].endswith("impaired to the plant: inv2-4")
     assert [line.split()[-2:] for line in plain(bad).splitlines()[2:3]] == [["inv1,7", "plant"]]
+
+
+def test_telemetry_that_is_published_again_for_a_recorder_does_not_turn_the_clock_back() -> None:
+    """Who watches has seen it; a new life of the plant begins at 0 again."""
+    seen = picture()
+    seen.telemetry(told(2.2), now=10.2)
+    seen.telemetry(told(1.4), now=10.3)
+    assert seen.look((), now=10.3).t == 2.2
+    seen.telemetry(told(0.2, life=2), now=10.4)
+    assert seen.look((), now=10.4).t == 0.2

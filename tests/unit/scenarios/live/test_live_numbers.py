@@ -233,7 +233,7 @@ def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, A
     given = Account(ran, Book(scenario, feeder, links, None, None, None))
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
-    given(msgspec.structs.replace(recorded, rows=rows, events=events), None)
+    given(msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events), None)
     report = given.write()
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
@@ -260,6 +260,27 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     assert "ours | paper's Table I\n" in report
     assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8.00 s\n" in report
     assert len(list((tmp_path / "plots").glob("*.png"))) == 7
+
+
+@pytest.mark.parametrize(
+    ("missing", "measured", "disturbed"),
+    [((1.5, 3.0), ["event1", "event2"], ["event1"]), ((3.9, 4.5), ["event2"], ["event2"])],
+)
+def test_rows_that_are_missing_flag_their_windows(
+    tmp_path: Path, recorded: Recorded, missing: tuple[float, float], measured: list[str], disturbed: list[str]
+) -> None:
+    """A window with a hole is measured but not clean; one without rows at its end has no numbers. Both are told."""
+    before, after = missing
+    rows = [row for row in recorded.rows if not before < row[0] < after]
+    holed = msgspec.structs.replace(recorded, rows=rows, missing=(missing,))
+    metrics, report = account(tmp_path, holed, 8.0)
+
+    assert [name for name in metrics["cases"]["IV"] if name.startswith("event")] == measured
+    assert metrics["by_hand"]["disturbed"] == disturbed
+    assert metrics["by_hand"]["missing"] == [{"after_s": before, "before_s": after}]
+    assert f"NOTE  case IV: rows are missing between {before:.2f} and {after:.2f} s, as the record" in report
+    assert ("event1 (1 to 4 s)" in report) == (measured == ["event2"])
+    assert "paper's Table I" not in report
 
 
 @pytest.mark.parametrize(

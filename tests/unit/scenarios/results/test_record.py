@@ -1,11 +1,13 @@
 """What a case leaves on disk: bytes that are equal when the run is, whole files or none."""
 
 import hashlib
+import tracemalloc
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from scenarios.results.history import History, read_history
 from scenarios.results.record import PARTIAL, Recorder, RecordError
@@ -94,6 +96,39 @@ def test_a_history_with_a_gap_is_no_history(tmp_path: Path) -> None:
         recorder(telemetry((row(0.0), row(1.0))))
         with pytest.raises(RecordError, match=r"2 rows, but 1 s in steps of 0.5 s are 3; the last one is of 1 s"):
             recorder.finish(1.0, 0.5)
+
+
+def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
+    """In wall-clock time a recorder may be out of reach for too long: then it says which rows are missing."""
+    with Recorder(tmp_path / "I", gaps=True) as recorder:
+        recorder(telemetry(tuple(row(0.5 * k) for k in (0, 1, 2, 7, 8))))
+        recorded = recorder.finish(4.0, recorder.record_step)
+
+    assert recorded.missing == ((1.0, 3.5),)
+    assert (recorded.ended, [read[0] for read in recorded.rows]) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
+
+
+def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
+    """A run of hours takes no more memory than a short one; its numbers are read from the file, once it is whole."""
+    numbers = tuple(float(k) for k in range(60))
+
+    def message(first: int) -> Telemetry:
+        rows = tuple((0.01 * k, *numbers) for k in range(first, first + 10))
+        return replace(telemetry(()), inverters=tuple(f"inv{i}" for i in range(10)), rows=rows)
+
+    with Recorder(tmp_path / "I") as recorder:
+        for first in range(0, 1_000, 10):
+            recorder(message(first))
+        tracemalloc.start()
+        for first in range(1_000, 20_000, 10):
+            recorder(message(first))
+        grown, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        recorded = recorder.finish(0.01 * 19_999, 0.01)
+    history = History.of(recorded.inverters, recorded.rows)
+
+    assert grown < 50_000
+    assert (len(history.t), history.V_set[-1, -1]) == (20_000, 59.0)
 
 
 def test_rows_come_in_the_order_of_time(tmp_path: Path) -> None:

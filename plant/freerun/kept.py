@@ -1,0 +1,72 @@
+"""What the plant has published for recorders of late, to be published again to one that was out of reach. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+
+KEPT = 4_000_000
+"""Bytes that are kept: over two minutes of nine inverters at real time, and a small part of what the process takes."""
+
+AT_ONCE = 20
+"""Messages that are published again in one control period, so that the plant keeps its pace."""
+
+
+class KeptTelemetry:
+    """The latest messages on the key of telemetry, in their order.
+
+    Messages are numbered by the next or same Telemetry: what comes between two of them counts to the later one. While
+    something is published again, what is new waits for its turn: a recorder gets all in order.
+
+    Parameters
+    ----------
+    limit : int, optional
+        Bytes that are kept.
+
+    Examples
+    --------
+    >>> kept = KeptTelemetry(limit=8)
+    >>> [kept.add(number, payload) for number, payload in [(0, b"T0"), (1, b"T1"), (2, b"L2"), (2, b"T2"), (3, b"T3")]]
+    [True, True, True, True, True]
+    >>> kept.again_from(0)
+    1
+    >>> kept.add(4, b"T4"), kept.take(3), kept.take(3), kept.add(5, b"T5")
+    (False, [b'T1', b'L2', b'T2'], [b'T3', b'T4'], True)
+    """
+
+    def __init__(self, limit: int = KEPT) -> None:
+        self._limit, self._bytes = limit, 0
+        self._kept: deque[tuple[int, bytes]] = deque()
+        self._due: deque[tuple[int, bytes]] = deque()
+        self._latest, self._count = 0, 0
+
+    def add(self, number: int, payload: bytes) -> bool:
+        """Keep a message; whether it is to be published now, and not after what is published again."""
+        self._latest, self._count = number, self.others(number) + 1
+        self._kept.append((number, payload))
+        self._bytes += len(payload)
+        while self._bytes > self._limit and self._kept[0][0] < number:  # what counts to one Telemetry goes together
+            gone = self._kept[0][0]
+            while self._kept[0][0] == gone:
+                self._bytes -= len(self._kept.popleft()[1])
+        if self._due:
+            self._due.append((number, payload))
+            return False
+        return True
+
+    def others(self, number: int) -> int:
+        """How many messages count to a Telemetry that is yet to be kept."""
+        return self._count if number == self._latest else 0
+
+    def again_from(self, number: int) -> int:
+        """Have messages from a number on published again; the first number that is still kept."""
+        start = min(number, self._due[0][0]) if self._due else number
+        self._due = deque(entry for entry in self._kept if entry[0] >= start)
+        return max(number, self._kept[0][0]) if self._kept else number
+
+    def take(self, count: int = AT_ONCE) -> list[bytes]:
+        """Take out what is to be published again now."""
+        return [self._due.popleft()[1] for _ in range(min(count, len(self._due)))]
+
+    def take_all(self) -> list[bytes]:
+        """Take out all of it, as the run ends."""
+        return self.take(len(self._due))

@@ -1,0 +1,67 @@
+"""How often a line that comes again and again is said, and how many were left out. Time is an argument (s)."""
+
+from __future__ import annotations
+
+import re
+
+BURST = 20
+"""Lines of one kind that may come at once, as of all agents that join."""
+
+INTERVAL = 10.0
+"""Time (s) after which one more may come."""
+
+_KINDS = 200
+"""Kinds that are told apart; all further ones count as one."""
+
+_NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
+
+
+class RateLimit:
+    """Lets the first lines of a kind through, then one in a while that tells how many were left out.
+
+    Lines are of one kind if they differ in numbers only.
+
+    Parameters
+    ----------
+    burst : int, optional
+        Lines of a kind that may come at once.
+    interval : float, optional
+        Time (s) after which one more may.
+
+    Examples
+    --------
+    >>> limit = RateLimit(burst=1, interval=10.0)
+    >>> [limit.admit(f"late by {i} ms", now=float(i)) for i in range(3)]
+    ['late by 0 ms', None, None]
+    >>> limit.admit("late by 9 ms", now=11.0)
+    'late by 9 ms (2 more lines like this one were left out)'
+    >>> limit.admit("late by 9 ms", now=11.5), limit.left_out()
+    (None, ['1 more lines like this one were left out: late by 9 ms'])
+    """
+
+    def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:
+        self._burst, self._interval = burst, interval
+        self._allowed: dict[str, tuple[float, float]] = {}
+        """Of each kind how many lines may come now, and when that was so (s)."""
+        self._left: dict[str, tuple[int, str]] = {}
+        """Of each kind how many were left out since the last that was said, and the latest of them."""
+
+    def admit(self, text: str, now: float) -> str | None:
+        """Say a line now (s): as it is, with a word on those left out before it, or not at all."""
+        kind = _NUMBER.sub("0", text)
+        if kind not in self._allowed and len(self._allowed) >= _KINDS:
+            kind = ""
+        allowed, since = self._allowed.get(kind, (float(self._burst), now))
+        allowed = min(float(self._burst), allowed + (now - since) / self._interval)
+        left, _ = self._left.pop(kind, (0, ""))
+        if allowed < 1.0:
+            self._allowed[kind] = allowed, now
+            self._left[kind] = left + 1, text
+            return None
+        self._allowed[kind] = allowed - 1.0, now
+        return f"{text} ({left} more lines like this one were left out)" if left else text
+
+    def left_out(self) -> list[str]:
+        """Take out what is yet to be told of lines that were left out, e.g. at the end."""
+        left, self._left = self._left, {}
+        return [f"{count} more lines like this one were left out: {text}" for count, text in left.values()]
