@@ -192,6 +192,8 @@ def _by_droop(
     """Find the Q at which V_set - m_q Q is each terminal's voltage, within the apparent-power limit."""
     units = flow.units
     free = np.flatnonzero(~swing & flow.reduction.online)
+    if not free.size:  # swings alone: they hold their voltage, and nothing is left to find
+        return *flow.solve(J, P, Q, swing), Q
     limit = np.sqrt(np.maximum(units.S_max**2 - P**2, 0.0))
 
     def deviation(q: Real) -> Real:

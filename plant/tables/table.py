@@ -57,7 +57,7 @@ class Row:
         """
         value = self._cells.get(column, "")
         try:
-            number = float(value)
+            number = float(value) if "_" not in value else math.nan
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
@@ -135,6 +135,9 @@ class Table:
 
     def _open(self, path: Path, columns: Collection[str], required: bool) -> None:
         file, mistakes = self.file, self._mistakes
+        if path.exists() and not path.is_file():
+            mistakes.append(f"{file}: is no file")
+            return
         if not path.is_file():
             if required:
                 mistakes.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")
@@ -144,6 +147,9 @@ class Table:
                 reader = csv.DictReader(stream, restval="", strict=True)
                 found = [name.strip() for name in reader.fieldnames or ()]
                 reader.fieldnames = found
+                for column in dict.fromkeys(name for name in columns if found.count(name) > 1):
+                    mistakes.append(f'{file}: column "{column}" stands there twice; keep one')
+                    return
                 for column in columns:
                     if column not in found:
                         mistakes.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')

@@ -5,9 +5,10 @@ from __future__ import annotations
 from agents.config import Gains, Handling
 from netem.plausible import Range
 from plant.config import GflParameters, GfmParameters
-from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Time
+from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Scenario, Time
 
 RANGES: dict[tuple[type, str], Range] = {
+    (Scenario, "seed"): Range("a seed", "", 0, 2**63 - 1),
     (Time, "end_s"): Range("the duration of a run", "s", 0.001, 3600.0, above_zero=True),
     (Time, "T_c_s"): Range("a control period", "s", 0.0005, 2.0, above_zero=True),
     (Time, "h_s"): Range("an integration step", "s", 1e-5, 0.02, above_zero=True),

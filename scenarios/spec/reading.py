@@ -107,6 +107,9 @@ def _value(
     except msgspec.ValidationError:
         mistakes.add(path, _wrong_type(kind, raw))
         return _placeholder(kind) if field.default is msgspec.NODEFAULT else field.default
+    if isinstance(value, str) and not value.isprintable():
+        mistakes.add(path, f"has characters that cannot be printed: {value!a}; write letters, digits and signs")
+        return field.default if isinstance(field.default, str) else _placeholder(kind)
     allowed = range_of(cls, field.name) if kind in (float, int) else None
     if allowed is not None and (wrong := objection(value, allowed)):
         mistakes.add(path, wrong)

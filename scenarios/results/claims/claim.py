@@ -89,6 +89,9 @@ def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim
     name = "abs(f-60)" if quantity == "f_error_Hz" else quantity
 
     def compare(found: Findings) -> tuple[bool, str]:
+        absent = [cell for cell in cells if not found.has(cell)]
+        if absent:
+            return False, f"there is no such number: {absent[0].where}"
         ours = {cell: found.value(cell) for cell in cells}
 
         def off(cell: Cell) -> float:

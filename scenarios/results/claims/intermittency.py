@@ -23,9 +23,12 @@ SOURCE = "section 4, Table III and figure"
 
 def _at_the_limit(found: Findings) -> tuple[bool, str]:
     off = max(
-        abs(found.results[case][CLOUDS].p[name] - limit)
-        for case in CUT
-        for name, limit in found.available[case].items()
+        (
+            abs(found.results[case][CLOUDS].p[name] - limit)
+            for case in CUT
+            for name, limit in found.available[case].items()
+        ),
+        default=float("inf"),
     )
     return off < AT_LIMIT.value, f"at most {off:.4f} pu off their limits"
 

@@ -154,3 +154,14 @@ def over_graphs(**times: float | None) -> Findings:
 def test_claims_of_topologies_hold_and_fail(name: str, found: Findings, status: str) -> None:
     """A time that never came counts as later than all others; where nothing was run below 8, nothing is claimed."""
     assert {v.claim.name: v.status for v in judge(found, CLAIMS["topology"])}[name] == status
+
+
+def test_an_experiment_without_the_papers_islands_fails_its_table() -> None:
+    """A scenario of the user's own that says it is the paper's, and has no islands, is judged without a traceback."""
+    steady = Steady(f_error_Hz=0.0, MPSI=0.0, V_error=0.0, MQSI=0.0, t_restore_s=None, p={"inv1": 0.5})
+    found = Findings(results={"IV": {"event1": steady, "event2": steady}}, islands={"IV": {}})
+
+    verdicts = judge(found, CLAIMS["switching"])
+
+    assert {verdict.status for verdict in verdicts} == {"FAIL"}
+    assert verdicts[0].found == "there is no such number: case IV, event2, island of inv1"

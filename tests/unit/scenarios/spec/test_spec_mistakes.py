@@ -44,6 +44,12 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         ("P_set0_pu = 0.647", "P_set0_pu = 64.7", r"plant.P_set0_pu: 64.7 pu .* did you mean 0.647 \(64.7 %\)\?"),
         ("P_set0_pu = 0.647", "P_set0_pu = 388200", r"plant.P_set0_pu: .* neither kW nor V"),
         ("P_set0_pu = 0.647", "P_set0_kW = 388", r"plant.P_set0_kW: unknown key; write P_set0_pu, per unit"),
+        ("seed = 1 ", "seed = -1 ", r"seed: a seed must not be negative, got -1"),
+        (
+            'title = "no control"',
+            r'title = "no \u001b[31m"',
+            r"case.I.title: has characters that cannot be printed: 'no \\x1b",
+        ),
         ("k_p = 0.0007", "k_p = 0", r"gains.k_p: gain k_p must be above 0, got 0"),
         ("k_q = 0.25", "k_q = -1.0", r"gains.k_q: gain k_q must be above 0, got -1"),
         ("alpha = 1.0", "alpha = -1.0", r"gains.alpha: gain alpha must not be negative, got -1"),

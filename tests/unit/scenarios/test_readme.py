@@ -1,0 +1,85 @@
+"""What the README tells to type and to write works as it stands."""
+
+import inspect
+import re
+import shlex
+import sys
+import tomllib
+from importlib import util
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from scenarios.cli import app
+from scenarios.spec import load_scenario
+from scenarios.spec.loading import CATALOGUE
+from tests.command_line import invoke
+
+README = Path(__file__).parents[3] / "README.md"
+TEXT = README.read_text(encoding="utf-8")
+SNIPPETS = [block for block in re.findall(r"```\n(.*?)```", TEXT, re.S) if re.search(r"^\[\[?[a-z]", block, re.M)]
+ROWS = [line for line in TEXT.splitlines() if line.startswith("| ") and "gridpeers" in line]
+SWEEP_EXTRA = ("joblib", "pyarrow", "dask", "distributed")
+"""Modules that the extra `sweep` installs besides what everybody has."""
+
+
+def commands(row: str) -> list[list[str]]:
+    """Command lines of `gridpeers` in a row of a table."""
+    parts = [part for code in re.findall(r"`([^`]+)`", row) for part in code.split("&&")]
+    words = [shlex.split(part.strip()) for part in parts]
+    return [line[1:] for line in words if line and Path(line[0]).name == "gridpeers"]
+
+
+COMMANDS = [(row, line) for row in ROWS for line in commands(row)]
+
+
+def test_the_readme_has_snippets_and_commands() -> None:
+    """The tests below look at something."""
+    assert SNIPPETS
+    assert len(COMMANDS) >= 8
+
+
+@pytest.mark.parametrize("snippet", SNIPPETS)
+def test_a_snippet_of_a_scenario_passes_check_below_the_catalogues_own(snippet: str, tmp_path: Path) -> None:
+    """Written below a copy of the islanding scenario, with its cases taken out, it is a scenario that can be run."""
+    text = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text[: text.index("[case.")] + snippet, encoding="utf-8")
+
+    scenario, _ = load_scenario(tmp_path / "mine.toml")
+
+    assert list(scenario.cases) == list(tomllib.loads(snippet)["case"])
+
+
+def command_of(line: list[str]) -> Any:
+    """The command of a command line, and the context to parse it in."""
+    group: Any = typer.main.get_command(app)
+    context = group.make_context("gridpeers", list(line), resilient_parsing=True)
+    return group.get_command(context, line[0]), context
+
+
+@pytest.mark.parametrize(("row", "line"), COMMANDS, ids=[" ".join(line) for _, line in COMMANDS])
+def test_a_command_of_the_readme_is_one(row: str, line: list[str]) -> None:
+    """Its words and options are those of the command line."""
+    command, context = command_of(line)
+
+    assert command is not None, line[0]
+    command.make_context(line[0], line[1:], parent=context)
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if commands(row)])
+def test_a_row_whose_command_needs_an_extra_tells_to_install_it(
+    row: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A row tells to install the extra exactly where one of its commands ends without its packages."""
+    find, missing = util.find_spec, []
+    monkeypatch.setattr(util, "find_spec", lambda name, *rest: None if name in SWEEP_EXTRA else find(name, *rest))
+    monkeypatch.chdir(tmp_path)
+    for line in commands(row):
+        command, _ = command_of(line)
+        if "check_packages" in inspect.getsource(sys.modules[command.callback.__module__]):
+            code, said = invoke(*line)
+            missing.append(code == 2 and "gridpeers[sweep]" in said)
+
+    assert ("'.[sweep]'" in row) == any(missing)
