@@ -20,6 +20,9 @@ from scenarios.results.steadiness import Ends, ends_of, reason
 F_BAND, MPSI_BAND = 0.01, 0.01
 """Frequency (Hz) and MPSI below which a microgrid counts as restored."""
 
+NO_LOAD = 0.001
+"""Part of the ratings below which a total power is too small for its sharing to mean anything."""
+
 LOAD_BAND = 0.02
 """Part of the steady total real power within which the load counts as taken over."""
 
@@ -204,10 +207,8 @@ def _reasons(
 ) -> dict[str, str]:
     """Why measures are no steady values, by name."""
     present, forming = history.present, plates.GFM
-    there = bool(present[ends.steady].any(axis=1).all())
     dead = "de-energised: no inverter is on the network"
     leaderless = "no grid-forming inverter is on the network" if forming.any() else "there is no grid-forming inverter"
-    shared = "nothing shared: the total is 0" if there else dead
     names = np.array(plates.names)
     found = {
         "f_error_Hz": reason(
@@ -217,12 +218,22 @@ def _reasons(
             f"no leader: {leaderless}",
             tuple(names[forming]) if forming.sum() > 1 else (),
         ),
-        "MPSI": reason("MPSI", sharing, ends, shared),
+        "MPSI": _idle(history.P, plates, ends, present) or reason("MPSI", sharing, ends, dead),
         "V_error": reason("V_error", voltage, ends, dead),
-        "MQSI": reason("MQSI", vars_, ends, shared),
+        "MQSI": _idle(history.Q, plates, ends, present) or reason("MQSI", vars_, ends, dead),
         "p": reason("p", history.P / plates.s, ends, dead, plates.names),
     }
     return {name: text for name, text in found.items() if text}
+
+
+def _idle(x: Floats, plates: Plates, ends: Ends, present: Flags) -> str:
+    """Why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
+    rows = ends.steady & present.any(axis=1)
+    if not rows.any() or not present[ends.steady].any(axis=1).all():
+        return ""  # dead, or without rows: told as that
+    total = np.abs(np.where(present, x, 0.0).sum(axis=1))[rows]
+    rated = np.where(present, plates.s, 0.0).sum(axis=1)[rows]
+    return f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings" if _mean(total / rated) < NO_LOAD else ""
 
 
 def _mean(x: Floats) -> float:
