@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from msgspec.structs import replace
+
 from agents.config import AgentConfig
 from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
@@ -172,9 +174,12 @@ class Agent:
         return self._state(measurement, self._P_set, self._V_set)
 
     def stand_still(self, measurement: Measurement) -> State:
-        """What a paused agent is taken to say at this tick: what the plant holds, from which it begins again."""
+        """What an agent that is paused, or measures nothing, says at this tick: only that it is there.
+
+        When it goes on it begins from what the plant holds.
+        """
         self.let_go()
-        return self._state(measurement, measurement.P_set, measurement.V_set)
+        return replace(self._state(measurement, measurement.P_set, measurement.V_set), Q=0.0, island="", idle=True)
 
     def _state(self, measurement: Measurement, P_set: float, V_set: float) -> State:
         return State(

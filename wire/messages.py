@@ -176,6 +176,9 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     Empty if it is not known."""
     angle: Angle | None = None
     """Where the inverter's angle stood at that measurement; sent only where islands are told apart by it."""
+    idle: bool = False
+    """Whether the agent stands still: paused, or without a measurement. In wall-clock time it then says nothing; in
+    simulated time the tick waits for this state, which nobody uses."""
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -297,7 +300,8 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     rejected: Count
     """Messages dropped since its start."""
     lost: Count
-    """Messages that never came, by gaps in the numbers of who sent them, since its start."""
+    """Messages that never came for use, since its start: by gaps in the numbers of who sent them, and by what emulated
+    links dropped; not what a cut still keeps."""
     ticks: Count
     """Ticks done since its start."""
     missed: Count
