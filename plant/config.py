@@ -116,6 +116,20 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Upper bound of V_set (pu)."""
 
 
+class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Synchronism check of a switch that is to join two live islands: the largest differences across it."""
+
+    angle: float = 0.0
+    """Of the angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE 1547-2018,
+    Table 5)."""
+    f: float = 0.0
+    """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1, likewise."""
+    V: float = 0.0
+    """Of the voltage (pu of nominal); 0: 0.10, 0.05 or 0.03, likewise."""
+    timeout: float = 10.0
+    """How long (s) a switch of the schedule waits for synchronism before it gives up."""
+
+
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A switch operated at a time of the scenario."""
 
@@ -124,6 +138,8 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     switch: str
     """Name, e.g. "13-152" or "sw1_2"."""
     action: Literal["open", "close"]
+    synchronised: bool = False
+    """Whether to wait, where it would join two live islands, until they are in step within the synchronism check."""
 
 
 class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -164,6 +180,7 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     gfl: GflParameters = GflParameters()
     events: tuple[SwitchEvent, ...] = ()
     """Switches operated on schedule."""
+    sync_check: SyncCheck = SyncCheck()
     limits: tuple[PowerLimit, ...] = ()
     """Available power that changes on schedule."""
     spares: tuple[str, ...] = ()

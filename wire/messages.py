@@ -259,9 +259,10 @@ class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A person wants something of the plant (command line -> plant, wall-clock time)."""
 
-    verb: Literal["open", "close", "stop", "down", "status", "link", "links", "telemetry"]
-    """Open or close a switch; have an agent leave; end the run; tell how it stands; order emulated links to do
-    something; ask all of them how they stand; publish telemetry again that a recorder has not got."""
+    verb: Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links", "telemetry"]
+    """Open or close a switch; close it if its sides are in step; have an agent leave; end the run; tell how it stands;
+    order emulated links to do something; ask all of them how they stand; publish telemetry again that a recorder has
+    not got."""
     argument: Text = ""
     """Name of the switch or of the agent; the order; number of the first Telemetry wanted; empty for the others."""
     reply_to: Name

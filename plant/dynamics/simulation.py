@@ -11,6 +11,7 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
+from plant.dynamics.kernel.gfl import F_NOM
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
@@ -156,6 +157,25 @@ class Dynamics:
         """Go back to the start of the step that failed."""
         units = self.inverters
         units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
+
+    def voltages(self) -> Complex:
+        """Present voltages of the circuit's nodes (V), 0 in dead islands and at nodes without any admittance."""
+        network = self.network
+        return network.reduction.node_voltages(
+            self.inverters.J, network.V_branch[network.reduction.branches], network.source_voltage
+        )
+
+    def frequency(self, island: int) -> float:
+        """Frequency (Hz) of an island: nominal at a source, else the mean over its GFM by rating; 0 if it is dead."""
+        units, reduction = self.inverters, self.network.reduction
+        if reduction.has_source[island]:
+            return F_NOM
+        at = units.gfm_at
+        here = reduction.online[at] & (reduction.inverter_island[at] == island)
+        if not here.any():
+            return 0.0
+        speed = np.average(units.gfm_state["w"][here], weights=units.S_b[at][here])
+        return F_NOM + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
         """Present f (Hz), P (W), Q (var), V (V) from the last solution, n_inv x 4, before any step was taken."""

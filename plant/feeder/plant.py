@@ -10,10 +10,12 @@ import numpy as np
 from plant.config import PlantSettings, PowerLimit
 from plant.dynamics import Dynamics, Inverter, PlantError
 from plant.feeder.circuits import Circuits
+from plant.feeder.closings import Closings
 from plant.feeder.islands import GRID, Islands
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
-from plant.feeder.trips import Closing, trip_event
+from plant.feeder.synchronism import Synchronism
+from plant.feeder.trips import trip_event
 from plant.network import Network
 from wire.messages import PlantEvent
 
@@ -96,7 +98,9 @@ class Plant:
             settings.h,
             connected=[not unit.spare for unit in network.inverters],
         )
-        self._closings: list[Closing] = []
+        sync = Synchronism(network, self._dynamics, settings.sync_check)
+        timeout = round(settings.sync_check.timeout / settings.h)
+        self._closings = Closings(self._switches, sync, timeout, settings.h)
         n = len(self.inverters)
         self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
         self._check_start()
@@ -134,8 +138,11 @@ class Plant:
         self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * self._P_rated[i] / 1e3)
         self._events += self._set_points.held(name, t, "V_set", V_set, V * self._V_nom[i])
 
-    def switch(self, name: str, action: str) -> bool:
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias; it acts from the next step on.
+
+        Closing two live islands, it joins them as they stand, and a warning tells how far they were apart; with
+        `synchronised` only if they are in step.
 
         Returns
         -------
@@ -145,13 +152,17 @@ class Plant:
         Raises
         ------
         ValueError
-            If there is no such switch; the message lists those there are.
+            If there is no such switch; the message lists those there are. If it was to close in step and is not; the
+            message says how far its sides are apart.
         """
+        known = self.network.switch_name(name)
+        if synchronised and action == "close" and (refusal := self._closings.refusal(known)):
+            raise ValueError(refusal)
         step, closed = self.tick * self._steps, self._switches.closed
         for at, then in zip(sorted(self._switches.steps), self._switches.foreseen(), strict=True):
             closed = then if at <= step else closed
-        self._switches.put(step, name, action)
-        return (self.network.switch_name(name) in closed) == (action == "close")
+        self._switches.put(step, known, action, synchronised=synchronised)
+        return (known in closed) == (action == "close")
 
     def connect(self, name: str, on: bool) -> None:
         """Put an inverter on the network, at zero current and in step with it, or take it off."""
@@ -173,6 +184,7 @@ class Plant:
         An island whose network has no solution is de-energised and told as an event; the others go on.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
+        self._events += self._closings.check_waiting(first)
         stops = sorted({s for s in (*self._switches.steps, *self._limits) if first < s < last} | {last})
         step = first
         for stop in stops:
@@ -227,7 +239,11 @@ class Plant:
     def _operate(self, step: int) -> None:
         """Operate the switches of this step, all at once, then find the islands anew."""
         t, before = round(step * self._h, 9), self._switches.closed
-        told = self._switches.operate(step)
+        notes, warnings = self._closings.judge(step)
+        self._events += warnings
+        if not self._switches.due(step):
+            return
+        told = self._switches.operate(step, notes)
         closed = self._switches.closed
         try:
             circuit = self._circuits.of(closed)
@@ -247,7 +263,7 @@ class Plant:
         closed = self._switches.closed
         for trip in trips:
             t = round((step + trip.step) * self._h, 9)
-            self._events.append(trip_event(t, trip, self.network, closed, self._closings))
+            self._events.append(trip_event(t, trip, self.network, closed, self._closings.joined))
             self._events += self._islands.report_dead(t, closed, self._dynamics.network.reduction)
         return bool(trips)
 

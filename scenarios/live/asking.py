@@ -15,7 +15,7 @@ from scenarios.live.visit import NobodyError, Visit
 from wire.codec import RejectedError, decode, encode
 from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
 
-Verb = Literal["open", "close", "stop", "down", "status", "link", "links"]
+Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
 ANSWER = 5.0
 """Longest wait (s) for the answer of a plant that is there."""
