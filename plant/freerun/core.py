@@ -194,7 +194,9 @@ class FreePlant(Side):
                 self._gather(now)
             case ("alive", "agent", name, instance):
                 self._tokens.add(key)
-                if name not in self.plant.inverters:
+                if self.phase == "closing":  # it was not there, or not heard, when the others were told
+                    self.stop(self.keys.dismissal(name, instance), self.outcome or "the run has ended")
+                elif name not in self.plant.inverters:
                     inverters = ", ".join(self.plant.inverters)
                     self._refuse(name, instance, f"{name}: no inverter of this name; inverters are {inverters}")
                 elif self.instances.get(name, instance) != instance:

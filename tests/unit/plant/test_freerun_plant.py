@@ -378,3 +378,20 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     assert asked == 2
     assert lab.fetched.count(KEYS.nameplate("inv2", "b")) == 2
     assert [m.to for m in lab.take(Measurement)][-1] == "inv2"
+
+
+def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
+    """An agent whose session was renewed just then has not heard the end; else it would seek a plant for minutes."""
+    lab = Lab()
+    lab.join("inv1", "inv2", "inv3")
+    lab.side.abort("the end of it", lab.now)
+    lab.do()
+    lab.token("inv2", gone=True)
+    lab.sent.clear()
+    lab.token("inv2", "b")
+
+    ((key, stop),) = lab.sent
+    assert key == KEYS.dismissal("inv2", "b")
+    assert isinstance(stop, Stop)
+    assert stop.reason == "the end of it"
+    assert not stop.refused
