@@ -15,7 +15,7 @@ from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
 from agents.slip import Slips
 from agents.topology import in_neighbours
-from wire.messages import Measurement, Nameplate, State
+from wire.messages import OFF, Measurement, Nameplate, State
 
 
 class Agent:
@@ -107,6 +107,8 @@ class Agent:
         one island to another, the island before counts too.
         """
         state = self._heard.get(name)
+        if state is not None and state.island == OFF:
+            return False
         if state is None or self._slips is not None:
             return state is not None and name not in self._apart
         return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
@@ -143,6 +145,9 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
+        if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds
+            self.let_go()
+            return self._state(measurement, measurement.P_set, measurement.V_set)
         config = self.config
         self._islands = (measurement.island, self._islands[0] or measurement.island)
         if self._slips is not None:
@@ -190,7 +195,7 @@ class Agent:
             P_set=P_set,
             V_set=V_set,
             Q=measurement.Q,
-            island=measurement.island if self._is_told_islands else "",
+            island=measurement.island if self._is_told_islands or measurement.island == OFF else "",
             angle=None if self._slips is None else self._slips.angle,
         )
 

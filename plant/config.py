@@ -130,6 +130,19 @@ class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """How long (s) a switch of the schedule waits for synchronism before it gives up."""
 
 
+class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """When inverters trip by voltage or frequency, and when they enter service again: IEEE 1547-2018."""
+
+    category: Literal["II", "III", "off"] = "III"
+    """Abnormal operating performance category whose default trip settings hold; "off": no inverter trips."""
+    trips: dict[str, tuple[float, float]] = {}
+    """Settings in place of the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
+    pu or in Hz at 60 Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }."""
+    enter_service: float = 5.0
+    """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz) must be normal before an inverter that
+    tripped comes back. The standard's default is 300 s, longer than a run."""
+
+
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A switch operated at a time of the scenario."""
 
@@ -178,6 +191,7 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """First V_set of every inverter (pu of its nominal voltage)."""
     gfm: GfmParameters = GfmParameters()
     gfl: GflParameters = GflParameters()
+    protection: Protection = Protection()
     events: tuple[SwitchEvent, ...] = ()
     """Switches operated on schedule."""
     sync_check: SyncCheck = SyncCheck()

@@ -19,6 +19,9 @@ import msgspec
 PLANT = "plant"
 """Name under which the plant process sends."""
 
+OFF = "off"
+"""In place of an island's name: the inverter is off the network, or in an island that nothing feeds."""
+
 LIMIT = 64_000
 """Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
 
@@ -145,7 +148,7 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
     island: NameOrNone
-    """Name of the island: "grid", or the first inverter in it."""
+    """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
     roster: Names
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 

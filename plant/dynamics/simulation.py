@@ -82,8 +82,12 @@ class Dynamics:
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
-        """Connect an inverter or take it off; see `plant.dynamics.switching.switch_inverter`."""
-        self._trips += switching.switch_inverter(self.inverters, self.network, i, on)
+        """Connect an inverter or take it off; see `switch_inverters`."""
+        self.switch_inverters((i,), on)
+
+    def switch_inverters(self, which: Sequence[int], on: bool) -> None:
+        """Connect inverters or take them off, all at once; see `plant.dynamics.switching.switch_inverters`."""
+        self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
         """Take all that feeds these islands off the network; see `plant.dynamics.switching.deenergise`."""
@@ -95,7 +99,7 @@ class Dynamics:
         return trips
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V), all finite.
+        """Advance by `steps` steps; returns steps x n_inv x `kernel.step.READING`, all finite.
 
         Where the frozen tangent does not lead to a solution it is renewed, as often as need be. An island that has
         none is de-energised before the step, which the others then take. With 0 steps the inner loop is only compiled

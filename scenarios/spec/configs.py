@@ -66,6 +66,7 @@ def configs(
             V_set0=scenario.plant.V_set0_pu,
             gfm=scenario.plant.gfm,
             gfl=scenario.plant.gfl,
+            protection=scenario.protection,
             events=_switch_events(scenario),
             sync_check=scenario.plant.sync_check,
             limits=limits_of(scenario, case),

@@ -12,7 +12,7 @@ import msgspec
 
 from agents.config import Gains, GraphRule, Handling
 from netem.spec.netem import Netem
-from plant.config import GflParameters, GfmParameters, SyncCheck
+from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 
 
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -118,6 +118,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Table `[time]`."""
     plant: PlantTable = PlantTable()
     """Table `[plant]`."""
+    protection: Protection = Protection()
+    """Table `[protection]`: when inverters trip, and when they come back."""
     gains: Gains = Gains()
     """Table `[gains]`: of the secondary law, for every case."""
     handling: Handling = Handling()
@@ -135,6 +137,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 UNIT_OF_KEY: dict[type, dict[str, str]] = {
     Gains: dict.fromkeys(("V_full", "P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
     Handling: {**dict.fromkeys(("T_age", "max_age", "T_sat"), "s"), "slip_max": "cycles"},
+    Protection: {"enter_service": "s"},
     GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
     | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu")
     | dict.fromkeys(("P_set_lim", "V_set_min", "V_set_max"), "pu"),

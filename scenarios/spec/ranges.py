@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from agents.config import Gains, Handling
 from netem.plausible import Range
-from plant.config import GflParameters, GfmParameters, SyncCheck
+from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Scenario, Time
 
 RANGES: dict[tuple[type, str], Range] = {
@@ -15,6 +15,7 @@ RANGES: dict[tuple[type, str], Range] = {
     (Time, "record_s"): Range("the distance of recorded rows", "s", 1e-5, 2.0, above_zero=True),
     (PlantTable, "P_set0_pu"): Range("a power set-point", "pu", 0.0, 1.2),
     (PlantTable, "V_set0_pu"): Range("a voltage set-point", "pu", 0.8, 1.2, above_zero=True),
+    (Protection, "enter_service"): Range("the delay of entering service", "s", 0.01, 3600.0, above_zero=True),
     (Event, "t_s"): Range("the time of an event", "s", 0.0, 3600.0, above_zero=True),
     (Processes, "deadline_s"): Range("a deadline", "s", 0.1, 600.0, above_zero=True),
     (Processes, "port"): Range("a port", "", 0, 65535),

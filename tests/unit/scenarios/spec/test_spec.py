@@ -133,8 +133,10 @@ finite = st.floats(min_value=1e-3, max_value=100.0)
 
 
 @settings(max_examples=50, deadline=None)  # each example reads a feeder
-@example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='\x7f\x00"\\\n')
-@given(k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20))
+@example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='"\\ ä%')
+@given(
+    k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20).filter(str.isprintable)
+)
 def test_a_runs_copy_means_the_same_as_the_scenario(
     tmp_path_factory: pytest.TempPathFactory, k_p: float, k_q: float, alpha: float, seed: int, title: str
 ) -> None:

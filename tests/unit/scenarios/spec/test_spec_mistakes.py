@@ -102,6 +102,31 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
             "[plant.gfm]\nP_min_pu = 0.7\n\n[plant]",
             r"plant.P_set0_pu: 0.647 pu is below plant.gfm.P_min_pu = 0.7 pu.*raise P_set0_pu",
         ),
+        (
+            "[plant]",
+            '[protection]\ncategory = "IV"\n\n[plant]',
+            r'protection.category: there is no "IV"; .* II, III, off',
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV3 = [0.5, 0.1] }\n\n[plant]",
+            r'protection.trips: no trip function "UV3"; did you mean "UV[12]"',
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV2 = [1.2, 0.1] }\n\n[plant]",
+            r"protection.trips: UV2 must be between 0 and 1 pu, got 1.2 pu",
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV2 = [0.4, 0.0] }\n\n[plant]",
+            r"protection.trips: UV2: the clearing time must be above 0 and at most 3600 s, got 0 s",
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { OF1 = [62.5, 1.0] }\n\n[plant]",
+            r"protection.trips: OF2 = 62 Hz must be farther from nominal than OF1 = 62.5 Hz",
+        ),
         ("[plant]", "[plant.gfm]\nE_min_pu = 1.5\n\n[plant]", r"plant.gfm.E_min_pu: 1.5 must be below E_max_pu = 1.25"),
     ],
 )
