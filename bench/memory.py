@@ -79,7 +79,7 @@ def main() -> None:
     parser.add_argument("--every", type=float, default=5.0, help="time (s) between two looks")
     parser.add_argument("--skip", type=float, default=0.3, help="part of the time that is left out")
     parser.add_argument(
-        "--link", nargs="*", default=[], help='words for "gridpeers link", e.g. set "* -> inv1" --loss 0.1'
+        "--link", nargs=argparse.REMAINDER, help='last: words for gridpeers link, e.g. set "* -> inv1" --loss 0.1'
     )
     arguments = parser.parse_args()
     command = [sys.executable, "-P", "-c", "from scenarios.cli import main; main()"]

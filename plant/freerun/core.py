@@ -168,6 +168,7 @@ class FreePlant(Side):
             self.outcome = reason
             self._report(final=True)
             self.phase = "over"
+            self._publish_again(self.kept.take_all())
 
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
@@ -176,6 +177,7 @@ class FreePlant(Side):
         self._say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
+        self._publish_again(self.kept.take_all())
         self._deadline = now + CLOSING
         if self._all_have_gone():
             self.phase = "over"

@@ -13,6 +13,7 @@ from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode, encode
+from wire.driver.drive import StoppedError
 from wire.keys import Keys
 from wire.messages import Answer, Command, Leave, Measurement, Message, PlantEvent, State, Stop, Telemetry, Waiting
 
@@ -395,3 +396,17 @@ def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
     assert isinstance(stop, Stop)
     assert stop.reason == "the end of it"
     assert not stop.refused
+
+
+def test_a_signal_in_the_middle_of_a_message_ends_the_process_and_not_the_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """SIGTERM comes at any moment: it is no error of the message that is just handled, which would be rejected."""
+    lab = Lab(end=None)
+
+    def connect(name: str, on: bool) -> None:
+        raise StoppedError("SIGTERM")
+
+    monkeypatch.setattr(lab.toy, "connect", connect)
+    with pytest.raises(StoppedError):
+        lab.join("inv1")
