@@ -15,7 +15,33 @@ from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
 from agents.slip import Slips
 from agents.topology import in_neighbours
+from wire.codec import RejectedError, decode, encode
 from wire.messages import OFF, Measurement, Nameplate, State
+
+
+def nameplate_of(config: AgentConfig) -> Nameplate:
+    """What an agent tells of itself."""
+    return Nameplate(
+        sender=config.name,
+        incarnation=config.incarnation,
+        seq=0,
+        t=0.0,
+        kind=config.kind,
+        microgrid=config.microgrid,
+        P_rated=config.P_rated,
+        V_nom=config.V_nom,
+        f_nom=config.f_nom,
+        m_p=config.m_p,
+        m_q=config.m_q,
+    )
+
+
+def check_nameplate(config: AgentConfig) -> None:
+    """Raise ValueError if everybody would refuse the nameplate of an agent, as a value in it cannot be."""
+    try:
+        decode(encode(nameplate_of(config)))
+    except RejectedError as rejected:
+        raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
 
 
 class Agent:
@@ -41,19 +67,7 @@ class Agent:
 
     def __init__(self, config: AgentConfig) -> None:
         self.config = config
-        self.nameplate = Nameplate(
-            sender=config.name,
-            incarnation=config.incarnation,
-            seq=0,
-            t=0.0,
-            kind=config.kind,
-            microgrid=config.microgrid,
-            P_rated=config.P_rated,
-            V_nom=config.V_nom,
-            f_nom=config.f_nom,
-            m_p=config.m_p,
-            m_q=config.m_q,
-        )
+        self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"

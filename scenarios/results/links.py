@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace, Outcome, combined
-from scenarios.emulation.report import LinkBook, decode_book
+from scenarios.emulation.report import book_of
 from scenarios.results.folder import write_whole
 from wire.messages import LinkReport
 
@@ -44,7 +44,7 @@ class LinkRecord:
     def __call__(self, report: LinkReport) -> None:
         """Take one part of a receiver's book."""
         try:
-            book: LinkBook = decode_book(report.data)
+            book = book_of(report)
         except msgspec.DecodeError:
             self.garbled += 1
             return
