@@ -90,7 +90,9 @@ def main() -> None:
             up = subprocess.Popen([*command, *words, "--out", f"{folder}/here"], stdout=log, stderr=log)
             try:
                 history = Path(folder) / "here"
-                while up.poll() is None and not list(history.glob("*/history.partial.csv")):
+                while up.poll() is None and not any(
+                    file.stat().st_size for file in history.glob("*/history.partial.csv")
+                ):
                     sleep(0.2)
                 if arguments.link:
                     subprocess.run([*command, "link", *arguments.link, "--run", run, "--connect", endpoint], check=True)
