@@ -77,11 +77,8 @@ class Core(Protocol):
         ...
 
 
-class StoppedError(BaseException):
-    """Another part of the process, or a signal, wants it to end.
-
-    No `Exception`: a signal comes at any moment, also while a message is handled, whose errors are the message's own.
-    """
+class StoppedError(Exception):
+    """Another part of the process, or a signal, wants it to end."""
 
 
 EVERYTHING = 1 << 30

@@ -1,0 +1,1 @@
+"""Our plant against GridLAB-D; see `bench.gridlabd.__main__`."""

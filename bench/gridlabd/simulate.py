@@ -1,0 +1,217 @@
+"""GridLAB-D in a process of its own, stepped from outside through its delta mode.
+
+GridLAB-D's Python interface runs all delta steps of a second in one call, and its state is global. So this file is a
+program for itself, run by whichever interpreter has the wheel `gridlabd`; it needs nothing else. It overwrites two
+function pointers of a loaded module (`tape`) with callbacks: one keeps the core in delta mode, the other is called
+after every step and, when enough are done, holds GridLAB-D until the next request comes.
+
+Requests are JSON objects, one a line on standard input, answered one a line on standard output:
+
+    {"load": path, "inverters": [[name, bus, kind], ...]}   {"version": ...}; the first step of delta mode is done
+    {"write": [[object, property, value], ...]}             {}; acts from the next step on
+    {"advance": n}                                          {"steps": n lists of a reading per inverter}
+
+A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), and the set-points as GridLAB-D holds them: `Pset` (pu)
+of a GFM or `Pref` (W) of a GFL, and `Vset` (pu). What goes wrong is answered as {"error": text}.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import json
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+STAY = 0
+"""What a module wishes that wants delta mode now; else the time (s) until it does."""
+
+SWITCH_STATES = {"open": 0, "close": 1}
+"""Values of a switch's property `status`."""
+
+Reading = tuple[float, float, float, float, float, float]
+
+
+class Module(ctypes.Structure):
+    """Head of GridLAB-D's record of a loaded module, as of version 6.0.0."""
+
+    _fields_ = (
+        ("library", ctypes.c_void_p),
+        ("id", ctypes.c_uint),
+        ("name", ctypes.c_char * 1024),
+        ("first_class", ctypes.c_void_p),
+        ("major", ctypes.c_ushort),
+        ("minor", ctypes.c_ushort),
+        *((name, ctypes.c_void_p) for name in ("getvar", "setvar", "import_file", "export_file", "check")),
+        *((name, ctypes.c_void_p) for name in ("delta_desired", "preupdate", "interupdate", "delta_clock_update")),
+    )
+
+
+CLOCK_UPDATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_ulong, ctypes.c_int)
+DESIRED = ctypes.CFUNCTYPE(ctypes.c_ulong, ctypes.c_void_p)
+
+
+class Core:
+    """GridLAB-D's shared library: its clock, modules and objects' properties by raw pointer."""
+
+    def __init__(self) -> None:
+        with Path("/proc/self/maps").open(encoding="utf-8") as maps:
+            path = next(line.split()[-1] for line in maps if "libgldapi" in line)
+        self._library = ctypes.CDLL(path)
+        for name, result, arguments in (
+            ("module_find", ctypes.POINTER(Module), (ctypes.c_char_p,)),
+            ("object_find_name", ctypes.c_void_p, (ctypes.c_char_p,)),
+            ("object_get_addr", ctypes.c_void_p, (ctypes.c_void_p, ctypes.c_char_p)),
+        ):
+            function = getattr(self._library, name)
+            function.restype, function.argtypes = result, arguments
+
+    def clock(self) -> int:
+        """Time (s)."""
+        return ctypes.c_int64.in_dll(self._library, "global_clock").value
+
+    def module(self, name: str) -> Any:
+        """Give a loaded module; RuntimeError if this GridLAB-D lays it out in another way."""
+        module = self._library.module_find(name.encode())
+        if not module or module.contents.name != name.encode():
+            raise RuntimeError(f'module "{name}" is not laid out as in GridLAB-D 6.0.0; install gridlabd==6.0.0')
+        return module.contents
+
+    def doubles(self, name: str, key: str, count: int = 1) -> Any:
+        """View an object's property: a real (1) or a complex number (2)."""
+        return (ctypes.c_double * count).from_address(self._address(name, key))
+
+    def write(self, name: str, key: str, value: Any) -> None:
+        """Write a real property, or a switch's status ("open" or "close")."""
+        if key == "status":
+            ctypes.c_uint32.from_address(self._address(name, key)).value = SWITCH_STATES[value]
+        else:
+            self.doubles(name, key)[0] = value
+
+    def _address(self, name: str, key: str) -> int:
+        found = self._library.object_find_name(name.encode())
+        address = self._library.object_get_addr(found, key.encode()) if found else None
+        if not address:
+            raise KeyError(f"{name}.{key}")
+        return int(address)
+
+
+class Inverter:
+    """What is read of an inverter after every step."""
+
+    def __init__(self, core: Core, name: str, bus: str, kind: str) -> None:
+        forming = kind == "GFM"
+        self._f = core.doubles(name, "freq" if forming else "f_PLL_A")
+        self._S = core.doubles(name, "VA_Out", 2)
+        self._V = [core.doubles(bus, f"voltage_{phase}", 2) for phase in "ABC"]
+        self._P_set, self._V_set = core.doubles(name, "Pset" if forming else "Pref"), core.doubles(name, "Vset")
+
+    def read(self) -> Reading:
+        """Give its reading."""
+        V = sum(abs(complex(*phase)) for phase in self._V) / 3.0
+        return self._f[0], self._S[0], self._S[1], V, self._P_set[0], self._V_set[0]
+
+
+class Simulation:
+    """A model whose delta steps are taken when they are asked for; GridLAB-D itself runs in a thread.
+
+    Parameters
+    ----------
+    model
+        Path of the GLM.
+    inverters
+        Name, bus and kind of each.
+    """
+
+    def __init__(self, model: str, inverters: list[tuple[str, str, str]]) -> None:
+        gridlabd = importlib.import_module("gridlabd")
+        self.version = str(gridlabd.__version__)
+        self._gridlabd = gridlabd.DirectGridLabD()
+        if self._gridlabd.load_glm([model]) != gridlabd.GLDErrorCode.SUCCESS:
+            raise RuntimeError("the model was not loaded")
+        self.core = Core()
+        self._hook(self.core.module("tape"))
+        self._gridlabd.setup_after_load()
+        self._inverters = [Inverter(self.core, *inverter) for inverter in inverters]
+        self._go, self._done = threading.Semaphore(0), threading.Semaphore(0)
+        self._left = 1
+        self._error: Exception | None = None
+        self._steps: list[list[Reading]] = []
+        threading.Thread(target=self._run, daemon=True).start()
+        self._wait()
+
+    def advance(self, steps: int) -> list[list[Reading]]:
+        """Take steps; returns the readings after each."""
+        self._left, self._steps = steps, []
+        self._go.release()
+        self._wait()
+        return self._steps
+
+    def _wait(self) -> None:
+        self._done.acquire()
+        if self._error is not None:
+            raise self._error
+
+    def _run(self) -> None:
+        self._gridlabd.run()
+        self._error = self._error or RuntimeError("the simulation ended before its time")
+        self._done.release()
+
+    def _hook(self, module: Any) -> None:
+        start = self.core.clock()
+
+        def desired(flags: int) -> int:
+            # the power flow of the start is solved first; delta mode comes a second later
+            passed = self.core.clock() - start
+            return STAY if passed > 0 else 1
+
+        def clock_update(address: int, t: float, h: int, mode: int) -> int:
+            try:
+                self._steps.append([inverter.read() for inverter in self._inverters])
+            except Exception as error:  # an exception cannot pass through GridLAB-D
+                self._error = error
+                return 255  # ends the run
+            self._left -= 1
+            if self._left == 0:
+                self._done.release()
+                self._go.acquire()
+            return mode
+
+        self._callbacks = DESIRED(desired), CLOCK_UPDATE(clock_update)  # kept: the module has only pointers to them
+        module.delta_desired, module.delta_clock_update = (
+            ctypes.cast(callback, ctypes.c_void_p).value for callback in self._callbacks
+        )
+
+
+def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Answer requests, the first of which loads the model."""
+    first = next(requests)
+    simulation = Simulation(first["load"], first["inverters"])
+    yield {"version": simulation.version}
+    for request in requests:
+        if "advance" in request:
+            yield {"steps": simulation.advance(request["advance"])}
+        else:
+            for name, key, value in request["write"]:
+                simulation.core.write(name, key, value)
+            yield {}
+
+
+def main() -> None:
+    """Serve until standard input ends."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # GridLAB-D prints to standard output
+    try:
+        for answer in answers(json.loads(line) for line in sys.stdin):
+            print(json.dumps(answer), file=out, flush=True)
+    except Exception as error:
+        print(json.dumps({"error": f"{type(error).__name__}: {error}"}), file=out, flush=True)
+    os._exit(0)  # GridLAB-D's thread still waits inside a step
+
+
+if __name__ == "__main__":
+    main()
