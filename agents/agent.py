@@ -8,12 +8,40 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from msgspec.structs import replace
+
 from agents.config import AgentConfig
 from agents.handling import Follows, Worth, gains_in_force
 from agents.law import P_set_step, V_set_step
 from agents.slip import Slips
 from agents.topology import in_neighbours
-from wire.messages import Measurement, Nameplate, State
+from wire.codec import RejectedError, decode, encode
+from wire.messages import OFF, Measurement, Nameplate, State
+
+
+def nameplate_of(config: AgentConfig) -> Nameplate:
+    """What an agent tells of itself."""
+    return Nameplate(
+        sender=config.name,
+        incarnation=config.incarnation,
+        seq=0,
+        t=0.0,
+        kind=config.kind,
+        microgrid=config.microgrid,
+        P_rated=config.P_rated,
+        V_nom=config.V_nom,
+        f_nom=config.f_nom,
+        m_p=config.m_p,
+        m_q=config.m_q,
+    )
+
+
+def check_nameplate(config: AgentConfig) -> None:
+    """Raise ValueError if everybody would refuse the nameplate of an agent, as a value in it cannot be."""
+    try:
+        decode(encode(nameplate_of(config)))
+    except RejectedError as rejected:
+        raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
 
 
 class Agent:
@@ -39,19 +67,7 @@ class Agent:
 
     def __init__(self, config: AgentConfig) -> None:
         self.config = config
-        self.nameplate = Nameplate(
-            sender=config.name,
-            incarnation=config.incarnation,
-            seq=0,
-            t=0.0,
-            kind=config.kind,
-            microgrid=config.microgrid,
-            P_rated=config.P_rated,
-            V_nom=config.V_nom,
-            f_nom=config.f_nom,
-            m_p=config.m_p,
-            m_q=config.m_q,
-        )
+        self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"
@@ -105,6 +121,8 @@ class Agent:
         one island to another, the island before counts too.
         """
         state = self._heard.get(name)
+        if state is not None and state.island == OFF:
+            return False
         if state is None or self._slips is not None:
             return state is not None and name not in self._apart
         return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
@@ -141,6 +159,9 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
+        if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds
+            self.let_go()
+            return self._state(measurement, measurement.P_set, measurement.V_set)
         config = self.config
         self._islands = (measurement.island, self._islands[0] or measurement.island)
         if self._slips is not None:
@@ -172,9 +193,12 @@ class Agent:
         return self._state(measurement, self._P_set, self._V_set)
 
     def stand_still(self, measurement: Measurement) -> State:
-        """What a paused agent is taken to say at this tick: what the plant holds, from which it begins again."""
+        """What an agent that is paused, or measures nothing, says at this tick: only that it is there.
+
+        When it goes on it begins from what the plant holds.
+        """
         self.let_go()
-        return self._state(measurement, measurement.P_set, measurement.V_set)
+        return replace(self._state(measurement, measurement.P_set, measurement.V_set), Q=0.0, island="", idle=True)
 
     def _state(self, measurement: Measurement, P_set: float, V_set: float) -> State:
         return State(
@@ -185,7 +209,7 @@ class Agent:
             P_set=P_set,
             V_set=V_set,
             Q=measurement.Q,
-            island=measurement.island if self._is_told_islands else "",
+            island=measurement.island if self._is_told_islands or measurement.island == OFF else "",
             angle=None if self._slips is None else self._slips.angle,
         )
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import inf
 
-from agents.agent import Agent
+from agents.agent import Agent, check_nameplate
 from agents.config import AgentConfig
-from wire.codec import RejectedError, decode, encode
+from wire.codec import RejectedError, encode
 from wire.endpoint import Endpoint, Route
 from wire.keys import epoch_of
 from wire.links import Links
@@ -33,6 +33,7 @@ class Side(Endpoint):
 
     def __init__(self, config: AgentConfig, instance: str, links: Links | None, rate: float = inf) -> None:
         super().__init__(config.name, config.run, rate)
+        check_nameplate(config)
         self.stopped = ""
         """Why it closes; empty as long as it goes on."""
         self.failed = ""
@@ -41,10 +42,6 @@ class Side(Endpoint):
         """Whether the plant's token was ever there."""
         self._config, self._name, self._instance = config, config.name, instance
         self._agent = Agent(config)
-        try:
-            decode(encode(self._agent.nameplate))
-        except RejectedError as rejected:
-            raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
         self._links = links
         self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
         self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)

@@ -79,7 +79,7 @@ def main() -> None:
     parser.add_argument("--every", type=float, default=5.0, help="time (s) between two looks")
     parser.add_argument("--skip", type=float, default=0.3, help="part of the time that is left out")
     parser.add_argument(
-        "--link", nargs="*", default=[], help='words for "gridpeers link", e.g. set "* -> inv1" --loss 0.1'
+        "--link", nargs=argparse.REMAINDER, help='last: words for gridpeers link, e.g. set "* -> inv1" --loss 0.1'
     )
     arguments = parser.parse_args()
     command = [sys.executable, "-P", "-c", "from scenarios.cli import main; main()"]
@@ -90,7 +90,9 @@ def main() -> None:
             up = subprocess.Popen([*command, *words, "--out", f"{folder}/here"], stdout=log, stderr=log)
             try:
                 history = Path(folder) / "here"
-                while up.poll() is None and not list(history.glob("*/history.partial.csv")):
+                while up.poll() is None and not any(
+                    file.stat().st_size for file in history.glob("*/history.partial.csv")
+                ):
                     sleep(0.2)
                 if arguments.link:
                     subprocess.run([*command, "link", *arguments.link, "--run", run, "--connect", endpoint], check=True)

@@ -8,9 +8,10 @@ from hashlib import sha256
 
 import msgspec
 
-from netem.channel import Fate
+from netem.channel import DROPPED, Fate
+from wire.messages import Count, Label, Name, Time
 
-Outcome = float | str | tuple[tuple[float, int | None], ...]
+Outcome = float | str | tuple[tuple[float, Count | None], ...]
 """Delay (s) of one sound copy; or why it was dropped; or delay and flipped bit of each copy."""
 
 
@@ -20,32 +21,39 @@ class LinkTrace(msgspec.Struct, frozen=True, array_like=True):
     A message that was judged anew, because the cut that kept it was healed early, has a second row, which counts.
     """
 
-    src: str
+    src: Name
     """Who sent."""
-    dst: str
+    dst: Name
     """Who received."""
-    seq: tuple[int, ...]
+    seq: tuple[Count, ...]
     """Numbers of the messages."""
-    t: tuple[float, ...]
+    t: tuple[Time, ...]
     """When each was sent (s of run time)."""
     outcome: tuple[Outcome, ...]
     """What became of each."""
+
+    def __post_init__(self) -> None:
+        if not len(self.seq) == len(self.t) == len(self.outcome):
+            raise ValueError(f"{len(self.seq)} numbers, {len(self.t)} times, {len(self.outcome)} outcomes")
+        # not by the type: msgspec 0.22 corrupts memory over a union of a text with a pattern, a number and a tuple
+        if not {outcome for outcome in self.outcome if isinstance(outcome, str)} <= DROPPED.keys():
+            raise ValueError("a message was dropped for no reason that there is")
 
 
 class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
     """How many messages of one link fared how: sent + duplicated = delivered + dropped + in_flight."""
 
-    sent: int
+    sent: Count
     """Messages that were judged here."""
-    duplicated: int
+    duplicated: Count
     """Copies made of them."""
-    delivered: int
+    delivered: Count
     """Handed to the receiver, copies included."""
-    dropped: dict[str, int]
+    dropped: dict[Label, Count]
     """Not delivered, by reason."""
-    corrupted: int
+    corrupted: Count
     """Arrived with a flipped bit; delivered, or dropped by "checksum"."""
-    in_flight: int
+    in_flight: Count
     """Not arrived yet."""
 
     @property

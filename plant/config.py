@@ -116,6 +116,33 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Upper bound of V_set (pu)."""
 
 
+class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Synchronism check of a switch that is to join two live islands: the largest differences across it."""
+
+    angle: float = 0.0
+    """Of the angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE 1547-2018,
+    Table 5)."""
+    f: float = 0.0
+    """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1, likewise."""
+    V: float = 0.0
+    """Of the voltage (pu of nominal); 0: 0.10, 0.05 or 0.03, likewise."""
+    timeout: float = 10.0
+    """How long (s) a switch of the schedule waits for synchronism before it gives up."""
+
+
+class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """When inverters trip by voltage or frequency, and when they enter service again: IEEE 1547-2018."""
+
+    category: Literal["II", "III", "off"] = "III"
+    """Abnormal operating performance category whose default trip settings hold; "off": no inverter trips."""
+    trips: dict[str, tuple[float, float]] = {}
+    """Settings in place of the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
+    pu or in Hz at 60 Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }."""
+    enter_service: float = 5.0
+    """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz) must be normal before an inverter that
+    tripped comes back. The standard's default is 300 s, longer than a run."""
+
+
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A switch operated at a time of the scenario."""
 
@@ -124,6 +151,8 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     switch: str
     """Name, e.g. "13-152" or "sw1_2"."""
     action: Literal["open", "close"]
+    synchronised: bool = False
+    """Whether to wait, where it would join two live islands, until they are in step within the synchronism check."""
 
 
 class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -162,8 +191,10 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """First V_set of every inverter (pu of its nominal voltage)."""
     gfm: GfmParameters = GfmParameters()
     gfl: GflParameters = GflParameters()
+    protection: Protection = Protection()
     events: tuple[SwitchEvent, ...] = ()
     """Switches operated on schedule."""
+    sync_check: SyncCheck = SyncCheck()
     limits: tuple[PowerLimit, ...] = ()
     """Available power that changes on schedule."""
     spares: tuple[str, ...] = ()

@@ -65,8 +65,10 @@ class PlantLike(Protocol):
 class LivePlant(PlantLike, Protocol):
     """What wall-clock time needs of a plant on top: switches operated by hand."""
 
-    def switch(self, name: str, action: str) -> bool:
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown.
+
+        One that is to close synchronised and is not in step is a ValueError, too, that says how far off it is.
 
         Tells whether it stood so already.
         """

@@ -6,7 +6,7 @@ import gc
 import logging
 import sys
 from collections.abc import Callable
-from time import time_ns
+from time import monotonic, time_ns
 
 from msgspec.structs import replace
 
@@ -14,7 +14,7 @@ from plant.config import PlantConfig
 from plant.freerun import FreePlant
 from plant.interface import LivePlant
 from plant.lockstep import PlantSide
-from wire.driver.drive import StoppedError, drive, perform
+from wire.driver.drive import StoppedError, drive, perform, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
 from wire.driver.session import Session
 from wire.messages import PLANT
@@ -85,6 +85,10 @@ def run_plant(
             side.interrupt(f"the plant was asked to leave: {stop}", 0.0)
             perform(side.take_actions(), session, log)
             raise
+        except Exception as error:  # whatever it is: agents that are told close at once, else they seek a plant
+            side.cause = error
+            side.abort(f"plant at t = {side.t:g} s: {type(error).__name__}: {error}", monotonic())
+            serve(side, session, log)
     finally:
         session.close()
     if side.cause is not None:

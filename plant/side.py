@@ -50,7 +50,7 @@ class Side(Endpoint):
                 raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
         self.outcome = ""
         """Why the run broke; empty while it goes well."""
-        self.cause: RuntimeError | None = None
+        self.cause: Exception | None = None
         """What the plant raised, if that broke the run."""
         self.tick = 0
         """k: the plant stands at k T_c."""

@@ -36,7 +36,7 @@ def field_docs(cls: type[msgspec.Struct]) -> tuple[FieldDoc, ...]:
     --------
     >>> from plant.config import SwitchEvent
     >>> [doc.name for doc in field_docs(SwitchEvent)]
-    ['t', 'switch', 'action']
+    ['t', 'switch', 'action', 'synchronised']
     >>> field_docs(SwitchEvent)[0].text
     'Time (s), a multiple of h.'
     """

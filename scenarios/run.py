@@ -112,7 +112,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     links_sha256: dict[str, str] = {}
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
-        links = LinkRecord()
+        links = LinkRecord(folder / case)
         plant, agents = _configs(request, case)
         recorded[case], outcome = _run_case(request, case, plant, agents, progress, links)
         checked = _checked_links(plant.links, links, folder / case)

@@ -9,6 +9,7 @@ not is a `RejectedError` of one of the kinds in `KINDS`: receivers count it and 
 from __future__ import annotations
 
 import re
+import traceback
 from collections import Counter
 from math import isfinite
 from typing import Any
@@ -130,7 +131,7 @@ class Rejects:
         self._who = who
         self._lines: list[str] = []
 
-    def add(self, kind: str, key: str, text: str, traceback: str = "") -> None:
+    def add(self, kind: str, key: str, text: str, trace: str = "") -> None:
         """Count one; the first of its kind is worth a line, and the traceback of an error of ours."""
         assert kind in KINDS
         if not self.counts[kind]:
@@ -138,8 +139,12 @@ class Rejects:
                 f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {printable(text, 200)}. "
                 "More of this kind are only counted. See docs/protocol.md"
             )
-            self._lines.append("\n".join([line, *(printable(row, 200) for row in traceback.splitlines()[-TRACED:])]))
+            self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-TRACED:])]))
         self.counts[kind] += 1
+
+    def failed(self, key: str, error: Exception) -> None:
+        """Count a message on which an error of ours came up, which is being handled now."""
+        self.add("failed", key, f"{type(error).__name__}: {error}", traceback.format_exc())
 
     @property
     def has_lines(self) -> bool:

@@ -7,7 +7,6 @@ alone.
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 from math import inf
 from typing import Any, NamedTuple
@@ -86,7 +85,7 @@ class Endpoint:
             self.rejects.add(rejected.kind, key, rejected.text)
         except Exception as error:
             # The last line of defence: an error of ours, which some message has found, is that message's end alone.
-            self.rejects.add("failed", key, f"{type(error).__name__}: {error}", traceback.format_exc())
+            self.rejects.failed(key, error)
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
         """Make sure that a message is of whom its key says, and of the one that lives."""

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from wire.admission import Admission
 from wire.codec import RejectedError, Rejects, decode
-from wire.messages import AnyMessage
+from wire.messages import AnyMessage, Measurement, State
 
 
 class Arrival(Protocol):
@@ -123,6 +123,23 @@ def is_taken(links: Links | None, message: AnyMessage, payload: bytes, at: float
     if links is None or message.sender in links.clear:
         return False
     return links.offer(message.sender, message.seq, message.t, at, payload)
+
+
+def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
+    """Whether a message off the wire is of use at once; if not, it may come out of `arrived` later, or never.
+
+    What an agent that stands still says is for the lock-step alone: no link carries it, nobody uses it.
+
+    Parameters
+    ----------
+    links, message, payload, at
+        See `is_taken`.
+    who : Admission
+        Who speaks.
+    """
+    if isinstance(message, State) and message.idle:
+        return False
+    return not is_taken(links, message, payload, at) and who.passes(message)
 
 
 def arrived(links: Links | None, now: float, rejects: Rejects, admission: Admission) -> Iterator[AnyMessage]:

@@ -19,6 +19,9 @@ import msgspec
 PLANT = "plant"
 """Name under which the plant process sends."""
 
+OFF = "off"
+"""In place of an island's name: the inverter is off the network, or in an island that nothing feeds."""
+
 LIMIT = 64_000
 """Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
 
@@ -145,7 +148,7 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
     island: NameOrNone
-    """Name of the island: "grid", or the first inverter in it."""
+    """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
     roster: Names
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 
@@ -176,6 +179,9 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     Empty if it is not known."""
     angle: Angle | None = None
     """Where the inverter's angle stood at that measurement; sent only where islands are told apart by it."""
+    idle: bool = False
+    """Whether the agent stands still: paused, or without a measurement. In wall-clock time it then says nothing; in
+    simulated time the tick waits for this state, which nobody uses."""
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -256,9 +262,10 @@ class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A person wants something of the plant (command line -> plant, wall-clock time)."""
 
-    verb: Literal["open", "close", "stop", "down", "status", "link", "links", "telemetry"]
-    """Open or close a switch; have an agent leave; end the run; tell how it stands; order emulated links to do
-    something; ask all of them how they stand; publish telemetry again that a recorder has not got."""
+    verb: Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links", "telemetry"]
+    """Open or close a switch; close it if its sides are in step; have an agent leave; end the run; tell how it stands;
+    order emulated links to do something; ask all of them how they stand; publish telemetry again that a recorder has
+    not got."""
     argument: Text = ""
     """Name of the switch or of the agent; the order; number of the first Telemetry wanted; empty for the others."""
     reply_to: Name
@@ -297,7 +304,8 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     rejected: Count
     """Messages dropped since its start."""
     lost: Count
-    """Messages that never came, by gaps in the numbers of who sent them, since its start."""
+    """Messages that never came for use, since its start: by gaps in the numbers of who sent them, and by what emulated
+    links dropped; not what a cut still keeps."""
     ticks: Count
     """Ticks done since its start."""
     missed: Count

@@ -34,7 +34,7 @@ from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
 from wire.codec import encode
 from wire.endpoint import Route
-from wire.links import Links, arrived, is_taken
+from wire.links import Links, arrived, is_usable
 from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
 from wire.timer import Timer
 
@@ -313,7 +313,7 @@ class FreeAgent(Side):
 
     def _use(self, message: State | Measurement, payload: bytes, now: float) -> None:
         """Use a message, unless an emulated link takes it, and perhaps lets it through later."""
-        if not is_taken(self._links, message, payload, now * self._config.speed) and self.admission.passes(message):
+        if is_usable(self._links, message, payload, now * self._config.speed, self.admission):
             self._keep(message, now)
 
     def _take_arrived(self, now: float) -> None:

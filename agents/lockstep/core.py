@@ -35,7 +35,7 @@ from wire.actions import Fetch, Listen
 from wire.clock import time_of
 from wire.codec import RejectedError, encode
 from wire.endpoint import Route
-from wire.links import Links, arrived, is_taken
+from wire.links import Links, arrived, is_usable
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.patience import Awaited, Patience
 
@@ -212,7 +212,7 @@ class AgentSide(Side):
         if not self._introductions.ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         self._turn.grant(message)
-        if not is_taken(self._links, message, payload, message.t) and self.admission.passes(message):
+        if is_usable(self._links, message, payload, message.t, self.admission):
             self._sensed = message
         self._patience.renew(now)
         self._compute(now)
@@ -223,7 +223,7 @@ class AgentSide(Side):
             self._compute(now)
 
     def _hear(self, state: State, payload: bytes) -> None:
-        if not is_taken(self._links, state, payload, state.t) and self.admission.passes(state):
+        if is_usable(self._links, state, payload, state.t, self.admission):
             self._agent.hear(state)
 
     def _take_arrived(self, t: float) -> None:
@@ -245,12 +245,11 @@ class AgentSide(Side):
             return
         neighbours = tuple(name for name in self._neighbours if name in measurement.roster)
         self._take_arrived(measurement.t)
-        sensed = self._sensed or measurement  # the first one is how the agent is set up, and always there
-        if sensed is not measurement:
-            sensed = replace(sensed, seq=measurement.seq, t=measurement.t)
-        stalled = self._links is not None and self._links.stalled(measurement.t)
-        # A paused agent's state is for the lock-step alone: no link lets it through.
-        state = self._agent.stand_still(measurement) if stalled else self._agent.tick(sensed, neighbours)
+        if self._sensed is None or (self._links is not None and self._links.stalled(measurement.t)):
+            state = self._agent.stand_still(measurement)
+        else:
+            sensed = replace(self._sensed, seq=measurement.seq, t=measurement.t)
+            state = self._agent.tick(sensed, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)
         if (measurement.seq + 1) % REPORT_TICKS == 0:

@@ -52,7 +52,8 @@ class LiveNetwork:
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self.V_branch = circuit.V_branch.astype(complex)
-        self._source_voltage = self.reduction.circuit.source_voltage
+        self.source_voltage = self.reduction.circuit.source_voltage
+        """Phasors of the ideal sources that are connected (V)."""
 
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once: called ahead of a scheduled event, it takes the work out of the event's step."""
@@ -75,7 +76,7 @@ class LiveNetwork:
         self.V_branch[dead] = 0.0
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
-        self._source_voltage = self.reduction.circuit.source_voltage
+        self.source_voltage = self.reduction.circuit.source_voltage
 
     def guess(self) -> None:
         """Start the next solution from the last voltages, or from nominal ones where there was hardly any."""
@@ -95,7 +96,7 @@ class LiveNetwork:
         still = np.ones(self.reduction.count, complex)
         scale = float(units.V_b.max())
         for attempt in range(4):
-            self.net = self.reduction.linearise(V_b, self._source_voltage, theta)
+            self.net = self.reduction.linearise(V_b, self.source_voltage, theta)
             m = V_b.size
             x = np.concatenate([V_b.real, V_b.imag])
             I_b, work = np.empty(m, complex), np.empty(12 * len(units) + 6 * m)
@@ -107,7 +108,7 @@ class LiveNetwork:
         else:
             units.V[:] = V
             V_b = self._solve_islands(self.V_branch[branches])
-            units.V[:] = self.reduction.terminal_voltages(units.J, V_b, self._source_voltage)
+            units.V[:] = self.reduction.terminal_voltages(units.J, V_b, self.source_voltage)
         self._linearise(V_b)
         self.V_branch[branches] = V_b
 
@@ -123,7 +124,7 @@ class LiveNetwork:
 
     def set_source(self, source_voltage: Complex) -> None:
         """Move the ideal sources to other phasors (V), topology unchanged."""
-        self._source_voltage = source_voltage
+        self.source_voltage = source_voltage
         self._linearise(self._branch_voltages())
 
     def note(self) -> None:
@@ -133,13 +134,13 @@ class LiveNetwork:
 
     def _solve_islands(self, guess: Complex) -> Complex:
         """Voltages of the live branches (V) from a guess, or NoSolutionError."""
-        V_b, failed = solve_islands(self.reduction, self._inverters.J, self._source_voltage, guess)
+        V_b, failed = solve_islands(self.reduction, self._inverters.J, self.source_voltage, guess)
         if failed:
             raise NoSolutionError(failed)
         return V_b
 
     def _linearise(self, V_b: Complex) -> None:
-        self.net = self.reduction.linearise(V_b, self._source_voltage, self._inverters.theta())
+        self.net = self.reduction.linearise(V_b, self.source_voltage, self._inverters.theta())
         self.x = np.concatenate([V_b.real, V_b.imag])
 
     def _branch_voltages(self) -> Complex:

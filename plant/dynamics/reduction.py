@@ -174,10 +174,17 @@ class Reduction:
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
         """Terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
-        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
-        I_b = np.conj(S / V_b) + I0 * V_b / np.abs(V_b)
-        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ I_b
+        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ self._branch_currents(V_b)
         return V_G.reshape(3, -1).T
+
+    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Voltage of every node (V) from the same; 0 in dead islands."""
+        return self.all_voltages(J, self._branch_currents(V_b), source_voltage)
+
+    def _branch_currents(self, V_b: Complex) -> Complex:
+        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
+        I_b: Complex = np.conj(S / V_b) + I0 * V_b / np.abs(V_b)
+        return I_b
 
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
         """What the ideal sources alone give at the branches and at the terminals (V)."""

@@ -11,6 +11,7 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
+from plant.dynamics.kernel.gfl import F_NOM
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
@@ -81,8 +82,12 @@ class Dynamics:
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
-        """Connect an inverter or take it off; see `plant.dynamics.switching.switch_inverter`."""
-        self._trips += switching.switch_inverter(self.inverters, self.network, i, on)
+        """Connect an inverter or take it off; see `switch_inverters`."""
+        self.switch_inverters((i,), on)
+
+    def switch_inverters(self, which: Sequence[int], on: bool) -> None:
+        """Connect inverters or take them off, all at once; see `plant.dynamics.switching.switch_inverters`."""
+        self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
         """Take all that feeds these islands off the network; see `plant.dynamics.switching.deenergise`."""
@@ -94,7 +99,7 @@ class Dynamics:
         return trips
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; returns steps x n_inv x (f in Hz, P in W, Q in var, V in V), all finite.
+        """Advance by `steps` steps; returns steps x n_inv x `kernel.step.READING`, all finite.
 
         Where the frozen tangent does not lead to a solution it is renewed, as often as need be. An island that has
         none is de-energised before the step, which the others then take. With 0 steps the inner loop is only compiled
@@ -156,6 +161,25 @@ class Dynamics:
         """Go back to the start of the step that failed."""
         units = self.inverters
         units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
+
+    def voltages(self) -> Complex:
+        """Present voltages of the circuit's nodes (V), 0 in dead islands and at nodes without any admittance."""
+        network = self.network
+        return network.reduction.node_voltages(
+            self.inverters.J, network.V_branch[network.reduction.branches], network.source_voltage
+        )
+
+    def frequency(self, island: int) -> float:
+        """Frequency (Hz) of an island: nominal at a source, else the mean over its GFM by rating; 0 if it is dead."""
+        units, reduction = self.inverters, self.network.reduction
+        if reduction.has_source[island]:
+            return F_NOM
+        at = units.gfm_at
+        here = reduction.online[at] & (reduction.inverter_island[at] == island)
+        if not here.any():
+            return 0.0
+        speed = np.average(units.gfm_state["w"][here], weights=units.S_b[at][here])
+        return F_NOM + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
         """Present f (Hz), P (W), Q (var), V (V) from the last solution, n_inv x 4, before any step was taken."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -92,26 +92,33 @@ def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: 
 
 
 def switch_inverter(units: Inverters, network: LiveNetwork, i: int, on: bool) -> list[Trip]:
-    """Take an inverter off the network, or put it back at zero current, in step with the voltage there.
+    """Take an inverter off the network or put it back; see `switch_inverters`."""
+    return switch_inverters(units, network, (i,), on)
 
-    Back, its set-points are those at which it rests there: V_set the terminal's voltage, and the P_set whose
+
+def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int], on: bool) -> list[Trip]:
+    """Take inverters off the network all at once, or put them back at zero current, in step with the voltage there.
+
+    Back, the set-points of each are those at which it rests there: V_set the terminal's voltage, and the P_set whose
     droop gives no power at the island's frequency. What comes next is a matter of control alone.
-    Returns what had to be tripped because its island has no solution without it, or with it.
+    Returns what had to be tripped because its island has no solution without them, or with them.
     """
-    if on == bool(units.connected[i]):
+    moved = [i for i in which if on != bool(units.connected[i])]
+    if not moved:
         return []
-    w = _island_speed(units, network, i)
-    units.connected[i] = on
-    if on:
+    speed = {i: _island_speed(units, network, i) for i in moved}
+    units.connected[moved] = on
+    for i in moved if on else ():
         v = _mean_voltage(units, i)
-        units.set_points[i] = w / (units.m_p[i] * OMEGA_0), v if v > 0.1 else 1.0, 0.0
+        units.set_points[i] = speed[i] / (units.m_p[i] * OMEGA_0), v if v > 0.1 else 1.0, 0.0
     trips = connect(units, network, network.circuit)
-    if on and units.forming[i]:
-        units.gfm_state["w"][units.gfm_at == i] = w
-    elif on:  # its PLL has found the island's frequency before the contactor closes
-        follower = units.gfl_at == i
-        units.gfl_state["w_i"][follower] = w
-        units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = gfl_model.F_NOM + w / (2.0 * np.pi)
+    for i, w in speed.items() if on else ():
+        if units.forming[i]:
+            units.gfm_state["w"][units.gfm_at == i] = w
+        else:  # its PLL has found the island's frequency before the contactor closes
+            follower = units.gfl_at == i
+            units.gfl_state["w_i"][follower] = w
+            units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = gfl_model.F_NOM + w / (2.0 * np.pi)
     return trips
 
 

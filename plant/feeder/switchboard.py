@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 from plant.config import SwitchEvent
 from plant.network import Network
 from wire.messages import PlantEvent
 
 _PAST = {"open": "opened", "close": "closed"}
+
+
+class Operation(NamedTuple):
+    """A switch to be operated."""
+
+    switch: str
+    """Its name."""
+    action: str
+    """What to do: "open" or "close"."""
+    synchronised: bool = False
+    """Whether to close only in step."""
 
 
 class Switchboard:
@@ -37,16 +50,16 @@ class Switchboard:
     def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
         self._network, self._h = network, h
         self.closed = network.closed0
-        self._at: dict[int, list[tuple[str, str]]] = {}
+        self._at: dict[int, list[Operation]] = {}
         for event in events:
-            self.put(round(event.t / h), event.switch, event.action)
+            self.put(round(event.t / h), event.switch, event.action, synchronised=event.synchronised)
 
     @property
     def steps(self) -> Collection[int]:
         """Steps at which switches are or were operated."""
         return self._at.keys()
 
-    def put(self, step: int, name: str, action: str) -> None:
+    def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
         """Have a switch operated at a step ("open" or "close"), by its name or alias.
 
         Raises
@@ -55,28 +68,43 @@ class Switchboard:
             If there is no such switch; the message lists those there are.
         """
         known = self._network.switch_name(name)  # before anything is noted of the step
-        self._at.setdefault(step, []).append((known, action))
+        self._at.setdefault(step, []).append(Operation(known, action, synchronised))
+
+    def due(self, step: int) -> tuple[Operation, ...]:
+        """Operations of a step."""
+        return tuple(self._at.get(step, ()))
+
+    def drop(self, step: int, operation: Operation) -> None:
+        """Leave out an operation of a step; what stands there else is operated all the same."""
+        self._at[step].remove(operation)
+
+    def shown(self, name: str) -> str:
+        """Name of a switch as people are told it, with its alias."""
+        alias = self._network.switches[name].alias
+        return f"{alias} ({name})" if alias else name
 
     def foreseen(self) -> Iterator[frozenset[str]]:
         """Switches that will be closed after each step with operations, in order of time, those now past included."""
         closed = self.closed
         for step in sorted(self._at):
-            for name, action in self._at[step]:
-                closed = _operated(closed, name, action)
+            for operation in self._at[step]:
+                closed = _operated(closed, operation.switch, operation.action)
             yield closed
 
-    def operate(self, step: int) -> list[PlantEvent]:
-        """Operate the switches of a step, all at once; tells of each what was done."""
+    def operate(self, step: int, notes: Mapping[str, str] = MappingProxyType({})) -> list[PlantEvent]:
+        """Operate the switches of a step, all at once; tells of each what was done, and what is noted of it."""
         t = round(step * self._h, 9)
         events = []
-        for name, action in self._at[step]:
+        for name, action, _ in self._at[step]:
             known = name in self.closed
             self.closed = _operated(self.closed, name, action)
-            alias = self._network.switches[name].alias
-            shown = f"{alias} ({name})" if alias else name
             already = known == (action == "close")
             what = f"was {'closed' if known else 'open'} already" if already else _PAST[action]
-            events.append(PlantEvent(t=t, kind="switch", subject=name, text=f"switch {shown} {what}"))
+            events.append(
+                PlantEvent(
+                    t=t, kind="switch", subject=name, text=f"switch {self.shown(name)} {what}{notes.get(name, '')}"
+                )
+            )
         return events
 
 

@@ -33,7 +33,7 @@ from wire.actions import Say
 from wire.clock import time_of
 from wire.codec import encode
 from wire.endpoint import ANYBODY, Route
-from wire.links import Links, is_taken
+from wire.links import Links, is_usable
 from wire.messages import (
     PLANT,
     AgentStatus,
@@ -64,6 +64,9 @@ AGAIN = 1.0
 WAITING = 0.5
 """Time (s, wall) between two words of a plant that waits for agents to those that are there."""
 
+REFUSALS = 20
+"""Refused processes that are told of in the log: anybody may hold tokens."""
+
 FASTER = 2.0
 """So many times as often as itself the plant believes agents to send at most."""
 
@@ -92,6 +95,7 @@ class FreePlant(Side):
         self.plant = plant
         self.pacer = Pacer(config.T_c / config.speed, 0.0)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
+        self._refusals = 0
         self._asked: dict[str, float] = {}
         """When each was last asked for its nameplate."""
         self._heard = Heard()
@@ -164,6 +168,7 @@ class FreePlant(Side):
             self.outcome = reason
             self._report(final=True)
             self.phase = "over"
+            self._publish_again(self.kept.take_all())
 
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
@@ -172,6 +177,7 @@ class FreePlant(Side):
         self._say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
+        self._publish_again(self.kept.take_all())
         self._deadline = now + CLOSING
         if self._all_have_gone():
             self.phase = "over"
@@ -190,7 +196,9 @@ class FreePlant(Side):
                 self._gather(now)
             case ("alive", "agent", name, instance):
                 self._tokens.add(key)
-                if name not in self.plant.inverters:
+                if self.phase == "closing":  # it was not there, or not heard, when the others were told
+                    self.stop(self.keys.dismissal(name, instance), self.outcome or "the run has ended")
+                elif name not in self.plant.inverters:
                     inverters = ", ".join(self.plant.inverters)
                     self._refuse(name, instance, f"{name}: no inverter of this name; inverters are {inverters}")
                 elif self.instances.get(name, instance) != instance:
@@ -211,7 +219,10 @@ class FreePlant(Side):
                 self._ask(name, now)
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
-        self._say(f"refused {reason}")
+        self._refusals += 1
+        if self._refusals <= REFUSALS:
+            more = "" if self._refusals < REFUSALS else "; whoever else is refused is not told of"
+            self._say(f"refused {reason}{more}")
         self.stop(self.keys.dismissal(name, instance), reason, refused=True)
 
     def vanished(self, key: str, now: float) -> None:
@@ -244,11 +255,12 @@ class FreePlant(Side):
         self.admission.take(state)
         self._heard.came(state.sender, now)
         self._silence.heard(state.sender, self.tick)
-        if not is_taken(self._links, state, payload, now * self.config.speed) and self.admission.passes(state):
+        if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
             self._heard.keep(state)
 
     def _on_status(self, status: AgentStatus, payload: bytes, now: float) -> None:
-        if self.admission.lives(status):  # one comes before its nameplate now and then
+        if status.sender in self.plates:  # one comes before its nameplate now and then
+            self.admission.check(status)
             self._silence.reported(status, self.tick)
 
     def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:

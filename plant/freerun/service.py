@@ -63,6 +63,9 @@ class Service:
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
             side.stop(side.keys.dismissal(argument, instance), "stopped by command")
             return f"{argument} was asked to leave at t = {side.t:.2f} s"
+        if verb == "synchronise":
+            side.plant.switch(argument, "close", synchronised=True)
+            return f"switch {argument}: close in step at t = {side.t:.2f} s"
         if side.plant.switch(argument, verb):
             return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already at t = {side.t:.2f} s"
         return f"switch {argument}: {verb} at t = {side.t:.2f} s"

@@ -25,7 +25,7 @@ from plant.reporting import measurement_of
 from plant.side import CLOSING, LINK_TICKS, Side
 from wire.codec import encode
 from wire.endpoint import Route
-from wire.links import Links, is_taken
+from wire.links import Links, is_usable
 from wire.messages import AnyMessage, LinkReport, Nameplate, PlantEvent, Ready, State
 from wire.patience import Awaited
 
@@ -160,7 +160,7 @@ class PlantSide(Side):
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         self._waiting.state(state, self.tick)
-        if not is_taken(self._links, state, payload, state.t) and self.admission.passes(state):
+        if is_usable(self._links, state, payload, state.t, self.admission):
             self._states[state.sender] = state
 
     def _on_ready(self, ready: Ready, payload: bytes, now: float) -> None:

@@ -97,6 +97,10 @@ class Network:
         """Position of a node in all vectors; KeyError if there is none."""
         return self._index[bus, phase]
 
+    def has(self, bus: str, phases: str) -> bool:
+        """Whether a bus has these phases."""
+        return all((bus, phase) in self._index for phase in phases)
+
     def switch_name(self, text: str) -> str:
         """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`.
 

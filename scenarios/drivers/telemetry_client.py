@@ -6,11 +6,12 @@ from time import monotonic
 from typing import NamedTuple
 
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
+from wire.admission import Admission
 from wire.codec import RejectedError, Rejects, decode, encode
 from wire.driver.inbox import Inbox
 from wire.driver.session import Clock, Session
 from wire.keys import Keys
-from wire.messages import Answer, Command
+from wire.messages import PLANT, Answer, AnyMessage, Command, LinkReport
 
 LOOK = 0.5
 """Longest wait (s) before it is looked whether something is missing."""
@@ -45,6 +46,7 @@ class TelemetryClient:
         self._stream = TelemetryStream() if clock == "wall" else None
         self._questions = 0
         self._closed = False
+        self._admission = Admission()
         self.rejects = Rejects(name)
         """What was dropped."""
         self.inbox = Inbox()
@@ -77,6 +79,7 @@ class TelemetryClient:
             elif kind == "message":
                 try:
                     message = decode(payload)
+                    self._identify(message)
                     if isinstance(message, Answer):
                         self._answered(message)
                     elif not isinstance(message, Recordable):
@@ -87,6 +90,8 @@ class TelemetryClient:
                         found += self._stream.take(message, monotonic())
                 except RejectedError as rejected:
                     self.rejects.add(rejected.kind, key, rejected.text)
+                except Exception as error:
+                    self.rejects.failed(key, error)
         if self._stream is not None and not self._closed:
             self._look_after(self._stream)
         return found
@@ -103,6 +108,16 @@ class TelemetryClient:
             session.subscribe(self._keys.answer(self._name))
         session.hold_token(self._keys.alive_recorder(self._name))
         return session
+
+    def _identify(self, message: AnyMessage) -> None:
+        """Make sure that a message is of the plant: the one that spoke first, as there is no other at its endpoint."""
+        if isinstance(message, LinkReport):  # the plant passes them on as they are, once it has checked them
+            return
+        if message.sender == PLANT and self._admission.epoch(PLANT) is None:
+            self._admission.bind(PLANT, message.incarnation)
+        if message.sender != PLANT:
+            raise RejectedError("foreign", f"a {type(message).__name__} of {message.sender}")
+        self._admission.check(message)
 
     def _answered(self, answer: Answer) -> None:
         if self._stream is None or answer.seq != self._questions:

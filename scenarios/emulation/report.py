@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
+from wire.messages import LinkReport, Name
 
 
 class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -12,7 +13,7 @@ class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     traces: tuple[LinkTrace, ...] = ()
     """Verdicts since the last part."""
-    counts: dict[str, LinkCounts] = {}
+    counts: dict[Name, LinkCounts] = {}
     """Of each sender how its messages have fared so far."""
     sha256: str = ""
     """Hash (hex) of all verdicts so far."""
@@ -36,8 +37,17 @@ decode_stands = msgspec.msgpack.Decoder(dict[str, LinkStand]).decode
 encode_book = msgspec.msgpack.Encoder().encode
 """Bytes of a book."""
 
-decode_book = msgspec.msgpack.Decoder(LinkBook).decode
-"""Book of the bytes; msgspec.DecodeError if it is none."""
+_decode_book = msgspec.msgpack.Decoder(LinkBook).decode
+
+
+def book_of(report: LinkReport) -> LinkBook:
+    """The part of a receiver's book that is in a report; msgspec.DecodeError if it is none, or another's."""
+    book = _decode_book(report.data)
+    strangers = {trace.dst for trace in book.traces} - {report.sender}
+    if strangers:
+        raise msgspec.ValidationError(f"{report.sender} reports of links to {', '.join(sorted(strangers))}")
+    return book
+
 
 AT_ONCE = 1000
 """Verdicts in one part: some 25 bytes each, so that a part is far below what a message may have."""

@@ -7,15 +7,16 @@ from typing import Literal
 
 import msgspec
 
+from agents.agent import check_nameplate
 from agents.config import AgentConfig
 from agents.freerun.hearing import Hearing
 from scenarios.live.show.look import Look, in_order
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
-from wire.codec import RejectedError, decode, encode
+from wire.codec import encode
 from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
 
-Verb = Literal["open", "close", "stop", "down", "status", "link", "links"]
+Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
 ANSWER = 5.0
 """Longest wait (s) for the answer of a plant that is there."""
@@ -54,8 +55,8 @@ def ask(visit: Visit, verb: Verb, argument: str = "") -> str:
     visit.publish(visit.keys.command, encode(command))
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
-        for _, payload in visit.take(left):
-            answer = _decoded(payload)
+        for key, payload in visit.take(left):
+            answer = visit.read(key, payload)
             if isinstance(answer, Answer):
                 if not answer.ok:
                     raise RefusedError(answer.text)
@@ -144,12 +145,12 @@ class Watching:
     def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
         """Wait (s) for something to happen and note it; what was told."""
         told: list[Telemetry | AgentStatus] = []
-        for _, payload in self._visit.take(seconds):
+        for key, payload in self._visit.take(seconds):
             config = _plate(payload)
             if config is not None:
                 self._picture.plate(config)
                 continue
-            message = _decoded(payload)
+            message = self._visit.read(key, payload)
             if isinstance(message, Telemetry):
                 self._picture.telemetry(message, monotonic())
                 told.append(message)
@@ -187,16 +188,11 @@ def _plate(payload: bytes) -> AgentConfig | None:
     if not payload.startswith(b"{"):
         return None
     try:
-        return msgspec.json.decode(payload, type=AgentConfig)
-    except msgspec.DecodeError:
+        config = msgspec.json.decode(payload, type=AgentConfig)
+        check_nameplate(config)
+    except (msgspec.DecodeError, ValueError):
         return None
-
-
-def _decoded(payload: bytes) -> object:
-    try:
-        return decode(payload)
-    except RejectedError:  # nothing depends on a visitor
-        return None
+    return config
 
 
 def has_left(visit: Visit, name: str) -> bool:

@@ -55,7 +55,7 @@ class Book:
     ) -> None:
         self._scenario, self._feeder, self._setup = scenario, feeder, Setup.of_text(links)
         self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
-        self._record = LinkRecord()
+        self._record = LinkRecord(folder)
         self._orders: dict[int, Change] = {}
 
     @property

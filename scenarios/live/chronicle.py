@@ -130,7 +130,10 @@ class Chronicle:
             for item in self._client.take(None):
                 if isinstance(item, Word):
                     return
-                self._take(item)
+                try:
+                    self._take(item)
+                except Exception as error:  # whatever else is wrong with it is that message's end alone
+                    self._client.rejects.failed("telemetry", error)
         self._client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
     def _take(self, message: Telemetry | LinkReport | LinkOrder) -> None:

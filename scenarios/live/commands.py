@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -187,22 +187,28 @@ def stop(
 def event(
     action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
     switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
+    synchronised: Annotated[
+        bool, typer.Option("--synchronised", help="Close only if both sides are in step (IEEE 1547, Table 5).")
+    ] = False,
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
 ) -> None:
     """Open or close a switch of a running plant.
 
-    Exit code: 0 it was done, 2 there is no such switch.
+    Exit code: 0 it was done, 2 there is no such switch, or its sides are not in step.
 
-    Example:  gridpeers event open sw1_2
+    Example:  gridpeers event close 13-152 --synchronised
     """
     if action not in ("open", "close"):
         fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
+    if synchronised and action == "open":
+        fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
     with visit_to(run, connect, wait) as visit:
         from scenarios.live.asking import ask
 
-        typer.echo(ask(visit, "open" if action == "open" else "close", switch))
+        closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
+        typer.echo(ask(visit, "open" if action == "open" else closing, switch))
 
 
 def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:

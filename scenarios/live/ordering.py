@@ -16,7 +16,7 @@ from scenarios.emulation.setup import Setup
 from scenarios.live.asking import ANSWER, RefusedError, Verb, configurations
 from scenarios.live.place import UsageError
 from scenarios.live.visit import NobodyError, Visit
-from wire.codec import RejectedError, decode, encode
+from wire.codec import encode
 from wire.messages import PLANT, Answer, Command, LinkAnswer
 
 ACKNOWLEDGED = 4.0
@@ -101,7 +101,10 @@ def stands(visit: Visit) -> tuple[float, dict[tuple[str, str], LinkStand], tuple
     found: dict[tuple[str, str], LinkStand] = {}
     for name, answer in answers.items():
         if answer.ok:
-            of_sender: dict[str, LinkStand] = decode_stands(answer.data)
+            try:
+                of_sender: dict[str, LinkStand] = decode_stands(answer.data)
+            except msgspec.DecodeError:  # as good as no answer
+                continue
             found |= {(src, name): stand for src, stand in of_sender.items()}
     return taken.t, found, tuple(name for name in taken.asked if name not in answers)
 
@@ -114,11 +117,8 @@ def _ask(visit: Visit, verb: Verb, argument: str) -> tuple[_Taken, dict[str, Lin
     answers: dict[str, LinkAnswer] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
-        for _, payload in visit.take(left):
-            try:
-                message = decode(payload)
-            except RejectedError:
-                continue
+        for key, payload in visit.take(left):
+            message = visit.read(key, payload)
             if isinstance(message, LinkAnswer):
                 answers[message.sender] = message
             elif isinstance(message, Answer):

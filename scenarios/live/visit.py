@@ -7,8 +7,10 @@ from time import monotonic
 from types import TracebackType
 
 from scenarios.live.place import Place, UsageError, accepting
+from wire.codec import RejectedError, decode
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
+from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAnswer, Telemetry
 
 VISITOR = "visitor"
 
@@ -74,6 +76,29 @@ class Visit:
     def plant(self) -> bool:
         """Whether the plant's token is there."""
         return bool(self.epochs)
+
+    def read(self, key: str, payload: bytes) -> AnyMessage | None:
+        """Message of the bytes that came on a key, if it is one, and of whom the key says.
+
+        If that is the plant, of the one that is there. What the plant passes on from others it has checked itself.
+        """
+        try:
+            message = decode(payload)
+        except RejectedError:  # nothing depends on a visitor
+            return None
+        of_plant = message.sender == PLANT and message.incarnation in self.epochs
+        match self.keys.parts(key), message:
+            case ("status", name), AgentStatus():
+                believed = message.sender == name
+            case ("telemetry",), Telemetry():
+                believed = of_plant
+            case ("answer", _), Answer():
+                believed = of_plant
+            case ("answer", _), LinkAnswer():
+                believed = True
+            case _:
+                believed = False
+        return message if believed else None
 
     @property
     def id(self) -> str:

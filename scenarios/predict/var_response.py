@@ -4,7 +4,7 @@ r"""Voltage and vars with the plant's own lags: its answer to a step of each V_s
 late links: there what decides are a few tenths of a second that the GFM's voltage controllers and the GFL's volt-var
 take. So here the answer of q and v to V_set is the plant's own, tick by tick for 2 s, and the law
 
-.. math:: V(k) = V(k-1) - a \big(z(k) - D^{-1} A\, z(k-1-n)\big) - g b\, v(k), \quad z = m_q q
+.. math:: V(k) = V(k-1) - a \big(z(k) - D^{-1} A\, z(k-1-n)\big) - b\, v(k), \quad z = m_q q
 
 is followed from a random start; what is left after a while is its slowest mode, and its rate is told.
 """
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.law import towards
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from plant.feeder import raise_for_trip
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.loads import LoadError
 from scenarios.predict.sensitivity import STEP, plant_in_first_window
+from scenarios.predict.vars import factors
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
@@ -109,16 +109,13 @@ def var_growth(fleet: Fleet, plant: VarResponse, *, link_delay_s: float = 0.0) -
     if unknown:
         raise ValueError(f"no answer of {', '.join(unknown)}; there are {', '.join(plant.names)}")
     at = [plant.names.index(name) for name in fleet.names]
-    n, K, T, gains = fleet.n, len(plant.q), fleet.T_c, fleet.gains
+    n, K, T = fleet.n, len(plant.q), fleet.T_c
     late = max(0, math.ceil(link_delay_s / T - 1e-9) - 1)  # a state takes one period in any case
     z_of, v_of = (
         np.moveaxis(x[:, at][:, :, at] * by, 0, 1).reshape(n, K * n)
         for x, by in ((plant.q, fleet.m_q[None, :, None]), (plant.v, 1.0))
     )
-    beta = np.where(fleet.GFM, gains.beta_GFM, gains.beta_GFL)
-    a = np.array([towards(w / gains.k_q, d, T) for w, d in zip(beta.tolist(), fleet.degree.tolist(), strict=True)])
-    a = np.where(fleet.acts & (fleet.degree > 0), a, 0.0)
-    b = np.where(fleet.leads, 1.0 - math.exp(-gains.alpha * T / gains.k_q), 0.0)
+    a, b = (np.where(fleet.acts, factor, 0.0) for factor in factors(fleet))
     mean = fleet.heard / np.maximum(fleet.degree, 1.0)[:, None]
     ticks = round(FOLLOWED / T)
     V, z = np.zeros((K + ticks + 1, n)), np.zeros((K + ticks + 1, n))

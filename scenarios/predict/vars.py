@@ -1,9 +1,9 @@
 r"""Voltage and vars: the law (14), (15) on the plant's own sensitivities, without lags, with delays in ticks.
 
-With q = S V_set and v = H V_set around an operating point (droops included, all filters at rest), a_i =
-`towards`(beta_i/k_q, d_i, T_c) and b = 1 - exp(-alpha T_c/k_q) the law is
+With q = S V_set and v = H V_set around an operating point (droops included, all filters at rest) and the factors a_i,
+b_i of `agents.law.V_factors` the law is
 
-.. math:: V(k) = V(k-1) - a \big(m_q S\, V(k-1-l) - D^{-1} A\, m_q S\, V(k-2-l-n)\big) - g b H\, V(k-1-l)
+.. math:: V(k) = V(k-1) - a \big(m_q S\, V(k-1-l) - D^{-1} A\, m_q S\, V(k-2-l-n)\big) - b H\, V(k-1-l)
 
 where l is the delay of the local loop (measurement or set-point) and n that of the links: a neighbour's var is always
 one period older than the own, as it is measured at its sender's tick. The beta part is a consensus on m_q q through S;
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.law import towards
+from agents.law import V_factors
 from scenarios.predict.closed_form import settling
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.model import AT_REST
@@ -82,18 +82,24 @@ def var_delay_limit(fleet: Fleet, plant: Sensitivity, *, longest_s: float = 1.0)
     return math.inf
 
 
+def factors(fleet: Fleet) -> tuple[Floats, Floats]:
+    """Factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
+    gains, T, each = fleet.gains, fleet.T_c, zip(fleet.GFM, fleet.leads, fleet.degree.tolist(), strict=True)
+    weights = [(gains.alpha * leads, gains.beta_GFM if GFM else gains.beta_GFL, d) for GFM, leads, d in each]
+    a, b = np.array([V_factors(alpha, beta, d, k_q=gains.k_q, T=T) for alpha, beta, d in weights]).T
+    return a, b
+
+
 def _map(fleet: Fleet, plant: Sensitivity, local: int, link: int) -> Floats:
     """Map of V(k-1), V(k-2), ... of those that run the law to V(k), V(k-1), ...; of V alone as if `local` were -1."""
     unknown = [name for name in fleet.names if name not in plant.names]
     if unknown:
         raise ValueError(f"no sensitivity of {', '.join(unknown)}; there are {', '.join(plant.names)}")
     at = [plant.names.index(name) for name in fleet.names]
-    S, H, gains, T = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)], fleet.gains, fleet.T_c
-    beta = np.where(fleet.GFM, gains.beta_GFM, gains.beta_GFL)
-    a = np.array([towards(w / gains.k_q, d, T) for w, d in zip(beta.tolist(), fleet.degree.tolist(), strict=True)])
-    b = np.where(fleet.leads, 1.0 - math.exp(-gains.alpha * T / gains.k_q), 0.0)
+    S, H = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)]
+    a, b = factors(fleet)
     z = fleet.m_q[:, None] * S
-    own = a[:, None] * z * (fleet.degree > 0)[:, None] + b[:, None] * H
+    own = a[:, None] * z + b[:, None] * H
     others = a[:, None] * (fleet.heard / np.maximum(fleet.degree, 1.0)[:, None]) @ z
     free = np.ix_(fleet.acts, fleet.acts)
     n, depth = int(fleet.acts.sum()), local + link + 2

@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace, Outcome, combined
-from scenarios.emulation.report import LinkBook, decode_book
+from scenarios.emulation.report import book_of
 from scenarios.results.folder import write_whole
 from wire.messages import LinkReport
 
@@ -18,12 +18,23 @@ COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 """Of links.csv: one row for each copy of a message, or for a message that was dropped."""
 
 
-class LinkRecord:
-    """Takes the reports of one case as they come."""
+PARTIAL = "links.partial"
+"""Name of the verdicts' file while the case runs; links.csv takes its place."""
 
-    def __init__(self) -> None:
-        self.traces: list[LinkTrace] = []
-        """Verdicts, in parts."""
+
+class LinkRecord:
+    """Takes the reports of one case as they come.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        The case's folder, for verdicts until the case has ended: they are as many as messages. Else they are kept in
+        memory.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._file = None if folder is None else folder / PARTIAL
+        self._traces: list[LinkTrace] = []
         self.counts: dict[tuple[str, str], LinkCounts] = {}
         """Of each link (src, dst) how its messages fared."""
         self.garbled = 0
@@ -33,14 +44,35 @@ class LinkRecord:
     def __call__(self, report: LinkReport) -> None:
         """Take one part of a receiver's book."""
         try:
-            book: LinkBook = decode_book(report.data)
+            book = book_of(report)
         except msgspec.DecodeError:
             self.garbled += 1
             return
-        self.traces += book.traces
+        self._keep(book.traces)
         self.counts.update({(src, report.sender): counts for src, counts in book.counts.items()})
         if book.sha256:
             self._sha256[report.sender] = book.sha256
+
+    @property
+    def traces(self) -> list[LinkTrace]:
+        """Verdicts, in parts."""
+        return list(self._parts())
+
+    def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
+        if self._file is None:
+            self._traces += traces
+        elif traces:
+            with self._file.open("ab") as file:
+                for trace in traces:
+                    encoded = _encode(trace)
+                    file.write(len(encoded).to_bytes(4, "little") + encoded)
+
+    def _parts(self) -> Iterator[LinkTrace]:
+        yield from self._traces
+        if self._file is not None and self._file.exists():
+            with self._file.open("rb") as file:
+                while size := file.read(4):
+                    yield _decode(file.read(int.from_bytes(size, "little")))
 
     @property
     def sha256(self) -> str:
@@ -49,16 +81,18 @@ class LinkRecord:
 
     def by_link(self) -> dict[tuple[str, str], LinkTrace]:
         """All verdicts of each link (src, dst) in one."""
-        found: dict[tuple[str, str], LinkTrace] = {}
-        for part in self.traces:
-            key = part.src, part.dst
-            before = found.get(key)
-            found[key] = (
-                part
-                if before is None
-                else LinkTrace(*key, before.seq + part.seq, before.t + part.t, before.outcome + part.outcome)
+        parts: dict[tuple[str, str], list[LinkTrace]] = {}
+        for part in self._parts():
+            parts.setdefault((part.src, part.dst), []).append(part)
+        return {
+            link: LinkTrace(
+                *link,
+                tuple(seq for part in of for seq in part.seq),
+                tuple(t for part in of for t in part.t),
+                tuple(outcome for part in of for outcome in part.outcome),
             )
-        return dict(sorted(found.items()))
+            for link, of in sorted(parts.items())
+        }
 
     def write(self, path: Path) -> None:
         """Write links.csv."""
@@ -68,6 +102,13 @@ class LinkRecord:
         for trace in self.by_link().values():
             writer.writerows(_rows(trace))
         write_whole(path, text.getvalue())
+        if self._file is not None:
+            self._file.unlink(missing_ok=True)
+            self._file, self._traces = None, []
+
+
+_encode = msgspec.msgpack.Encoder().encode
+_decode = msgspec.msgpack.Decoder(LinkTrace).decode
 
 
 def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:

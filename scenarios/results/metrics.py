@@ -45,7 +45,7 @@ class Steady:
     """Real power of each inverter (pu of its rating); exactly 0 of one that is off the network."""
     t_load_s: float | None = None
     """Time (s) from the event until the inverters' total real power is within 2 % of its steady value for good: until
-    those that remain carry the load of one that left. None if never."""
+    those that remain carry the load of one that left. None if never, and where nothing is fed."""
     reasons: Mapping[str, str] = field(default_factory=dict)
     """Why a measure is no steady value, by its name; what is not named is one (`scenarios.results.steadiness`)."""
 
@@ -197,7 +197,7 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
         MQSI=_mean(vars_[steady]),
         t_restore_s=for_good(history.t[inside], restored[inside], window.start),
         p={name: _mean(history.P[steady, i] / plates.s[i]) for i, name in enumerate(plates.names)},
-        t_load_s=for_good(history.t[inside], carried[inside], window.start),
+        t_load_s=for_good(history.t[inside], carried[inside], window.start) if total[steady].any() else None,
         reasons=_reasons(history, plates, ends, sharing, voltage, vars_),
     )
 

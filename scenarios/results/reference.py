@@ -12,7 +12,7 @@ from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
-from plant.config import GflParameters, GfmParameters
+from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
 from wire import keys, messages
@@ -28,6 +28,8 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[plant]", PlantTable),
     ("[plant.gfm]", GfmParameters),
     ("[plant.gfl]", GflParameters),
+    ("[plant.sync_check]", SyncCheck),
+    ("[protection]", Protection),
     ("[gains]", Gains),
     ("[handling]", Handling),
     ("[processes]", Processes),

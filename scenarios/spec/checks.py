@@ -170,6 +170,11 @@ def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> No
                 f"event[{i}]",
                 f'event "{event.label}" does nothing; give it {", ".join(keys)}, e.g. open = ["13-152"]',
             )
+        if event.synchronised and not event.close and not mistakes.touch(f"event[{i}].close"):
+            mistakes.add(
+                f"event[{i}].synchronised",
+                f'event "{event.label}" closes no switch that could wait for synchronism; give it close',
+            )
         named: set[str] = set()
         for action, closed, names in (("open", False, event.open), ("close", True, event.close)):
             for name in names:

@@ -66,7 +66,9 @@ def configs(
             V_set0=scenario.plant.V_set0_pu,
             gfm=scenario.plant.gfm,
             gfl=scenario.plant.gfl,
+            protection=scenario.protection,
             events=_switch_events(scenario),
+            sync_check=scenario.plant.sync_check,
             limits=limits_of(scenario, case),
             spares=tuple(row.name for row in inverters if row.spare),
         ),
@@ -105,7 +107,7 @@ def configs(
 
 def _switch_events(scenario: Scenario) -> tuple[SwitchEvent, ...]:
     return tuple(
-        SwitchEvent(t=event.t_s, switch=switch, action=action)
+        SwitchEvent(t=event.t_s, switch=switch, action=action, synchronised=event.synchronised and action == "close")
         for event in scenario.events
         for action, switches in _actions(event)
         for switch in switches

@@ -19,6 +19,7 @@ from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.netem import check_netem, with_delays
+from scenarios.spec.protection import check_protection
 from scenarios.spec.reading import read_tables
 from scenarios.spec.supply import check_supply
 
@@ -107,6 +108,7 @@ def check_tables(
     check_times(scenario, mistakes)
     check_step(scenario, mistakes)
     check_names(scenario, mistakes)
+    check_protection(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)

@@ -12,7 +12,7 @@ import msgspec
 
 from agents.config import Gains, GraphRule, Handling
 from netem.spec.netem import Netem
-from plant.config import GflParameters, GfmParameters
+from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 
 
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -43,6 +43,8 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
     gfl: GflParameters = GflParameters()
     """Table `[plant.gfl]`: parameters of the grid-following inverters."""
+    sync_check: SyncCheck = SyncCheck()
+    """Table `[plant.sync_check]`: how far two islands may be apart when an event joins them `synchronised`."""
 
 
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -56,6 +58,9 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Switches to open, e.g. ["13-152"]."""
     close: tuple[str, ...] = ()
     """Switches to close."""
+    synchronised: bool = False
+    """Whether each switch to close that would join two live islands waits until they are in step, within
+    `[plant.sync_check]`; else it joins them as they stand."""
     leave: tuple[str, ...] = ()
     """Inverters whose agents end, e.g. ["inv2"]; each takes its inverter off the network."""
     join: tuple[str, ...] = ()
@@ -113,6 +118,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Table `[time]`."""
     plant: PlantTable = PlantTable()
     """Table `[plant]`."""
+    protection: Protection = Protection()
+    """Table `[protection]`: when inverters trip, and when they come back."""
     gains: Gains = Gains()
     """Table `[gains]`: of the secondary law, for every case."""
     handling: Handling = Handling()
@@ -130,6 +137,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 UNIT_OF_KEY: dict[type, dict[str, str]] = {
     Gains: dict.fromkeys(("V_full", "P_set_min", "P_set_max", "V_set_min", "V_set_max"), "pu"),
     Handling: {**dict.fromkeys(("T_age", "max_age", "T_sat"), "s"), "slip_max": "cycles"},
+    Protection: {"enter_service": "s"},
     GfmParameters: dict.fromkeys(("T_p", "T_q", "T_v"), "s")
     | dict.fromkeys(("R_f", "X_f", "P_max", "P_min", "Q_max", "Q_min", "V_lim", "E_min", "E_max"), "pu")
     | dict.fromkeys(("P_set_lim", "V_set_min", "V_set_max"), "pu"),
@@ -137,6 +145,7 @@ UNIT_OF_KEY: dict[type, dict[str, str]] = {
     | dict.fromkeys(("R_f", "X_f", "db_UV", "db_OV", "P_max", "P_min", "S_max", "i_max"), "pu")
     | dict.fromkeys(("P_set_lim", "V_set_min", "V_set_max"), "pu")
     | dict.fromkeys(("db_UF", "db_OF"), "Hz"),
+    SyncCheck: {"angle": "deg", "f": "Hz", "V": "pu", "timeout": "s"},
 }
 """Unit that a key of the file carries where the field, named as in the models' equations, does not."""
 

@@ -152,8 +152,8 @@ def plant_at_start(config: PlantConfig) -> Plant:
     """
     if not hasattr(_kept, "plants"):
         _kept.plants = OrderedDict()
-    plants: OrderedDict[Any, Plant] = _kept.plants
-    key = (config.settings, config.T_c, config.record_step)
+    plants: OrderedDict[bytes, Plant] = _kept.plants
+    key = msgspec.json.encode((config.settings, config.T_c, config.record_step))  # tables in it have no hash
     if key not in plants:
         plants[key] = build_plant(config)
         if len(plants) > KEPT_PLANTS:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+import random
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 from zlib import crc32
 
 import msgspec
 from msgspec import inspect
 
-from wire.codec import CRC
-from wire.messages import MESSAGES, Message
+from wire.codec import CRC, RejectedError, decode
+from wire.messages import MESSAGES, Message, Nameplate
 
 BODIES: dict[str, dict[str, Any]] = {
     "Nameplate": dict(kind="GFM", microgrid="mg 1", P_rated=1e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05),
@@ -171,3 +172,51 @@ def _numbers(part: Any) -> Iterator[tuple[Any, bool | None]]:
     at = [low if part.ge is not None else math.nextafter(low, math.inf), high]
     yield from ((value, True) for value in at)
     yield from ((value, False) for value in [*beyond, "1", [], b"\x00" * 8])
+
+
+Truth = Mapping[str, tuple[str, tuple[type[Message], ...]]]
+"""Of each key who speaks there, empty for anybody, and with which messages."""
+
+
+def hostile(keys: Truth, epochs: Mapping[str, int], rng: random.Random) -> Iterator[tuple[str, bytes]]:
+    """Keys and bytes in any order, some twice: nothing that a key's true sender might say in its epoch is among them.
+
+    Parameters
+    ----------
+    keys : Truth
+        Who may say what, where.
+    epochs : Mapping[str, int]
+        Epoch of everybody that there is.
+    rng : random.Random
+        Draws the order.
+    """
+    headers: list[dict[str, Any]] = [
+        {"sender": sender, "incarnation": epoch + life, "seq": seq}
+        for sender, epoch in epochs.items()
+        for life, seq in ((0, 3), (-1, 10**6), (1, 2**53 - 1))
+    ]
+    every = [*keys]
+    found = [(key, case.payload) for header in headers for case in all_cases(**header) for key in rng.sample(every, 2)]
+    found += [
+        (key, packed(sound(kind, sender=sender, incarnation=epoch, seq=seq, t=t)))
+        for key in every
+        for kind in MESSAGES
+        for sender, epoch in epochs.items()
+        for seq, t in ((0, 0.0), (10**9, 1e9))
+    ]
+    rng.shuffle(found)
+    for key, payload in found:
+        if not _is_true(key, payload, keys, epochs):
+            yield from [(key, payload)] * rng.choice((1, 1, 2))
+
+
+def _is_true(key: str, payload: bytes, keys: Truth, epochs: Mapping[str, int]) -> bool:
+    """Whether it cannot be told from what the true sender might say. A nameplate can, as it is learnt once."""
+    sender, types = keys[key]
+    try:
+        message = decode(payload)
+    except RejectedError:
+        return False
+    if not isinstance(message, types) or isinstance(message, Nameplate):
+        return False
+    return not sender or (message.sender == sender and message.incarnation == epochs[sender])

@@ -47,7 +47,7 @@ def test_what_was_wound_up_overshoots_when_power_is_back(wind_up: Experiment) ->
 
 
 def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far(wind_up: Experiment) -> None:
-    """The clipping decides: with a bound of 3 pu for GFL too, the frequency goes to 60.40 Hz instead of 60.12 Hz."""
+    """The clipping decides: with a bound of 3 pu for GFL too, the frequency goes to 60.38 Hz instead of 60.12 Hz."""
     scenario, feeder = load_scenario("wind-up")
     plant = replace(scenario.plant, gfl=replace(scenario.plant.gfl, P_set_lim=3.0))
     rows: list[tuple[float, ...]] = []
@@ -57,7 +57,7 @@ def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far(wind_up: 
 
     run_inprocess(*configs(replace(scenario, plant=plant), feeder, "none"), take)
 
-    assert overshoot(History.of(wind_up.plates.names, rows), wind_up) == pytest.approx(0.396, abs=0.005)
+    assert overshoot(History.of(wind_up.plates.names, rows), wind_up) == pytest.approx(0.384, abs=0.005)
     assert overshoot(wind_up.histories["none"], wind_up) == pytest.approx(0.121, abs=0.005)
 
 

@@ -17,7 +17,7 @@ from scenarios.drivers.rendezvous import rendezvous
 from scenarios.results.links import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
-from wire.codec import decode, encode
+from wire.codec import RejectedError, decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import (
@@ -219,7 +219,15 @@ class Town:
         elif kind == "vanished":
             self.tokens.discard(key)
         elif kind == "message":
-            message = decode(payload)
+            try:
+                message = decode(payload)
+            except RejectedError:
+                return
+            own = {AgentStatus: self.keys.status, State: self.keys.state}.get(type(message))
+            if own is not None and key != own(message.sender):
+                return
+            if isinstance(message, Telemetry | LinkReport | LinkOrder) and key != self.keys.telemetry:
+                return
             if isinstance(message, AgentStatus):
                 self.status[message.sender] = message
             elif isinstance(message, State):

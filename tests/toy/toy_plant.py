@@ -84,7 +84,7 @@ class ToyPlant:
             self._events.append(PlantEvent(t=self._t, kind="switch", subject="toy", text="the grid is lost"))
         self._rows.append(self._row())
 
-    def switch(self, name: str, action: str) -> bool:
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate the only switch there is; it does nothing but tell, and stands as it was told last."""
         if name != "sw1":
             raise ValueError(f'no switch "{name}"; switches are sw1')

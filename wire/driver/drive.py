@@ -77,8 +77,11 @@ class Core(Protocol):
         ...
 
 
-class StoppedError(Exception):
-    """Another part of the process, or a signal, wants it to end."""
+class StoppedError(BaseException):
+    """Another part of the process, or a signal, wants it to end.
+
+    No `Exception`: a signal comes at any moment, also while a message is handled, whose errors are the message's own.
+    """
 
 
 EVERYTHING = 1 << 30

@@ -13,11 +13,18 @@ from plant.dynamics.kernel.gfl import F_NOM, advance_gfl
 from plant.dynamics.kernel.gfm import advance_gfm
 from plant.dynamics.kernel.solve import solve_network
 
-READING = 4
-"""Numbers recorded per inverter and step: f (Hz), P (W), Q (var), V (V)."""
+READING = 6
+"""Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), and V of the lowest and the highest phase (V)."""
 
 FAILURES = 3
 """What can fail in a step: 0 the first network solution, 1 the second, 2 a controller whose frequency is not finite."""
+
+
+@compiled
+def read_voltage(V: NDArray[np.complex128], reading: NDArray[np.float64]) -> None:
+    """Write the mean of the phases' voltages, the lowest and the highest (V) into an inverter's reading."""
+    a, b, c = abs(V[0]), abs(V[1]), abs(V[2])
+    reading[3], reading[4], reading[5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
 
 
 @compiled
@@ -28,14 +35,13 @@ def read_terminal(
     I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
     reading: NDArray[np.float64],
 ) -> None:
-    """Write an inverter's phase currents (A), and P (W), Q (var) and mean V (V) into its reading (section 2)."""
+    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2)."""
     S = 0.0j
-    v = 0.0
     for phase in range(3):
         I[phase] = J[phase] - y_f * V[phase]
         S += V[phase] * I[phase].conjugate()
-        v += abs(V[phase])
-    reading[1], reading[2], reading[3] = S.real, S.imag, v / 3.0
+    reading[1], reading[2] = S.real, S.imag
+    read_voltage(V, reading)
 
 
 @compiled
@@ -100,7 +106,7 @@ def run_steps(
     x
         Branch voltages in the islands' frames, the first guess of the next solution.
     out
-        steps x n_inv x READING: each step's f of the corrector, P, Q, V of the second solution.
+        steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second solution.
     """
     n = J.shape[0]
     m = net.S.size
@@ -185,7 +191,7 @@ def run_steps(
             for i in range(n):
                 if not online[i]:
                     out[step, i, 0], out[step, i, 1], out[step, i, 2] = F_NOM, 0.0, 0.0
-                    out[step, i, 3] = (abs(V[i, 0]) + abs(V[i, 1]) + abs(V[i, 2])) / 3.0
+                    read_voltage(V[i], out[step, i])
                 elif not np.isfinite(out[step, i, 0]):
                     return -1 - (FAILURES * step + 2)
     return total

@@ -97,7 +97,7 @@ class Picture:
 
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Note what the plant tells; `now` is the visitor's clock (s)."""
-        if message.incarnation > self._life:
+        if message.incarnation != self._life:
             if self._life:
                 self._events.clear()
                 self._standing = None
@@ -105,6 +105,8 @@ class Picture:
         if message.t < self._latest:
             return  # published again for a recorder that has missed it
         self._latest = message.t
+        if message.inverters != self._inverters:
+            self._row = ()
         self._inverters, self._t, self._told = message.inverters, message.t, now
         self._end = message.outcome if message.final else None
         self._pacing = message.pacing or self._pacing

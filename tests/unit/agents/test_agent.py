@@ -1,15 +1,15 @@
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.config import Control
+from agents.config import Control, Handling
 from agents.law import P_set_step, V_set_step
 from tests.toy.toy_configs import ALL_FULL, agent_config
-from wire.messages import Measurement, Nameplate, State
+from wire.messages import OFF, Measurement, Nameplate, State
 
 ROSTER = ("inv1", "inv2", "inv3")
 
@@ -134,3 +134,27 @@ def test_another_life_of_a_name_begins_anew() -> None:
 def test_unknown_names_on_the_roster_are_no_neighbours() -> None:
     """Whose nameplate has not been seen cannot be judged by the rule."""
     assert met().in_neighbours((*ROSTER, "inv7")) == ("inv2", "inv3")
+
+
+def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_plant_holds() -> None:
+    """While the inverter is off there is nothing to control; then the law starts from the held set-points."""
+    agent = met()
+    agent.tick(measurement())
+    off = agent.tick(measurement(1, island=OFF, V=0.0, f=0.0, P=0.0, Q=0.0, P_set=0.0, V_set=277.0))
+
+    back = agent.tick(measurement(2, P_set=5e3, V_set=270.0, f=60.0, V=277.0))
+
+    assert (off.P_set, off.V_set, off.island) == (0.0, 277.0, OFF)
+    assert (back.P_set, back.V_set) == (5e3, 270.0)
+
+
+@pytest.mark.parametrize("islands", ["switches", "frequency", "ignored"])
+def test_a_neighbour_that_is_out_of_service_is_left_out(islands: Literal["switches", "frequency", "ignored"]) -> None:
+    """It has no power to share, so its 0 var would bias the others: however islands are told apart."""
+    control = replace(ALL_FULL, handling=Handling(islands=islands))
+    agent = met(control)
+    agent.hear(state("inv2"))
+    agent.hear(replace(state("inv3", P_set=0.0, Q=0.0), island=OFF))
+
+    assert agent.shares_island("inv2")
+    assert not agent.shares_island("inv3")

@@ -134,7 +134,7 @@ def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
 
     leader = (1.0 - exp(-KAPPA * T)) * 0.001 / M_P
     assert decided.P_set / 1e5 == pytest.approx(moved(0.5, 0.7, 5.0) + leader, rel=1e-12)
-    V_set = 1.0 + 0.5 * (1.0 - exp(-2.0 * 3.0 * T / K_Q)) * M_Q * 0.2 + (1.0 - exp(-ALPHA * T / K_Q)) * 0.02
+    V_set = 1.0 + 0.5 * (1.0 - exp(-2.0 * 3.0 * T / K_Q)) * (M_Q * 0.2 + ALPHA / 3.0 * 0.02)
     assert decided.V_set / 277.0 == pytest.approx(V_set, rel=1e-12)
     assert half.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, 0.8, 0.5 * 5.0), rel=1e-12)
 

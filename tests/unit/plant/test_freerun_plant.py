@@ -13,6 +13,7 @@ from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode, encode
+from wire.driver.drive import StoppedError
 from wire.keys import Keys
 from wire.messages import Answer, Command, Leave, Measurement, Message, PlantEvent, State, Stop, Telemetry, Waiting
 
@@ -378,3 +379,34 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     assert asked == 2
     assert lab.fetched.count(KEYS.nameplate("inv2", "b")) == 2
     assert [m.to for m in lab.take(Measurement)][-1] == "inv2"
+
+
+def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
+    """An agent whose session was renewed just then has not heard the end; else it would seek a plant for minutes."""
+    lab = Lab()
+    lab.join("inv1", "inv2", "inv3")
+    lab.side.abort("the end of it", lab.now)
+    lab.do()
+    lab.token("inv2", gone=True)
+    lab.sent.clear()
+    lab.token("inv2", "b")
+
+    ((key, stop),) = lab.sent
+    assert key == KEYS.dismissal("inv2", "b")
+    assert isinstance(stop, Stop)
+    assert stop.reason == "the end of it"
+    assert not stop.refused
+
+
+def test_a_signal_in_the_middle_of_a_message_ends_the_process_and_not_the_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """SIGTERM comes at any moment: it is no error of the message that is just handled, which would be rejected."""
+    lab = Lab(end=None)
+
+    def connect(name: str, on: bool) -> None:
+        raise StoppedError("SIGTERM")
+
+    monkeypatch.setattr(lab.toy, "connect", connect)
+    with pytest.raises(StoppedError):
+        lab.join("inv1")

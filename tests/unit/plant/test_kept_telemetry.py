@@ -189,3 +189,18 @@ def test_a_session_that_brings_nothing_is_opened_anew_ever_more_seldom() -> None
     assert stream.take(replace(first, seq=1, final=True), now)
     assert stream.question(now + 100.0) is None
     assert not stream.is_astray(now + 100.0)
+
+
+@pytest.mark.parametrize("end", ["close", "interrupt"])
+def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) -> None:
+    """A plant that is told to end while a recorder is being served sends all of it, and the last word, at once."""
+    lab = running(end=None)
+    lab.step(2000)
+    assert lab.ask("telemetry", "0").ok
+    lab.step(2)
+    (lab.side.close if end == "close" else lab.side.interrupt)("enough", lab.now)
+    lab.do()
+    told: list[Telemetry] = lab.take(Telemetry)
+
+    assert told[-1].final
+    assert [message.seq for message in told[-150:]] == list(range(told[-1].seq - 149, told[-1].seq + 1))

@@ -321,3 +321,23 @@ def test_misfortunes_strike_in_turn_and_nobody_stays_paused(monkeypatch: pytest.
         (2.5, "inv3", "SIGCONT"),
     ]  # fmt: skip
     assert struck.killed == {"inv2"}
+
+
+def test_what_links_drop_counts_as_lost() -> None:
+    """Whoever watches sees it while it lasts: the numbers of who sent them show only what the wire has lost."""
+    lab = agent_lab()
+    order(lab, 1, 0.0)
+    for k in range(1, 40):
+        lab.measure(k)
+        if k != 20:  # that one is lost before it comes to the link
+            lab.state("inv2", k, k * agent_side.T_C)
+        lab.go(agent_side.T_C)
+    lab.go(0.5)
+    during = lab.status().lost
+    lab.token("plant", gone=True)
+    lab.token("plant", epoch=2)
+    lab.measure(0, incarnation=2)
+    lab.go(0.5)
+
+    assert during == 39
+    assert lab.status().lost == 39

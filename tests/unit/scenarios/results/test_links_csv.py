@@ -1,6 +1,7 @@
 """links.csv: one row for each copy of a message, which any reader of CSV takes apart as it was written."""
 
 import csv
+import tracemalloc
 from pathlib import Path
 
 from netem.models.corrupt import Corrupt
@@ -42,3 +43,29 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     assert found == expected
     assert any("passed, bit" in row["fate"] for row in rows)
     assert any("copy, bit" in row["fate"] for row in rows)
+
+
+def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path) -> None:
+    """A run of hours with faults has millions of verdicts: they are read back once it has ended, and give way then."""
+    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
+    in_memory, on_disk = LinkRecord(), LinkRecord(tmp_path)
+    tracemalloc.start()
+    for first in range(0, 20_000, 100):
+        for k in range(first, first + 100):
+            receiver.offer("inv1", k, 0.02 * k, 0.02 * k, b"state")
+            receiver.due(0.02 * k)
+        for data in parts(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+            on_disk(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
+            if first < 5_000:
+                in_memory(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
+            elif first == 5_000:
+                before, _ = tracemalloc.get_traced_memory()
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    (mine,), (theirs,) = on_disk.by_link().values(), in_memory.by_link().values()
+    on_disk.write(tmp_path / "links.csv")
+
+    assert grown < 100_000
+    assert mine.outcome[:5_000] == theirs.outcome
+    assert mine.seq == tuple(range(20_000))
+    assert [path.name for path in tmp_path.iterdir()] == ["links.csv"]

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from agents.config import Gains, Handling
-from plant.config import GfmParameters, SwitchEvent
+from plant.config import GfmParameters, SwitchEvent, SyncCheck
 from plant.tables.read import DATA
 from scenarios.spec import catalogue, load_scenario
 from scenarios.spec.configs import configs
@@ -133,8 +133,10 @@ finite = st.floats(min_value=1e-3, max_value=100.0)
 
 
 @settings(max_examples=50, deadline=None)  # each example reads a feeder
-@example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='\x7f\x00"\\\n')
-@given(k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20))
+@example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='"\\ ä%')
+@given(
+    k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20).filter(str.isprintable)
+)
 def test_a_runs_copy_means_the_same_as_the_scenario(
     tmp_path_factory: pytest.TempPathFactory, k_p: float, k_q: float, alpha: float, seed: int, title: str
 ) -> None:
@@ -156,3 +158,33 @@ def test_the_catalogue_holds_scenarios_and_nothing_else() -> None:
     assert sorted(path.name for path in CATALOGUE.iterdir() if path.name != "sweeps") == [
         f"{name}.toml" for name in catalogue()
     ]
+
+
+def test_a_synchronised_event_closes_its_switches_in_step(tmp_path: Path) -> None:
+    """The keys reach the plant: only what is closed waits, and the windows are in the units of their keys."""
+    path = tmp_path / "resync.toml"
+    path.write_text("""
+[time]
+end_s = 2.0
+[plant.sync_check]
+f_Hz = 0.2
+timeout_s = 3.0
+[[event]]
+label = "apart"
+t_s = 0.5
+open = ["13-152"]
+[[event]]
+label = "together"
+t_s = 1.0
+close = ["13-152"]
+open = ["60-160"]
+synchronised = true
+[case.IV]
+secondary = "all"
+graph = "full"
+""")
+    plant = configs(*load_scenario(str(path)), "IV")[0].settings
+
+    assert plant.sync_check == SyncCheck(f=0.2, timeout=3.0)
+    waits = {(event.t, event.switch): event.synchronised for event in plant.events}
+    assert waits == {(0.5, "13-152"): False, (1.0, "13-152"): True, (1.0, "60-160"): False}

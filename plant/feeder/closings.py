@@ -1,0 +1,107 @@
+"""Switches that join live islands: who may close now, who waits for synchronism, and what is told of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from plant.feeder.switchboard import Switchboard
+from plant.feeder.synchronism import Difference, Synchronism
+from plant.feeder.trips import Closing
+from wire.messages import PlantEvent
+
+
+class _Waiting(NamedTuple):
+    """A switch that waits for synchronism."""
+
+    since: int
+    """Step at which it was to close."""
+    last: int
+    """Step at which it gives up."""
+
+
+class Closings:
+    """Judges the closings of a feeder's switches.
+
+    Parameters
+    ----------
+    switches
+        The switches.
+    sync
+        Measures across them.
+    timeout
+        How many steps a switch waits for synchronism.
+    h
+        Step (s).
+
+    Attributes
+    ----------
+    joined : list of Closing
+        Those that have joined live islands, the latest last.
+    """
+
+    def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:
+        self._switches, self._sync, self._timeout, self._h = switches, sync, timeout, h
+        self._waiting: dict[str, _Waiting] = {}
+        self.joined: list[Closing] = []
+
+    def refusal(self, name: str) -> str:
+        """Why a switch (by its name) may not close now with a synchronism check; "" if it may."""
+        difference = self._sync.across(name, self._switches.closed)
+        if difference is None or difference.within:
+            return ""
+        return (
+            f"switch {self._switches.shown(name)} not closed: its sides are {difference}; allowed are "
+            f"{difference.window}; try again when they are in step, or close it without the check"
+        )
+
+    def check_waiting(self, step: int) -> list[PlantEvent]:
+        """Have those close at this step that are in step now; tells of those that give up."""
+        events = []
+        for name, waiting in list(self._waiting.items()):
+            difference = self._sync.across(name, self._switches.closed)
+            if difference is None or difference.within:
+                del self._waiting[name]
+                self._switches.put(step, name, "close", synchronised=True)
+            elif step >= waiting.last:
+                del self._waiting[name]
+                waited = (step - waiting.since) * self._h
+                text = f"not closed: not in step within {waited:g} s, now {difference}; allowed are {difference.window}"
+                events.append(self._warning(step, name, text))
+        return events
+
+    def judge(self, step: int) -> tuple[dict[str, str], list[PlantEvent]]:
+        """Hold back what is to wait among the operations of a step; notes on the others by switch, and what to tell."""
+        closed = self._switches.closed
+        due = self._switches.due(step)
+        closing = [operation.switch for operation in due if operation.action == "close"]
+        notes: dict[str, str] = {}
+        events: list[PlantEvent] = []
+        for operation in due:
+            name = operation.switch
+            self._waiting.pop(name, None)  # whoever operates it has thought anew
+            if operation.action != "close" or name in closed:
+                continue
+            difference = self._sync.across(name, closed, closing)
+            if difference is None:
+                continue
+            if operation.synchronised and not difference.within:
+                self._switches.drop(step, operation)
+                self._waiting[name] = _Waiting(step, step + self._timeout)
+                text = f"waits for synchronism: its sides are {difference}; allowed are {difference.window}"
+                events.append(self._warning(step, name, text))
+            elif operation.synchronised:
+                notes[name] = f" in step: {difference}"
+                self._note(step, difference)
+            else:
+                events.append(self._warning(step, name, f"joins two live islands: its sides are {difference}"))
+                self._note(step, difference)
+        return notes, events
+
+    def _note(self, step: int, difference: Difference) -> None:
+        t = round(step * self._h, 9)
+        self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.window.angle))
+        del self.joined[:-20]
+
+    def _warning(self, step: int, name: str, text: str) -> PlantEvent:
+        text = f"switch {self._switches.shown(name)} {text}"
+        return PlantEvent(t=round(step * self._h, 9), kind="warning", subject=name, text=text)

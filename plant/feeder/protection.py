@@ -1,0 +1,235 @@
+"""Protection of inverters: when one trips, and when one that has tripped may enter service again. Pure.
+
+Trips are those of IEEE 1547-2018, clause 6.4.1 (voltage) and 6.5.1 (frequency), with its default settings; entering
+service is clause 4.10. The quantities are those the clauses name: for undervoltage the lowest phase of the terminal,
+for overvoltage the highest; the frequency is the inverter's own (of the internal voltage of a GFM, of a GFL's PLL).
+A function trips when its condition has held at every step of its clearing time.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.config import Protection
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+F_BASE = 60.0
+"""Frequency (Hz) that the standard's frequency settings are written for; others are scaled."""
+
+_FREQUENCY = {"OF2": (62.0, 0.16), "OF1": (61.2, 300.0), "UF1": (58.5, 300.0), "UF2": (56.5, 0.16)}
+
+DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
+    "II": {"OV2": (1.20, 0.16), "OV1": (1.10, 2.0), "UV1": (0.70, 10.0), "UV2": (0.45, 0.16)} | _FREQUENCY,
+    "III": {"OV2": (1.20, 0.16), "OV1": (1.10, 13.0), "UV1": (0.88, 21.0), "UV2": (0.50, 2.0)} | _FREQUENCY,
+}
+"""Default trip settings, threshold (pu, or Hz at 60 Hz) and clearing time (s): IEEE 1547-2018, Tables 12, 13 and 18."""
+
+V_ENTER = (0.917, 1.05)
+"""Voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4."""
+
+F_ENTER = (59.5, 60.1)
+"""The same for the frequency (Hz at 60 Hz)."""
+
+ATTEMPTS = 3
+"""An inverter that trips so many times within `SETTLED` of coming back stays off until its agent joins anew."""
+
+SETTLED = 60.0
+"""Time in service (s) after which earlier trips are forgotten."""
+
+_WORDS = {"OV": "overvoltage", "UV": "undervoltage", "OF": "overfrequency", "UF": "underfrequency"}
+
+
+class Tripped(NamedTuple):
+    """An inverter whose protection has tripped."""
+
+    inverter: int
+    """Which."""
+    function: str
+    """Name of the function in the standard: "UV2"."""
+    value: float
+    """What was measured last (pu or Hz)."""
+    threshold: float
+    """Its setting (pu or Hz)."""
+    time: float
+    """For how long it has been beyond it (s): the clearing time."""
+
+    def __str__(self) -> str:
+        """Cause of the trip, for a person.
+
+        Examples
+        --------
+        >>> print(Tripped(0, "UV2", 0.42, 0.45, 0.16))
+        undervoltage 0.42 pu for 0.16 s (UV2: 0.45 pu)
+        """
+        unit, digits = ("Hz", 2) if self.function[1] == "F" else ("pu", 2)
+        value = f"{self.value:.{digits}f} {unit}"
+        return f"{_WORDS[self.function[:2]]} {value} for {self.time:g} s ({self.function}: {self.threshold:g} {unit})"
+
+
+class Relays:
+    """The trip functions of all inverters.
+
+    Parameters
+    ----------
+    settings
+        Category and changed settings.
+    n
+        Number of inverters.
+    h
+        Step (s).
+    f_nom
+        Nominal frequency (Hz).
+
+    Examples
+    --------
+    >>> relays = Relays(Protection(category="II"), n=1, h=0.02, f_nom=60.0)
+    >>> sag, normal, on = np.array([[0.4]]), np.array([[1.0]]), np.array([True])
+    >>> f = np.array([[60.0]])
+    >>> trips = [relays.watch(f, sag, normal, on) for _ in range(8)]
+    >>> [len(found) for found in trips], str(trips[-1][0])
+    ([0, 0, 0, 0, 0, 0, 0, 1], 'undervoltage 0.40 pu for 0.16 s (UV2: 0.45 pu)')
+    """
+
+    def __init__(self, settings: Protection, n: int, h: float, f_nom: float) -> None:
+        chosen = {} if settings.category == "off" else DEFAULTS[settings.category] | settings.trips
+        self.names = tuple(chosen)
+        scale = [f_nom / F_BASE if name[1] == "F" else 1.0 for name in chosen]
+        self.thresholds = np.array([value for value, _ in chosen.values()]) * np.array(scale)
+        self.times = np.array([time for _, time in chosen.values()])
+        self._need = np.maximum(1, np.round(self.times / h)).astype(np.int64)
+        self._of = np.array([("f", "low", "high").index(_quantity(name)) for name in chosen], np.int64)
+        self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
+        self._count = np.zeros((n, len(chosen)), np.int64)
+        """Steps for which each function's condition has held."""
+
+    @property
+    def quiet(self) -> int:
+        """Steps within which no function can trip."""
+        return int(np.min(self._need - self._count, initial=2**31))
+
+    def watch(self, f: Floats, V_low: Floats, V_high: Floats, on: Flags) -> list[Tripped]:
+        """Take the readings of the steps since the last call, at most `quiet` of them.
+
+        Parameters
+        ----------
+        f, V_low, V_high
+            Frequency (Hz), and voltage of the lowest and of the highest phase (pu): steps x inverters.
+        on
+            Inverters in service; the others do not trip.
+        """
+        if not self.names:
+            return []
+        measured = np.stack([f, V_low, V_high], axis=2)[:, :, self._of]
+        beyond = (self._sign * (measured - self.thresholds) > 0.0) & on[:, None]
+        if not beyond.any():
+            self._count[:] = 0
+            return []
+        for row in beyond:
+            self._count = np.where(row, self._count + 1, 0)
+        trips: dict[int, Tripped] = {}
+        for i, k in np.argwhere(self._count >= self._need).tolist():
+            value, threshold, time = measured[-1, i, k], self.thresholds[k], self.times[k]
+            trips.setdefault(i, Tripped(i, self.names[k], float(value), float(threshold), float(time)))
+        self._count[list(trips)] = 0
+        return list(trips.values())
+
+
+class Recovery:
+    """Inverters that have tripped, and when they may enter service again.
+
+    Parameters
+    ----------
+    delay
+        How long (s) voltage and frequency must have been normal at the terminals.
+    n
+        Number of inverters.
+    h
+        Step (s).
+    f_nom
+        Nominal frequency (Hz).
+
+    Attributes
+    ----------
+    tripped : bool[n]
+        Inverters that are off because they tripped.
+    locked : bool[n]
+        Those among them that have tripped too often: they do not come back by themselves.
+    """
+
+    def __init__(self, delay: float, n: int, h: float, f_nom: float) -> None:
+        self.tripped, self.locked = np.zeros(n, bool), np.zeros(n, bool)
+        self._need, self._settled = max(1, round(delay / h)), round(SETTLED / h)
+        self._f_band = F_ENTER[0] * f_nom / F_BASE, F_ENTER[1] * f_nom / F_BASE
+        self._waited, self._served = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self._trips = np.zeros(n, np.int64)
+        self._was_dead = np.zeros(n, bool)
+
+    def trip(self, i: int, before: int = 0) -> bool:
+        """Note that an inverter tripped, `before` steps after the last `watch`. Whether it has done so too often."""
+        self._trips[i] = 1 if self._served[i] >= self._settled else self._trips[i] + 1
+        self.tripped[i], self._waited[i], self._served[i] = True, -before, 0
+        self.locked[i] = self._trips[i] >= ATTEMPTS
+        return bool(self.locked[i])
+
+    def enter(self, i: int) -> None:
+        """Note that an inverter has come back."""
+        self.tripped[i] = self.locked[i] = False
+        self._served[i] = 0
+
+    def forget(self, i: int) -> None:
+        """Forget that an inverter tripped: it is off or on because its agent wants it."""
+        self.enter(i)
+        self._trips[i] = 0
+
+    def unlock(self, i: int) -> None:
+        """Let an inverter come back that has tripped too often, as its agent joins anew."""
+        self.locked[i], self._trips[i] = False, 0
+
+    def await_others(self, i: int) -> None:
+        """Let an inverter that comes, and need not wait itself, wait for those that have tripped."""
+        self.tripped[i], self._waited[i] = True, self._need
+        self.unlock(i)
+
+    def passed(self, i: int) -> bool:
+        """Whether a tripped inverter has waited long enough."""
+        return bool(self._waited[i] >= self._need)
+
+    @property
+    def quiet(self) -> int:
+        """Steps within which no delay passes."""
+        waits = (self._need - self._waited)[self.tripped & ~self.locked]
+        return int(np.min(waits[waits > 0], initial=2**31))
+
+    def watch(self, f: Floats, V_low: Floats, V_high: Floats, dead: Flags) -> None:
+        """Take what the terminals show since the last call.
+
+        Parameters
+        ----------
+        f, V_low, V_high
+            Frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu): steps x inverters.
+        dead
+            Inverters whose island nothing feeds: there the delay counts from the trip, as there is nothing to measure.
+        """
+        steps = len(f)
+        self._served = np.where(self.tripped, 0, self._served + steps)
+        if not self.tripped.any():
+            return
+        normal = (V_low >= V_ENTER[0]) & (V_high <= V_ENTER[1]) & (f >= self._f_band[0]) & (f <= self._f_band[1])
+        normal |= dead
+        since_last = np.where(normal.all(axis=0), steps, np.argmin(normal[::-1], axis=0))
+        waited = np.where(normal.all(axis=0), self._waited + steps, since_last)
+        waited = np.where(dead == self._was_dead, waited, np.minimum(waited, since_last))
+        self._waited = np.where(self.tripped, waited, 0)
+        self._was_dead = dead.copy()
+
+
+def _quantity(name: str) -> Literal["f", "low", "high"]:
+    """What a function looks at."""
+    if name[1] == "F":
+        return "f"
+    return "high" if name[0] == "O" else "low"

@@ -1,0 +1,141 @@
+"""How far two live islands are apart across an open switch, and how far they may be when it closes.
+
+The windows are those of IEEE Std 1547-2018, Table 5: limits of frequency, voltage and phase-angle difference for
+connecting an energized local system, by the aggregate rating of its units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.config import SyncCheck
+from plant.dynamics import Dynamics
+from plant.network import Network
+
+_TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
+"""Up to which rating (VA): frequency (Hz), voltage (pu), angle (deg)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """Difference across an open switch between two separate live islands."""
+
+    switch: str
+    """Name of the switch."""
+    angle: float
+    """Largest angle between equal phases (deg), 0 to 180."""
+    f: float
+    """Difference of frequency (Hz)."""
+    V: float
+    """Largest difference of voltage of equal phases (pu of nominal)."""
+    window: Window
+    """Limits of these three."""
+
+    @property
+    def within(self) -> bool:
+        """Whether the two sides may be joined."""
+        return self.angle <= self.window.angle and self.f <= self.window.f and self.V <= self.window.V
+
+    def __str__(self) -> str:
+        return f"{self.angle:.1f} deg, {self.f:.3f} Hz and {100.0 * self.V:.1f} % of voltage apart"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """Largest differences at which a switch may close."""
+
+    angle: float
+    """Angle (deg)."""
+    f: float
+    """Frequency (Hz)."""
+    V: float
+    """Voltage (pu)."""
+
+    def __str__(self) -> str:
+        return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
+
+
+def window_for(rating: float, check: SyncCheck) -> Window:
+    """Window of IEEE 1547-2018 Table 5 for an aggregate rating (VA); what `check` sets goes before.
+
+    Examples
+    --------
+    >>> window_for(1.3e6, SyncCheck())
+    Window(angle=15.0, f=0.2, V=0.05)
+    >>> str(window_for(3.9e6, SyncCheck(angle=5.0)))
+    'at most 5 deg, 0.1 Hz and 3 %'
+    """
+    f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
+    return Window(angle=check.angle or angle, f=check.f or f, V=check.V or V)
+
+
+class Synchronism:
+    """Measures across the open switches of a feeder.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    dynamics
+        Its inverters.
+    check
+        What the windows are to be, where not as in the standard.
+    """
+
+    def __init__(self, network: Network, dynamics: Dynamics, check: SyncCheck) -> None:
+        self._network, self._dynamics, self._check = network, dynamics, check
+
+    def across(self, switch: str, closed: frozenset[str], others: Iterable[str] = ()) -> Difference | None:
+        """Difference across a switch (by its name) now; None if it does not part two live islands.
+
+        Parameters
+        ----------
+        switch
+            Its name.
+        closed
+            Switches that are closed now.
+        others
+            Switches that close with it. A dead side that one of them energizes counts as what energizes it.
+        """
+        network, reduction = self._network, self._dynamics.network.reduction
+        device, merge = network.switches[switch], network.merge(closed)
+        island = reduction.label[merge.representative]
+        live = reduction.live[island]
+        rest = closed.union(others) - {switch}
+        ends = [self._live_end(bus, device.phases, live, rest) for bus in (device.from_bus, device.to_bus)]
+        nodes = [[network.index(bus, phase) for phase in device.phases] for bus in ends if bus]
+        if len(nodes) < 2 or island[nodes[0][0]] == island[nodes[1][0]]:
+            return None
+        first, second = (int(island[of[0]]) for of in nodes)
+        V = merge.expand(self._dynamics.voltages())
+        a, b = (V[of] / network.nominal[of] for of in nodes)
+        rated = [self._rating(first), self._rating(second)]
+        f_1, f_2 = self._dynamics.frequency(first), self._dynamics.frequency(second)
+        return Difference(
+            switch=switch,
+            angle=degrees(float(np.max(np.abs(np.angle(a * np.conj(b)))))),
+            f=abs(f_1 - f_2),
+            V=float(np.max(np.abs(np.abs(a) - np.abs(b)))),
+            window=window_for(min(rated), self._check),
+        )
+
+    def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:
+        """The bus itself if it is live, else a live bus that these closed switches join to it; "" if there is none."""
+        network = self._network
+        island = next(buses for buses in network.islands(closed) if bus in buses)
+        for name in (bus, *(other.name for other in network.feeder.buses if other.name in island)):
+            if network.has(name, phases) and all(live[network.index(name, phase)] for phase in phases):
+                return name
+        return ""
+
+    def _rating(self, island: int) -> float:
+        """Rating (VA) of all inverters that feed an island; the substation has no bound."""
+        reduction, units = self._dynamics.network.reduction, self._dynamics.inverters
+        if reduction.has_source[island]:
+            return float("inf")
+        return float(units.S_b[reduction.online & (reduction.inverter_island == island)].sum())

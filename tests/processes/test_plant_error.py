@@ -1,0 +1,57 @@
+"""A plant process in which something breaks that nobody thought of."""
+
+from __future__ import annotations
+
+from time import monotonic
+from typing import Literal
+
+import pytest
+from msgspec.structs import replace
+
+from plant.config import PlantConfig
+from plant.runtime import run_plant
+from scenarios.drivers.rendezvous import rendezvous
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_plant import ToyPlant
+from wire.codec import decode
+from wire.driver.session import Session
+from wire.keys import Keys
+from wire.messages import Stop
+
+
+class Broken(ToyPlant):
+    """Divides by zero in its first step."""
+
+    def advance(self) -> None:
+        """Go one control period on, in vain."""
+        raise ZeroDivisionError("no step")
+
+
+@pytest.mark.parametrize("clock", ["wall", "simulated"])
+def test_agents_are_told_to_close_whatever_broke_the_plant(clock: Literal["wall", "simulated"]) -> None:
+    """An error that is no PlantError, too, ends the run with a Stop to all: no agent outlives its plant."""
+    endpoint = rendezvous()
+    config, _ = toy_configs(1, end=5.0)
+    config = replace(config, clock=clock, listen=(endpoint,), agents=(), recorders=("visitor",))
+    keys = Keys(config.run)
+    visitors: list[Session] = []
+
+    def build(plant_config: PlantConfig) -> Broken:
+        visitors.append(Session("visitor", connect=(endpoint,), clock=clock))
+        visitors[0].subscribe(keys.control)
+        visitors[0].hold_token(keys.alive_recorder("visitor"))  # who sees it has heard of the subscription
+        return Broken(plant_config)
+
+    try:
+        outcome = run_plant(config, build)
+        reasons: list[str] = []
+        deadline = monotonic() + 5.0
+        while not reasons and monotonic() < deadline:
+            heard = [decode(payload) for kind, _, payload, _ in visitors[0].take(1, 1.0) if kind == "message"]
+            reasons += [message.reason for message in heard if isinstance(message, Stop)]
+    finally:
+        for visitor in visitors:
+            visitor.close()
+
+    assert outcome == "plant at t = 0 s: ZeroDivisionError: no step"
+    assert reasons == [outcome]
