@@ -11,6 +11,8 @@ the tick loop `seq` is the tick k and `t` is k T_c.
 
 from __future__ import annotations
 
+import re
+from functools import lru_cache
 from math import inf
 from typing import Annotated, Literal
 
@@ -38,6 +40,13 @@ Name = Annotated[str, msgspec.Meta(pattern=rf"^{NAME}\Z")]
 
 NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
 """The same, or empty if there is none or it is not known."""
+
+QuickName = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^{NAME}\Z"})]
+"""A name that is checked together with all others of its message, by `__post_init__`: a pattern for each would cost
+several times what all else of decoding does, and states and measurements are decoded at every tick."""
+
+QuickNameOrNone = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^({NAME})?\Z"})]
+"""The same, or empty."""
 
 Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
 """What people call something in their tables: up to 200 printable characters."""
@@ -91,6 +100,19 @@ Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
 """Names of inverters or processes."""
 
 
+QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
+"""The same, checked together."""
+
+_is_name = re.compile(NAME).fullmatch
+
+
+@lru_cache(maxsize=128)
+def _check_names(*names: str) -> None:
+    """Check all names of a message at once; those of a sender are the same each time."""
+    if not all(map(_is_name, names)):
+        raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
+
+
 def _once(what: str, names: tuple[str, ...]) -> None:
     if len(set(names)) != len(names):
         raise ValueError(f"{what}: a name stands there twice")
@@ -99,7 +121,7 @@ def _once(what: str, names: tuple[str, ...]) -> None:
 class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What every message has."""
 
-    sender: Name
+    sender: QuickName
     """Name of the inverter whose agent sent it, or `PLANT`."""
     incarnation: Count
     """Which life of the sender: greater after every restart."""
@@ -107,6 +129,9 @@ class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True,
     """Tick number k in the tick loop, roster number while a roster is prepared."""
     t: Time
     """Run time (s)."""
+
+    def __post_init__(self) -> None:
+        _check_names(self.sender)
 
 
 class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -131,7 +156,7 @@ class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What an inverter's sensors read at tick k, and the grant to compute tick k (plant -> agent)."""
 
-    to: Name
+    to: QuickName
     """Inverter this measurement belongs to."""
     P: Power
     """Real power out of the inverter (W, three phases)."""
@@ -147,12 +172,13 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Voltage set-point the plant holds now (V)."""
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
-    island: NameOrNone
+    island: QuickNameOrNone
     """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
-    roster: Names
+    roster: QuickNames
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 
     def __post_init__(self) -> None:
+        _check_names(self.sender, self.to, self.island or self.to, *self.roster)
         _once("roster", self.roster)
 
 
@@ -174,7 +200,7 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     """Voltage set-point (V)."""
     Q: Power
     """Reactive power measured at tick k (var)."""
-    island: NameOrNone = ""
+    island: QuickNameOrNone = ""
     """Island the inverter stood in at that measurement: who stands in another one leaves this state out of its sums.
     Empty if it is not known."""
     angle: Angle | None = None
@@ -182,6 +208,9 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     idle: bool = False
     """Whether the agent stands still: paused, or without a measurement. In wall-clock time it then says nothing; in
     simulated time the tick waits for this state, which nobody uses."""
+
+    def __post_init__(self) -> None:
+        _check_names(self.sender, self.island or self.sender)
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -193,6 +222,7 @@ class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     """Of each agent on the roster the instance that is meant: two processes may claim one name."""
 
     def __post_init__(self) -> None:
+        _check_names(self.sender)
         _once("roster", self.roster)
         if len(self.instances) != len(self.roster):
             raise ValueError(f"instances: {len(self.instances)} for {len(self.roster)} names on the roster")
@@ -233,6 +263,7 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
     """Whether this is the last part: the sender closes once it is told."""
 
     def __post_init__(self) -> None:
+        _check_names(self.sender)
         if self.final and not self.instance:
             raise ValueError("instance: the last part must say whom to tell that it has come")
 
@@ -316,6 +347,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Senders between whom and this agent an emulated fault holds now."""
 
     def __post_init__(self) -> None:
+        _check_names(self.sender)
         _once("neighbours", self.neighbours)
         if len(self.ages) != len(self.neighbours):
             raise ValueError(f"ages: {len(self.ages)} of {len(self.neighbours)} neighbours")
@@ -387,6 +419,7 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     whether it has got them all."""
 
     def __post_init__(self) -> None:
+        _check_names(self.sender)
         _once("inverters", self.inverters)
         columns, before = 1 + VALUES * len(self.inverters), -inf
         for row in self.rows:

@@ -46,8 +46,8 @@ BODIES: dict[str, dict[str, Any]] = {
 """Of each type of message the fields that no other has, in one that is sound."""
 
 TEXTS = (
-    "", "x", "inv1", "plant", "x" * 64, "x" * 65, "x" * 200, "x" * 201, "x" * 4000, "x" * 4001, "a b", "a/b", "*",
-    "a\n", "\x1b[2Jinv1", "inv1\x00", "\u202e1vni", "inv1\r2026-01-01 ERROR all is lost", "ä", "\ud7ff\U0001f600",
+    "", "x", "inv1", "plant", "x" * 64, "x" * 65, "x" * 200, "x" * 201, "x" * 4000, "x" * 4001, "a b", "a,b", "a/b",
+    "*", "a\n", "\x1b[2Jinv1", "inv1\x00", "\u202e1vni", "inv1\r2026-01-01 ERROR all is lost", "ä", "\ud7ff\U0001f600",
 )  # fmt: skip
 """Texts on both sides of any bound; which side, the annotation says."""
 
@@ -123,7 +123,15 @@ def _inside(path: str, type_: Any, holder: Any, key: Any) -> Iterator[tuple[str,
 
 
 def _parts(type_: Any) -> tuple[Any, ...]:
-    return type_.types if isinstance(type_, inspect.UnionType) else (type_,)
+    return tuple(map(plain, type_.types if isinstance(type_, inspect.UnionType) else (type_,)))
+
+
+def plain(type_: Any) -> Any:
+    """A type with the pattern that its message checks by itself, if it has one."""
+    if not isinstance(type_, inspect.Metadata):
+        return type_
+    assert type_.extra is not None
+    return msgspec.structs.replace(type_.type, pattern=type_.extra["pattern"])
 
 
 def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
