@@ -12,6 +12,10 @@ LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by mistake: control over such a link is not what netem is for."""
 
 
+LEAST = 1e-12
+"""Least probability that must be above 0: one that is divided by leaves no number where it is as good as 0."""
+
+
 class Mistake(NamedTuple):
     """One mistake."""
 
@@ -40,7 +44,7 @@ def probability(path: str, value: float, what: str, *, above_zero: bool = False)
     >>> probability("loss.p", 30.0, "a loss")[0].text
     'a loss is a probability from 0 to 1, got 30; did you mean 0.3 (30 %)?'
     """
-    if 0.0 < value <= 1.0 or (value == 0.0 and not above_zero):
+    if (LEAST if above_zero else 0.0) <= value <= 1.0:
         return []
     meant = f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
     least = "above 0 and up to 1" if above_zero else "from 0 to 1"

@@ -42,6 +42,10 @@ def objection(value: float, allowed: Range) -> str:
     """
     unit = f" {allowed.unit}" if allowed.unit else ""
     span = f"{allowed.low:g} to {allowed.high:g}{unit}"
+    try:
+        value = float(value)  # a whole number may be beyond any float
+    except OverflowError:
+        value = math.inf if value > 0 else -math.inf
     if not math.isfinite(value):
         return f"{allowed.what} must be a finite number, got {value}; {span} makes sense"
     if allowed.above_zero and value <= 0:

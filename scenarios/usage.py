@@ -64,7 +64,9 @@ def require(modules: dict[str, str], install: str = INSTALL) -> None:
 
 
 def fail(lines: list[str], code: int) -> NoReturn:
-    """End the command with lines on standard error."""
+    """End the command with lines on standard error; what cannot be printed in them is spelt out."""
+    from wire.printable import printable
+
     for line in lines:
-        print(f"gridpeers: {line}", file=sys.stderr)
+        print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)
     raise SystemExit(code)

@@ -24,6 +24,8 @@ MOST_ROWS = 20
 def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
     """Delays (s) of a CSV file with a column `delay_s`, one message a row; and what is wrong with it, row by row."""
     try:
+        if path.exists() and not path.is_file():  # a device or a pipe may never end
+            return (), [f"{path}: cannot be read: it is no file"]
         with path.open(newline="", encoding="utf-8-sig") as stream:
             return _rows(stream, path.name)
     except FileNotFoundError:
@@ -32,6 +34,8 @@ def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
         return (), [f"{path}: cannot be read: {error.strerror}"]
     except (UnicodeDecodeError, csv.Error) as error:
         return (), [f"{path.name}: not a CSV file in UTF-8 ({error})"]
+    except ValueError:  # a name with a zero byte
+        return (), [f'there is no file "{path}"; the path is seen from the scenario']
 
 
 def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:

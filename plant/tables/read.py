@@ -129,11 +129,19 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     return found
 
 
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder; a name that is too long, or cannot be, names none."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
 def _folder(feeder: str) -> Path:
     if feeder in feeders():
         return DATA / feeder
     folder = Path(feeder)
-    if folder.is_dir():
+    if is_folder(folder):
         return folder
     raise FeederError(
         feeder,

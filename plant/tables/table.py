@@ -155,6 +155,8 @@ class Table:
                         mistakes.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
                 if set(columns) <= set(found):
                     self._read(reader)
+        except OSError as error:
+            mistakes.append(f"{file}: cannot be read: {error.strerror}")
         except (UnicodeDecodeError, csv.Error) as error:
             mistakes.append(f"{file}: not a CSV file in UTF-8 ({error})")
 

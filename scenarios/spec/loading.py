@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder
-from plant.tables import FeederError, feeders, read_feeder
+from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
 from scenarios.spec.checks import check_cases, check_names, check_start, check_step, check_switches, check_times
 from scenarios.spec.limits import check_limits
@@ -82,8 +82,10 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     text = _text_of(path)
     try:
         return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # no TOML, or a whole number of more digits than Python reads
         raise ScenarioError([_malformed(path.name, text, str(error))]) from None
+    except RecursionError:
+        raise ScenarioError([f"{path.name}: brackets or names are nested too deeply to be read"]) from None
 
 
 def check_tables(
@@ -124,7 +126,7 @@ def check_tables(
 
 def _text_of(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ScenarioError([f"{path.name}: byte {error.start} is not UTF-8; save the file as UTF-8 text"]) from None
     except OSError as error:
@@ -133,6 +135,8 @@ def _text_of(path: Path) -> str:
 
 def _malformed(file: str, text: str, reason: str) -> str:
     """Mistake of a text that is no TOML, with its line, which `tomllib` tells in a parenthesis."""
+    if reason.startswith("Exceeds the limit"):
+        return f"{file}: not valid TOML: a whole number has thousands of digits"
     match = re.search(r"\(at line (\d+), column (\d+)\)", reason)
     last = max(len(text.rstrip().splitlines()), 1)
     line = int(match[1]) if match else last
@@ -144,7 +148,7 @@ def _malformed(file: str, text: str, reason: str) -> str:
 def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
     """Resolve a feeder's path that is relative to the file: processes may start elsewhere."""
     feeder = scenario.plant.feeder
-    if feeder not in feeders() and (folder / feeder).is_dir():
+    if feeder not in feeders() and is_folder(folder / feeder):
         plant = msgspec.structs.replace(scenario.plant, feeder=str((folder / feeder).resolve()))
         return msgspec.structs.replace(scenario, plant=plant)
     return scenario

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from wire.printable import printable
+
 _TABLE = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
 _ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
 _KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
@@ -16,11 +18,12 @@ class ScenarioError(ValueError):
     Attributes
     ----------
     mistakes : tuple[str, ...]
-        One sentence each, with file, line, key, value and what would be right.
+        One sentence each, with file, line, key, value and what would be right; what a file has that cannot be printed
+        is spelt out.
     """
 
     def __init__(self, mistakes: Iterable[str]) -> None:
-        self.mistakes = tuple(mistakes)
+        self.mistakes = tuple(map(printable, mistakes))
         super().__init__("\n".join(self.mistakes))
 
 
@@ -71,7 +74,8 @@ class Mistakes:
         while path:
             if path in self._lines:
                 return self._lines[path]
-            path = re.sub(r"(\.[^.\[]+|\[\d+\]|^[^.\[]+)$", "", path)
+            shorter = re.sub(r"(\.[^.\[]+|\[\d+\]|^[^.\[]+)$", "", path)
+            path = shorter if shorter != path else path[:-1]  # a quoted key may have any sign in it
         return 0
 
 
