@@ -99,7 +99,7 @@ def _logged(request: Request, progress: Progress) -> Report:
             print(f"broken: {error}", file=log)
             raise
         except Exception as error:
-            if no_room(error):
+            if no_room(error) or not file.exists():  # the folder is gone, and with it this log
                 raise
             traceback.print_exc(file=log)
             raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error

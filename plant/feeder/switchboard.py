@@ -56,7 +56,7 @@ class Switchboard:
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps at which switches are or were operated."""
+        """Steps at which switches are yet to be operated."""
         return self._at.keys()
 
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
@@ -77,6 +77,8 @@ class Switchboard:
     def drop(self, step: int, operation: Operation) -> None:
         """Leave out an operation of a step; what stands there else is operated all the same."""
         self._at[step].remove(operation)
+        if not self._at[step]:
+            del self._at[step]
 
     def shown(self, name: str) -> str:
         """Name of a switch as people are told it, with its alias."""
@@ -84,7 +86,7 @@ class Switchboard:
         return f"{alias} ({name})" if alias else name
 
     def foreseen(self) -> Iterator[frozenset[str]]:
-        """Switches that will be closed after each step with operations, in order of time, those now past included."""
+        """Switches that will be closed after each step with operations that are yet to come, in order of time."""
         closed = self.closed
         for step in sorted(self._at):
             for operation in self._at[step]:
@@ -92,10 +94,10 @@ class Switchboard:
             yield closed
 
     def operate(self, step: int, notes: Mapping[str, str] = MappingProxyType({})) -> list[PlantEvent]:
-        """Operate the switches of a step, all at once; tells of each what was done, and what is noted of it."""
+        """Operate the switches of a step, all at once, and forget it; tells of each what was done and is noted."""
         t = round(step * self._h, 9)
         events = []
-        for name, action, _ in self._at[step]:
+        for name, action, _ in self._at.pop(step):
             known = name in self.closed
             self.closed = _operated(self.closed, name, action)
             already = known == (action == "close")

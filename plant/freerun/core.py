@@ -61,6 +61,9 @@ LEAD = 0.25
 AGAIN = 1.0
 """Time (s, wall) after which a nameplate that has not come is asked for again: a question dies with its link."""
 
+RECORDING = 15.0
+"""Longest time (s, wall) that an ended run stays for a recorder that has not got all of it: it may have stood still."""
+
 WAITING = 0.5
 """Time (s, wall) between two words of a plant that waits for agents to those that are there."""
 
@@ -109,6 +112,8 @@ class FreePlant(Side):
         """What recorders can have again."""
         self._lost_recorders: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""
+        self._stays = False
+        """Whether the end is kept back only for recorders."""
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         keys = self.keys
         for name in plant.inverters:
@@ -238,7 +243,7 @@ class FreePlant(Side):
                 self._drop(name)
                 if self.phase in ("gathering", "running"):
                     self._note(name, f"{name} died; its inverter stays on primary droop at its last set-points")
-        if self.phase == "closing" and self._all_have_gone():
+        if self.phase == "closing" and (self._all_have_gone() or (self._stays and not self._awaits_recorders())):
             self.phase = "over"
 
     def _drop(self, name: str) -> None:
@@ -297,7 +302,7 @@ class FreePlant(Side):
             self.ordering.ask(self.plates, self.t, command.reply_to)
         if command.verb == "telemetry" and self.phase != "running":
             self._publish_again(self.kept.take_all())
-        if command.verb == "down":
+        if answer.ok and command.verb == "down":
             self.close("the run was ended by command", now)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
@@ -366,7 +371,10 @@ class FreePlant(Side):
             self._ask_again(now)
         elif self.phase == "closing":
             self._send_the_last()
-            self.phase = "over"
+            if self._stays or not self._awaits_recorders():
+                self.phase = "over"
+            else:
+                self._stays, self._deadline = True, now + RECORDING - CLOSING
         elif self.phase == "running" and self.tick == self._ticks:
             self.close("end of the scenario", now)
         elif self.phase == "running":
@@ -467,6 +475,10 @@ class FreePlant(Side):
     def _all_have_gone(self) -> bool:
         """Whether all tokens have; a recorder that is out of reach may yet come for what it has not got."""
         return super()._all_have_gone() and not self._lost_recorders
+
+    def _awaits_recorders(self) -> bool:
+        """Whether a recorder is out of reach, or has not left, which it does once it has the whole run."""
+        return not (self._recorders | self._lost_recorders).isdisjoint(self.config.recorders)
 
     def _publish_again(self, payloads: list[bytes]) -> None:
         for payload in payloads:

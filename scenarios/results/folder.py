@@ -83,7 +83,9 @@ def refusal(folder: Path, error: OSError) -> str:
     >>> refusal(Path("here"), OSError(errno.ENOSPC, "No space left on device"))
     'here: cannot be written: No space left on device'
     """
-    return f"{error.filename or shown(folder)}: cannot be written: {error.strerror}" if no_room(error) else str(error)
+    if no_room(error) or error.errno in _GONE:
+        return f"{error.filename or shown(folder)}: cannot be written: {error.strerror}"
+    return str(error)
 
 
 def write_whole(path: Path, text: str) -> None:

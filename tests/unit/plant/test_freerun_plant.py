@@ -410,3 +410,55 @@ def test_a_signal_in_the_middle_of_a_message_ends_the_process_and_not_the_messag
     monkeypatch.setattr(lab.toy, "connect", connect)
     with pytest.raises(StoppedError):
         lab.join("inv1")
+
+
+def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
+    """One that comes back five seconds after the end still gets all of it, the last telemetry too."""
+    lab = Lab(recorders=("r",))
+    recorder = KEYS.alive_recorder("r")
+    lab.side.appeared(recorder, lab.now)
+    lab.join("inv1", "inv2", "inv3")
+    lab.step(10)
+    lab.side.vanished(recorder, lab.now)
+    lab.ask("down")
+    for name in ("inv1", "inv2", "inv3"):
+        lab.token(name, gone=True)
+    lab.take(Telemetry)
+    lab.now += 5.0
+    lab.side.expire(lab.now)
+    lab.side.appeared(recorder, lab.now)
+    lab.do()
+    assert lab.side.phase == "closing"
+
+    lab.ask("telemetry", "0")
+    again = lab.take(Telemetry)
+    lab.side.vanished(recorder, lab.now)
+
+    assert [message.seq for message in again] == list(range(len(again)))
+    assert again[-1].final
+    assert lab.side.over
+
+
+def test_an_ended_run_does_not_stay_for_ever() -> None:
+    """A recorder that never comes back, and an agent that never leaves, keep nothing."""
+    lab = Lab(recorders=("r",))
+    lab.side.appeared(KEYS.alive_recorder("r"), lab.now)
+    lab.join("inv1", "inv2", "inv3")
+    lab.step(10)
+    ended = lab.now
+    lab.ask("down")
+    while not lab.side.over:
+        lab.step()
+
+    assert lab.now - ended < 15.1
+
+
+def test_a_run_is_ended_once() -> None:
+    """A second order to end a run that ends already is refused, and does not end it anew."""
+    lab = running()
+    lab.step()
+    answers = [lab.ask("down"), lab.ask("down")]
+
+    assert [(answer.ok, answer.text) for answer in answers][1] == (False, "the run is ending")
+    assert answers[0].ok
+    assert [message.final for message in lab.take(Telemetry)].count(True) == 1
