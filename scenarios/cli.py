@@ -159,7 +159,8 @@ def run(
         with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)
     except BrokenRunError as error:
-        fail([f"the run broke: {error}", f"what came until then is in {shown(folder)}/"], BROKEN)
+        kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []
+        fail([f"the run broke: {error}", *kept], BROKEN)
     except KeyboardInterrupt as error:
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     show(report, console)

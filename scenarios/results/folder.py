@@ -15,6 +15,9 @@ RUNS = Path("runs")
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """What a system says that takes no more bytes, whatever is done to the file."""
 
+_GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)
+"""What it says of a folder that was removed, or closed to us, while it was written to."""
+
 
 class FolderError(ValueError):
     """The output folder cannot be used."""
