@@ -9,7 +9,8 @@ from typing import get_type_hints
 from msgspec.structs import replace
 
 from plant.interface import PlantLike, ReadingLike
-from wire.messages import LIMIT, PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
+from wire.bounds import LIMIT
+from wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
 from wire.printable import printable
 
 _NUMBER_BYTES = 9

@@ -55,8 +55,8 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
 
     Examples
     --------
-    >>> from wire import messages
-    >>> dict(alias_docs(messages))["Rating"]
+    >>> from wire import bounds
+    >>> dict(alias_docs(bounds))["Rating"]
     'W: more than none, and at most a gigawatt.'
     """
     body = ast.parse(inspect.getsource(module)).body

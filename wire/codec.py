@@ -2,7 +2,7 @@
 
 msgpack through msgspec, which checks types and bounds while it decodes, and the CRC-32 of that in the last four bytes:
 TCP's checksum of 16 bits lets an error through now and then, and a bit flipped within a number would decode as another
-number. So a message that comes out of `decode` is as it was sent, and within the bounds of `wire.messages`. Whatever is
+number. So a message that comes out of `decode` is as it was sent, and within the bounds of `wire.bounds`. Whatever is
 not is a `RejectedError` of one of the kinds in `KINDS`: receivers count it and go on, as no message may stop an agent.
 """
 
@@ -17,7 +17,8 @@ from zlib import crc32
 
 import msgspec
 
-from wire.messages import LIMIT, AnyMessage, Message
+from wire.bounds import LIMIT
+from wire.messages import AnyMessage, Message
 from wire.printable import printable
 
 CRC = 4

@@ -10,7 +10,7 @@ import re
 
 import msgspec
 
-from wire.messages import NAME
+from wire.bounds import MOST_COUNT, NAME
 
 _NAME = re.compile(NAME)
 
@@ -161,7 +161,7 @@ def epoch_of(part: str) -> int | None:
     >>> epoch_of("1763778000000"), epoch_of("late"), epoch_of("9" * 30)
     (1763778000000, None, None)
     """
-    return int(part) if re.fullmatch("[0-9]{1,16}", part) and int(part) < 2**53 else None
+    return int(part) if re.fullmatch("[0-9]{1,16}", part) and int(part) <= MOST_COUNT else None
 
 
 def run_of_plant(key: str) -> str:

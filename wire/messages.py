@@ -1,116 +1,52 @@
 """The messages of a run. Frozen, validated, SI units on the wire.
 
-The annotations are the only place where bounds stand; the codec checks them while it decodes. They are physical: as
-wide as anything that a plant, an inverter or a run can be, and no wider. What a message says twice must agree
-(`__post_init__`). So whatever has been decoded is safe to compute with, to print and to put into a key.
+The type of a field is its bounds (`wire.bounds`), and what a message says twice must agree (`__post_init__`). So
+whatever has been decoded is safe to compute with, to print and to put into a key.
 
-Every message carries who sent it (`sender`), which life of that sender (`incarnation`: a restarted
-agent has a higher one than its ghost), a number (`seq`) and the run's time (`t`, s). In messages of
-the tick loop `seq` is the tick k and `t` is k T_c.
+Every message carries its sender (`sender`), the epoch of that sender (`incarnation`: the life of one process; see
+`wire.admission`), a number (`seq`) and the run's time (`t`, s). In messages of the tick loop `seq` is the tick k and
+`t` is k T_c.
 """
 
 from __future__ import annotations
 
-import re
-from functools import lru_cache
 from math import inf
 from typing import Annotated, Literal
 
 import msgspec
+
+from wire.bounds import (
+    LATEST,
+    MOST,
+    Age,
+    Count,
+    Cycles,
+    Data,
+    Droop,
+    Frequency,
+    Label,
+    Name,
+    NameOrNone,
+    Names,
+    NominalFrequency,
+    NominalVoltage,
+    Power,
+    QuickName,
+    QuickNameOrNone,
+    QuickNames,
+    Rating,
+    Reply,
+    Text,
+    Time,
+    Voltage,
+    check_names,
+)
 
 PLANT = "plant"
 """Name under which the plant process sends."""
 
 OFF = "off"
 """In place of an island's name: the inverter is off the network, or in an island that nothing feeds."""
-
-LIMIT = 64_000
-"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
-
-NAME = r"[A-Za-z0-9_.-]{1,64}"
-"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
-
-UNPRINTABLE = "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
-"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing."""
-
-_PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
-
-Name = Annotated[str, msgspec.Meta(pattern=rf"^{NAME}\Z")]
-"""Name of an inverter, process or run: 1 to 64 letters, digits, "_", "-" or "."; safe in keys, files and logs."""
-
-NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
-"""The same, or empty if there is none or it is not known."""
-
-QuickName = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^{NAME}\Z"})]
-"""A name that is checked together with all others of its message, by `__post_init__`: a pattern for each would cost
-several times what all else of decoding does, and states and measurements are decoded at every tick."""
-
-QuickNameOrNone = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^({NAME})?\Z"})]
-"""The same, or empty."""
-
-Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
-"""What people call something in their tables: up to 200 printable characters."""
-
-Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
-"""A sentence for people, or an order that no core reads: up to 4000 printable characters on one line."""
-
-Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
-"""What somebody asked for: printable, and only as long as a message may be."""
-
-Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
-"""Bytes that no core looks into."""
-
-Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
-"""A tick, a sequence number, an incarnation: never negative, and exact as a float too."""
-
-Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
-"""s, of run time or of waiting: up to 30 years."""
-
-Age = Annotated[float, msgspec.Meta(ge=-1.0, le=1e9)]
-"""s; -1 if there is none."""
-
-Rating = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
-"""W: more than none, and at most a gigawatt."""
-
-Power = Annotated[float, msgspec.Meta(ge=-1e11, le=1e11)]
-"""W or var: up to 100 times the largest rating, which is what an agent without limits ever sets."""
-
-NominalVoltage = Annotated[float, msgspec.Meta(gt=0.0, le=1e5)]
-"""V, line-to-neutral: at the terminals of an inverter, so at most 100 kV."""
-
-Voltage = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
-"""V, line-to-neutral RMS: up to 10 times the highest nominal voltage."""
-
-NominalFrequency = Annotated[float, msgspec.Meta(ge=1.0, le=1000.0)]
-"""Hz: 16.7, 50, 60 and 400 are in use."""
-
-Frequency = Annotated[float, msgspec.Meta(ge=0.0, le=2000.0)]
-"""Hz: from standstill to twice the highest nominal frequency."""
-
-Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
-"""pu per pu: some; at 1 full power would take the whole frequency, or voltage."""
-
-Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
-"""Cycles: the farthest frequency for the longest time."""
-
-MOST = 1000
-"""Most inverters in a run: one row of telemetry on more would not fit into a message."""
-
-Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
-"""Names of inverters or processes."""
-
-
-QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
-"""The same, checked together."""
-
-_is_name = re.compile(NAME).fullmatch
-
-
-@lru_cache(maxsize=128)
-def _check_names(*names: str) -> None:
-    """Check all names of a message at once; those of a sender are the same each time."""
-    if not all(map(_is_name, names)):
-        raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
 
 
 def _once(what: str, names: tuple[str, ...]) -> None:
@@ -124,14 +60,14 @@ class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True,
     sender: QuickName
     """Name of the inverter whose agent sent it, or `PLANT`."""
     incarnation: Count
-    """Which life of the sender: greater after every restart."""
+    """Epoch of the sender: the life of one process. Two are equal or not; which is greater says nothing."""
     seq: Count
     """Tick number k in the tick loop, roster number while a roster is prepared."""
     t: Time
     """Run time (s)."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender)
+        check_names(self.sender)
 
 
 class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -178,7 +114,7 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender, self.to, self.island or self.to, *self.roster)
+        check_names(self.sender, self.to, self.island or self.to, *self.roster)
         _once("roster", self.roster)
 
 
@@ -210,7 +146,7 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     simulated time the tick waits for this state, which nobody uses."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender, self.island or self.sender)
+        check_names(self.sender, self.island or self.sender)
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -222,7 +158,7 @@ class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     """Of each agent on the roster the instance that is meant: two processes may claim one name."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender)
+        check_names(self.sender)
         _once("roster", self.roster)
         if len(self.instances) != len(self.roster):
             raise ValueError(f"instances: {len(self.instances)} for {len(self.roster)} names on the roster")
@@ -263,7 +199,7 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
     """Whether this is the last part: the sender closes once it is told."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender)
+        check_names(self.sender)
         if self.final and not self.instance:
             raise ValueError("instance: the last part must say whom to tell that it has come")
 
@@ -347,7 +283,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Senders between whom and this agent an emulated fault holds now."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender)
+        check_names(self.sender)
         _once("neighbours", self.neighbours)
         if len(self.ages) != len(self.neighbours):
             raise ValueError(f"ages: {len(self.ages)} of {len(self.neighbours)} neighbours")
@@ -419,7 +355,7 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     whether it has got them all."""
 
     def __post_init__(self) -> None:
-        _check_names(self.sender)
+        check_names(self.sender)
         _once("inverters", self.inverters)
         columns, before = 1 + VALUES * len(self.inverters), -inf
         for row in self.rows:
@@ -427,7 +363,7 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
                 raise ValueError(
                     f"rows: one has {len(row)} values; t and those of {len(self.inverters)} inverters are {columns}"
                 )
-            if not (before < row[0] <= 1e9 and row[0] >= 0.0):
+            if not (before < row[0] <= LATEST and row[0] >= 0.0):
                 raise ValueError(f"rows: one of t = {row[0]:g} s comes after that of {before:g} s")
             before = row[0]
 

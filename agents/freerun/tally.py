@@ -7,6 +7,7 @@ from typing import Literal
 
 from agents.config import AgentConfig
 from agents.freerun.heard import Heard
+from wire.bounds import MOST_COUNT
 from wire.messages import AgentStatus
 from wire.printable import printable
 
@@ -72,7 +73,7 @@ class Tally:
             received=self.used,
             sent=self.sent,
             rejected=rejected,
-            lost=min(self.lost + dropped, 2**53 - 1),
+            lost=min(self.lost + dropped, MOST_COUNT),
             ticks=self.ticks,
             missed=self.missed,
             lateness=lateness,

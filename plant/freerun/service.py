@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from wire.messages import LIMIT, PLANT, Answer, Command
+from wire.bounds import LIMIT
+from wire.messages import PLANT, Answer, Command
 from wire.printable import printable
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
-from wire.messages import LinkReport, Name
+from wire.bounds import Name
+from wire.messages import LinkReport
 
 
 class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -15,9 +15,9 @@ from netem.spec.partition import Partition
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
-from wire import keys, messages
+from wire import bounds, keys, messages
+from wire.bounds import LIMIT
 from wire.codec import KINDS
-from wire.messages import LIMIT
 
 TOPICS = ("keys", "messages", "scenario")
 """Pages there are."""
@@ -76,7 +76,7 @@ def _messages() -> Iterator[str]:
     yield ""
     yield "## Types, and their bounds"
     yield ""
-    yield from _table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(messages)))
+    yield from _table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
     yield ""
     yield "## Kinds of refused messages"
     yield ""

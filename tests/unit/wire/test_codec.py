@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from msgspec import inspect
 
 from tests.hostile.cases import cases, packed, plain, sealed, sound
-from wire.codec import KINDS, LIMIT, RejectedError, Rejects, decode, encode
+from wire.bounds import LIMIT
+from wire.codec import KINDS, RejectedError, Rejects, decode, encode
 from wire.messages import (
     MESSAGES,
     AgentStatus,

@@ -16,7 +16,8 @@ from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.codec import LIMIT, encode
+from wire.bounds import LIMIT
+from wire.codec import encode
 from wire.messages import Ready, State, Stop, Telemetry
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -1,0 +1,106 @@
+"""Types of the fields of messages, each with its bounds. Pure.
+
+Bounds are physical: as wide as anything that a plant, an inverter or a run can be, and no wider. They stand here alone;
+the codec checks them while it decodes.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from typing import Annotated
+
+import msgspec
+
+LIMIT = 64_000
+"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
+
+NAME = r"[A-Za-z0-9_.-]{1,64}"
+"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
+
+UNPRINTABLE = "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
+"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing."""
+
+_PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
+
+Name = Annotated[str, msgspec.Meta(pattern=rf"^{NAME}\Z")]
+"""Name of an inverter, process or run: 1 to 64 letters, digits, "_", "-" or "."; safe in keys, files and logs."""
+
+NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
+"""The same, or empty if there is none or it is not known."""
+
+QuickName = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^{NAME}\Z"})]
+"""A name that is checked together with all others of its message, by `__post_init__`: a pattern for each would cost
+several times what all else of decoding does, and states and measurements are decoded at every tick."""
+
+QuickNameOrNone = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^({NAME})?\Z"})]
+"""The same, or empty."""
+
+Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
+"""What people call something in their tables: up to 200 printable characters."""
+
+Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
+"""A sentence for people, or an order that no core reads: up to 4000 printable characters on one line."""
+
+Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
+"""What somebody asked for: printable, and only as long as a message may be."""
+
+Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
+"""Bytes that no core looks into."""
+
+MOST_COUNT = 2**53 - 1
+"""Largest `Count`."""
+
+Count = Annotated[int, msgspec.Meta(ge=0, le=MOST_COUNT)]
+"""A tick, a sequence number, an epoch: never negative, and exact as a float too."""
+
+LATEST = 1e9
+"""Largest `Time` (s)."""
+
+Time = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST)]
+"""s, of run time or of waiting: up to 30 years."""
+
+Age = Annotated[float, msgspec.Meta(ge=-1.0, le=LATEST)]
+"""s; -1 if there is none."""
+
+Rating = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
+"""W: more than none, and at most a gigawatt."""
+
+Power = Annotated[float, msgspec.Meta(ge=-1e11, le=1e11)]
+"""W or var: up to 100 times the largest rating, which is what an agent without limits ever sets."""
+
+NominalVoltage = Annotated[float, msgspec.Meta(gt=0.0, le=1e5)]
+"""V, line-to-neutral: at the terminals of an inverter, so at most 100 kV."""
+
+Voltage = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
+"""V, line-to-neutral RMS: up to 10 times the highest nominal voltage."""
+
+NominalFrequency = Annotated[float, msgspec.Meta(ge=1.0, le=1000.0)]
+"""Hz: 16.7, 50, 60 and 400 are in use."""
+
+Frequency = Annotated[float, msgspec.Meta(ge=0.0, le=2000.0)]
+"""Hz: from standstill to twice the highest nominal frequency."""
+
+Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+"""pu per pu: some; at 1 full power would take the whole frequency, or voltage."""
+
+Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
+"""Cycles: the farthest frequency for the longest time."""
+
+MOST = 1000
+"""Most inverters in a run: one row of telemetry on more would not fit into a message."""
+
+Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
+"""Names of inverters or processes."""
+
+QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
+"""The same, checked together."""
+
+_is_name = re.compile(NAME).fullmatch
+
+
+@lru_cache(maxsize=128)
+def check_names(*names: str) -> None:
+    """Check all names of a message at once; those of a sender are the same each time."""
+    if not all(map(_is_name, names)):
+        raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
