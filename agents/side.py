@@ -1,4 +1,4 @@
-"""What an agent's side of simulated and of wall-clock time have in common: who it is, which plant it follows. Pure."""
+"""What an agent's side of simulated and of wall-clock time have in common: its routes, and what it reports. Pure."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from math import inf
 from agents.agent import Agent, check_nameplate
 from agents.config import AgentConfig
 from wire.codec import RejectedError, encode
-from wire.endpoint import Endpoint, Route
-from wire.keys import epoch_of
+from wire.endpoint import Route
 from wire.links import Links
-from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, Stop
+from wire.messages import PLANT, LinkReport, Measurement, Stop
+from wire.plant_follower import PlantFollower
 
 REPORT_TICKS = 100
 """What emulated links did is sent every so many ticks."""
 
 
-class Side(Endpoint):
+class Side(PlantFollower):
     """One agent on a wire.
 
     Parameters
@@ -45,8 +45,6 @@ class Side(Endpoint):
         self._links = links
         self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
         self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
-        self._plants: set[int] = set()
-        """Epochs of the plants whose tokens are there."""
 
     @property
     def token(self) -> str:
@@ -79,32 +77,10 @@ class Side(Endpoint):
 
     # ---------------------------------------------------------------- the plant
 
-    def _plant_appeared(self, part: str) -> None:
-        """Note the token of a plant."""
-        if (epoch := epoch_of(part)) is not None:
-            self._plants.add(epoch)
-            self.plant_seen = True
-
-    def _plant_vanished(self, part: str) -> bool:
-        """Note that the token of a plant is gone; whether the agent is without a plant now."""
-        if (epoch := epoch_of(part)) not in self._plants:
-            return False
-        self._plants.discard(epoch)
-        followed = self.admission.epoch(PLANT)
-        if followed == epoch:
-            self.admission.release(PLANT)
-        return followed == epoch or not self._plants
-
-    def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        """Follow the plant that speaks first of those whose tokens are there, until its token is gone."""
-        epoch = message.incarnation
-        if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
-            self.admission.bind(PLANT, epoch)
-            self._follow(epoch)
-        super()._admit(route, message, now)
-
-    def _follow(self, epoch: int) -> None:
-        """Note that the plant of this epoch is followed from now on."""
+    def _plant_appeared(self, part: str) -> bool:
+        known = super()._plant_appeared(part)
+        self.plant_seen |= known
+        return known
 
     def _on_own_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
         if message.to != self._name:

@@ -205,8 +205,7 @@ class FreeAgent(Side):
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared."""
         match self.keys.parts(key):
-            case ("alive", "plant", epoch):
-                self._plant_appeared(epoch)
+            case ("alive", "plant", epoch) if self._plant_appeared(epoch):
                 self._roll_call.plant_seen(now)
                 if self.phase == "seeking":
                     self.phase = "waiting"

@@ -124,8 +124,7 @@ class AgentSide(Side):
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared."""
         match self.keys.parts(key):
-            case ("alive", "plant", epoch):
-                self._plant_appeared(epoch)
+            case ("alive", "plant", epoch) if self._plant_appeared(epoch):
                 # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
                 self._patience.rest()
             case ("alive", "agent", name, instance) if name != self._name:

@@ -5,13 +5,10 @@ from __future__ import annotations
 from time import monotonic
 from typing import NamedTuple
 
+from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
-from wire.admission import Admission
-from wire.codec import RejectedError, Rejects, decode, encode
 from wire.driver.inbox import Inbox
 from wire.driver.session import Clock, Session
-from wire.keys import Keys
-from wire.messages import PLANT, Answer, AnyMessage, Command, LinkReport
 
 LOOK = 0.5
 """Longest wait (s) before it is looked whether something is missing."""
@@ -42,21 +39,15 @@ class TelemetryClient:
     """
 
     def __init__(self, name: str, run: str, endpoint: str, clock: Clock) -> None:
-        self._name, self._keys, self._endpoint, self._clock = name, Keys(run), endpoint, clock
+        self._name, self._endpoint, self._clock = name, endpoint, clock
         self._stream = TelemetryStream() if clock == "wall" else None
-        self._questions = 0
+        self._core = TelemetryEndpoint(name, run, self._stream)
         self._closed = False
-        self._admission = Admission()
-        self.rejects = Rejects(name)
+        self.rejects = self._core.rejects
         """What was dropped."""
         self.inbox = Inbox()
         """Where other threads put words."""
         self._session = self._open()
-
-    @property
-    def lost(self) -> bool:
-        """Whether something is lost for good."""
-        return self._stream is not None and self._stream.lost
 
     def say(self, word: str) -> None:
         """Have `take` return a word; from any thread."""
@@ -76,22 +67,11 @@ class TelemetryClient:
         for kind, key, payload, _ in self._session.take(1, timeout):
             if kind == "word":
                 found.append(Word(key))
+            elif kind == "appeared":
+                self._core.appeared(key)
             elif kind == "message":
-                try:
-                    message = decode(payload)
-                    self._identify(message)
-                    if isinstance(message, Answer):
-                        self._answered(message)
-                    elif not isinstance(message, Recordable):
-                        raise RejectedError("unexpected", f"a {type(message).__name__} instead of Telemetry")
-                    elif self._stream is None:
-                        found.append(message)
-                    else:
-                        found += self._stream.take(message, monotonic())
-                except RejectedError as rejected:
-                    self.rejects.add(rejected.kind, key, rejected.text)
-                except Exception as error:
-                    self.rejects.failed(key, error)
+                self._core.received(key, payload, monotonic())
+                found += self._core.take()
         if self._stream is not None and not self._closed:
             self._look_after(self._stream)
         return found
@@ -102,43 +82,19 @@ class TelemetryClient:
         self._session.close()
 
     def _open(self) -> Session:
+        keys = self._core.keys
         session = Session(self._name, connect=(self._endpoint,), gossip=False, clock=self._clock, inbox=self.inbox)
-        session.subscribe(self._keys.telemetry)
-        if self._stream is not None:
-            session.subscribe(self._keys.answer(self._name))
-        session.hold_token(self._keys.alive_recorder(self._name))
+        session.watch(keys.alive_plant("*"))  # before it subscribes: so it knows the plant when the plant speaks
+        for key in self._core.subscriptions:
+            session.subscribe(key)
+        session.hold_token(keys.alive_recorder(self._name))
         return session
-
-    def _identify(self, message: AnyMessage) -> None:
-        """Make sure that a message is of the plant: the one that spoke first, as there is no other at its endpoint."""
-        if isinstance(message, LinkReport):  # the plant passes them on as they are, once it has checked them
-            return
-        if message.sender == PLANT and self._admission.epoch(PLANT) is None:
-            self._admission.bind(PLANT, message.incarnation)
-        if message.sender != PLANT:
-            raise RejectedError("foreign", f"a {type(message).__name__} of {message.sender}")
-        self._admission.check(message)
-
-    def _answered(self, answer: Answer) -> None:
-        if self._stream is None or answer.seq != self._questions:
-            raise RejectedError("stale", f"an answer to question {answer.seq}, {self._questions} is the last")
-        self._stream.answered(answer, monotonic())
 
     def _look_after(self, stream: TelemetryStream) -> None:
         now = monotonic()
         if stream.is_astray(now):
             self._session.close()
             self._session = self._open()
-        question = stream.question(now)
+        question = self._core.question(now)
         if question is not None:
-            self._questions += 1
-            command = Command(
-                sender=self._name,
-                incarnation=1,
-                seq=self._questions,
-                t=0.0,
-                verb="telemetry",
-                argument=question,
-                reply_to=self._name,
-            )
-            self._session.publish(self._keys.command, encode(command))
+            self._session.publish(self._core.keys.command, question)

@@ -5,6 +5,8 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
+from agents.freerun import FreeAgent
+from tests.toy.toy_configs import agent_config
 from tests.unit.agents.free_lab import KEYS, T_C, Lab, running
 from wire.messages import Leave, Stop
 
@@ -312,3 +314,13 @@ def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     assert "in broken" in line
     assert "\x1b" not in line
     assert len(lab.decided()) == 1
+
+
+def test_a_token_that_no_plant_can_hold_is_no_plant() -> None:
+    """Anybody may hold a token alive/plant/x; whoever sees it goes on seeking."""
+    side = FreeAgent(replace(agent_config("inv1"), clock="wall"), "a")
+    side.start(0.0)
+    side.appeared("gridpeers/toy/alive/plant/x", 0.0)
+
+    assert side.phase == "seeking"
+    assert not side.plant_seen

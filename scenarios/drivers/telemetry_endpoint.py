@@ -1,0 +1,84 @@
+"""A recorder's end of a run without its session: which messages it believes, and in which order. Pure."""
+
+from __future__ import annotations
+
+from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
+from wire.codec import RejectedError, encode
+from wire.endpoint import Route
+from wire.messages import PLANT, Answer, AnyMessage, Command, LinkOrder, LinkReport, Telemetry
+from wire.plant_follower import PlantFollower
+
+
+class TelemetryEndpoint(PlantFollower):
+    """Takes what the plant publishes for recorders, of one plant from the first message to the last.
+
+    Parameters
+    ----------
+    name : str
+        The recorder's name.
+    run : str
+        Name of the run.
+    stream : TelemetryStream or None
+        Puts messages in order; None if nothing is ever lost, as in simulated time.
+    """
+
+    def __init__(self, name: str, run: str, stream: TelemetryStream | None) -> None:
+        super().__init__(name, run)
+        self._name, self._stream = name, stream
+        self._questions = 0
+        self._recordable: list[Recordable] = []
+        self._routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkOrder), self._on_recordable)
+        if stream is not None:
+            self._routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more is taken: never, as what came before the session was closed is recorded too."""
+        return False
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the token is declared."""
+        return tuple(self._routes)
+
+    def appeared(self, key: str) -> None:
+        """Note a token. That it goes is not noted: a link that breaks takes it away from a plant that goes on."""
+        match self.keys.parts(key):
+            case ("alive", "plant", part):
+                self._plant_appeared(part)
+
+    def take(self) -> list[Recordable]:
+        """Take out what can be recorded now, in order."""
+        found, self._recordable = self._recordable, []
+        return found
+
+    def question(self, now: float) -> bytes | None:
+        """The `Command` that asks the plant for what is missing, if it is to be asked now (s)."""
+        wanted = None if self._stream is None else self._stream.question(now)
+        if wanted is None:
+            return None
+        self._questions += 1
+        name = self._name
+        return encode(
+            Command(
+                sender=name,
+                incarnation=1,
+                seq=self._questions,
+                t=0.0,
+                verb="telemetry",
+                argument=wanted,
+                reply_to=name,
+            )
+        )
+
+    def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
+        if not isinstance(message, LinkReport):  # the plant passes them on as they are, once it has checked them
+            super()._admit(route, message, now)
+
+    def _on_recordable(self, message: Recordable, payload: bytes, now: float) -> None:
+        self._recordable += [message] if self._stream is None else self._stream.take(message, now)
+
+    def _on_answer(self, answer: Answer, payload: bytes, now: float) -> None:
+        if self._stream is None or answer.seq != self._questions:
+            raise RejectedError("stale", f"an answer to question {answer.seq}, {self._questions} is the last")
+        self._stream.answered(answer, now)

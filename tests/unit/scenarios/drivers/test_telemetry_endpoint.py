@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
+from scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
+from wire.codec import encode
+from wire.keys import Keys
+from wire.messages import Answer, LinkOrder, LinkReport, Telemetry
+
+KEYS = Keys("demo")
+
+
+def telemetry(seq: int, epoch: int = 7, sender: str = "plant") -> Telemetry:
+    """One without rows."""
+    return Telemetry(
+        sender=sender, incarnation=epoch, seq=seq, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
+        reproducible=True,
+    )  # fmt: skip
+
+
+@dataclass
+class Recorder:
+    """A recorder beside a plant of epoch 7."""
+
+    core: TelemetryEndpoint
+    taken: list[object] = field(default_factory=list)
+
+    def hear(self, message: Telemetry | LinkReport | LinkOrder | Answer, key: str = KEYS.telemetry) -> None:
+        """Bring a message on a key."""
+        self.core.received(key, encode(message), 0.0)
+        self.taken += self.core.take()
+
+
+def recorder(stream: TelemetryStream | None = None) -> Recorder:
+    """One that has just opened its session."""
+    return Recorder(TelemetryEndpoint("fleet", "demo", stream))
+
+
+def test_who_speaks_before_the_plant_does_not_take_its_place() -> None:
+    """Whoever knows the endpoint can publish as the plant; without the token of that epoch nobody records it."""
+    it = recorder()
+    it.hear(telemetry(0, epoch=6))
+    it.core.appeared(KEYS.alive_plant(7))
+    it.hear(telemetry(0, epoch=6))
+    it.hear(telemetry(0))
+    it.core.appeared(KEYS.alive_plant(6))
+    it.hear(telemetry(1, epoch=6))
+
+    assert it.taken == [telemetry(0)]
+    assert it.core.rejects.counts == {"unexpected": 2, "ghost": 1}
+
+
+def test_a_report_that_the_plant_passes_on_is_taken_and_an_order_of_anybody_else_is_not() -> None:
+    """Reports keep the name of the agent that made them; all else on the key is of the plant."""
+    it = recorder()
+    it.core.appeared(KEYS.alive_plant(7))
+    report = LinkReport(sender="inv1", incarnation=3, seq=0, t=0.0, data=b"book")
+    order = LinkOrder(sender="inv1", incarnation=3, seq=1, t=0.0, text="{}", reply_to="z1")
+    it.hear(report)
+    it.hear(order)
+    it.hear(telemetry(0, sender="inv1"))
+
+    assert it.taken == [report]
+    assert it.core.rejects.counts == {"foreign": 2}
+
+
+def test_only_the_answer_to_the_last_question_counts() -> None:
+    """An answer that nobody waits for any more would put the order out of step."""
+    it = recorder(TelemetryStream())
+    it.core.appeared(KEYS.alive_plant(7))
+    it.hear(telemetry(0))
+    asked = it.core.question(now=QUIET + 1.0)
+    for seq, first in ((0, "9"), (1, "1")):
+        it.hear(Answer(sender="plant", incarnation=7, seq=seq, t=0.0, ok=True, text=first), KEYS.answer("fleet"))
+    it.hear(telemetry(1))
+
+    assert asked is not None
+    assert it.taken == [telemetry(0), telemetry(1)]
+    assert it.core.rejects.counts == {"stale": 1}
