@@ -11,6 +11,7 @@ from plant.interface import PlantLike
 from plant.reporting import Reporter
 from plant.schedule import Schedule
 from wire.actions import Fetch
+from wire.admission import is_news
 from wire.clock import ticks_until, time_of
 from wire.codec import RejectedError, encode
 from wire.endpoint import Endpoint, Route
@@ -105,9 +106,7 @@ class Side(Endpoint):
         name = plate.sender
         if self.instances.get(name) != instance:
             raise RejectedError("ghost", f"instance {instance} of {name} does not take part")
-        if name in self.plates:
-            if self.plates[name] != plate:
-                raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+        if not is_news(plate, self.plates.get(name)):
             return
         self._introduced[name] = instance
         self.admission.bind(name, plate.incarnation)

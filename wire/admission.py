@@ -20,10 +20,13 @@ from __future__ import annotations
 from math import inf
 
 from wire.codec import RejectedError
-from wire.messages import AnyMessage
+from wire.messages import AnyMessage, Nameplate
 
 AHEAD = 50
 """Numbers by which a sender may be ahead of its run time: it may have sent some at once."""
+
+FASTER = 2.0
+"""So many times as often as itself a receiver in wall-clock time believes others to send at most."""
 
 PERSISTENT = 50
 """Messages in a row, rising, after which a sender is believed against a higher number: a second at 20 ms."""
@@ -140,3 +143,16 @@ class Admission:
             return False
         self._passed[name] = message.seq
         return True
+
+
+def is_news(plate: Nameplate, known: Nameplate | None) -> bool:
+    """Whether a process says who it is for the first time; what it has said before holds.
+
+    Raises
+    ------
+    RejectedError
+        If it says something else now.
+    """
+    if known is not None and known != plate:
+        raise RejectedError("implausible", f"{plate.sender} is not what it was; a nameplate never changes")
+    return known is None

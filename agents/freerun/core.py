@@ -32,6 +32,7 @@ from agents.freerun.roll_call import RollCall
 from agents.freerun.tally import Phase, Tally
 from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
+from wire.admission import FASTER
 from wire.codec import encode
 from wire.endpoint import Route
 from wire.links import Links, arrived, is_usable
@@ -44,9 +45,6 @@ STATUS_PERIOD = 0.5
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
 take what was sent last with it."""
-
-FASTER = 2.0
-"""So many times as often as itself an agent believes others to send at most."""
 
 WANTED = 1 << 30
 """Messages wait for the next tick; only tokens and words wake the agent before."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from agents.agent import Agent
 from agents.freerun.claims import Claims
-from wire.admission import Admission
+from wire.admission import Admission, is_news
 from wire.codec import RejectedError
 from wire.messages import Nameplate
 
@@ -70,9 +70,7 @@ class Peers:
         name = plate.sender
         if self._claims.instance(name) != instance:
             raise RejectedError("ghost", f"{name} is spoken for by another process")
-        if name in self._met:
-            if self._met[name] != plate:
-                raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+        if not is_news(plate, self._met.get(name)):
             return
         self._met[name] = plate
         self._agent.meet(plate)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from agents.agent import Agent
 from agents.topology import is_pairwise
-from wire.admission import Admission
+from wire.admission import Admission, is_news
 from wire.codec import RejectedError
 from wire.messages import Nameplate, Prepare
 
@@ -136,8 +136,8 @@ class Introductions:
         steps: list[Step] = []
         if peer not in self._asked:
             raise RejectedError("ghost", f"the nameplate of {peer.name}, whose token is gone")
-        if self._plates.setdefault(peer, plate) != plate:
-            raise RejectedError("implausible", f"{peer.name} is not what it was; a nameplate never changes")
+        if is_news(plate, self._plates.get(peer)):
+            self._plates[peer] = plate
         if peer in self._proving:
             self._proving.discard(peer)
             self._known[peer] = True

@@ -63,7 +63,7 @@ def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], s
     """Take all inverters of these islands off the network; where there are none, the substation.
 
     An island that the substation feeds thus first loses its inverters only: the grid may well feed it without them.
-    Inverters come back by `switch_inverter`, the substation does not.
+    Inverters come back by `switch_inverters`, the substation does not.
 
     Parameters
     ----------
@@ -89,11 +89,6 @@ def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: 
     if bare:
         network.substation_on = False
     return Trip(step, tuple(np.flatnonzero(lost).tolist()), bool(bare), float(np.min(v, initial=np.inf)))
-
-
-def switch_inverter(units: Inverters, network: LiveNetwork, i: int, on: bool) -> list[Trip]:
-    """Take an inverter off the network or put it back; see `switch_inverters`."""
-    return switch_inverters(units, network, (i,), on)
 
 
 def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int], on: bool) -> list[Trip]:

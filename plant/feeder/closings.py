@@ -10,8 +10,8 @@ from plant.feeder.trips import Closing
 from wire.messages import PlantEvent
 
 
-class _Waiting(NamedTuple):
-    """A switch that waits for synchronism."""
+class _Pending(NamedTuple):
+    """A closing that waits for synchronism."""
 
     since: int
     """Step at which it was to close."""
@@ -41,7 +41,7 @@ class Closings:
 
     def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:
         self._switches, self._sync, self._timeout, self._h = switches, sync, timeout, h
-        self._waiting: dict[str, _Waiting] = {}
+        self._waiting: dict[str, _Pending] = {}
         self.joined: list[Closing] = []
 
     def refusal(self, name: str) -> str:
@@ -86,7 +86,7 @@ class Closings:
                 continue
             if operation.synchronised and not difference.within:
                 self._switches.drop(step, operation)
-                self._waiting[name] = _Waiting(step, step + self._timeout)
+                self._waiting[name] = _Pending(step, step + self._timeout)
                 text = f"waits for synchronism: its sides are {difference}; allowed are {difference.window}"
                 events.append(self._warning(step, name, text))
             elif operation.synchronised:

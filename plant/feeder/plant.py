@@ -252,7 +252,7 @@ class Plant:
 
     def _operate(self, step: int) -> None:
         """Operate the switches of this step, all at once, then find the islands anew."""
-        t, before = round(step * self._h, 9), self._switches.closed
+        t, before = self._time(step), self._switches.closed
         notes, warnings = self._closings.judge(step)
         self._events += warnings
         if not self._switches.due(step):
@@ -284,7 +284,7 @@ class Plant:
         trips = self._dynamics.take_trips()
         closed = self._switches.closed
         for trip in trips:
-            t = round((step + trip.step) * self._h, 9)
+            t = self._time(step + trip.step)
             self._events.append(trip_event(t, trip, self.network, closed, self._closings.joined))
             self._events += self._islands.report_dead(t, closed, self._dynamics.network.reduction)
             self._in_service.note_trips(step + trip.step, list(trip.inverters), before=trip.step)

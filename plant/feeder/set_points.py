@@ -1,4 +1,4 @@
-"""Set-points beyond what an inverter can do: counted, and reported once per spell."""
+"""Set-points beyond what an inverter can do: counted and reported by spells."""
 
 from __future__ import annotations
 
@@ -28,24 +28,18 @@ class _Spell:
 class SetPointLimits:
     """Which inverters are told set-points beyond their bounds: an event when it begins, and one when it ends.
 
-    Attributes
-    ----------
-    count : dict[str, int]
-        Set-points that were limited or refused since the start, by inverter.
-
     Examples
     --------
     >>> limits = SetPointLimits()
     >>> [event.text for event in limits.held("inv1", 2.0, "P_set", told=10_000.0, held=1800.0)]
     ['inv1 is told P_set 10000 kW, which is beyond its bound; it holds 1800 kW']
-    >>> limits.held("inv1", 2.02, "P_set", told=10_000.0, held=1800.0), limits.count
-    ([], {'inv1': 2})
+    >>> limits.held("inv1", 2.02, "P_set", told=10_000.0, held=1800.0)
+    []
     >>> [event.text for event in limits.held("inv1", 3.5, "P_set", told=500.0, held=500.0)]
     ['inv1 is told P_set within its bound again; 2 set-points were limited, the farthest 10000 kW']
     """
 
     def __init__(self) -> None:
-        self.count: dict[str, int] = {}
         self._spells: dict[tuple[str, str], _Spell] = {}
         self._refused: set[str] = set()
 
@@ -54,7 +48,6 @@ class SetPointLimits:
         key, unit, distance = (name, quantity), _UNIT[quantity], abs(told - held)
         spell = self._spells.get(key)
         if distance > 1e-9 * abs(told):
-            self._count(name)
             if spell is None:
                 self._spells[key] = _Spell(1, t, told, distance)
                 text = f"{name} is told {quantity} {told:g} {unit}, which is beyond its bound; it holds {held:g} {unit}"
@@ -73,12 +66,8 @@ class SetPointLimits:
 
     def refused(self, name: str, t: float) -> list[PlantEvent]:
         """Note set-points that are no finite numbers; the event comes once per inverter."""
-        self._count(name)
         if name in self._refused:
             return []
         self._refused.add(name)
         text = f"{name} is told set-points that are no finite numbers; it keeps those it has"
         return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
-
-    def _count(self, name: str) -> None:
-        self.count[name] = self.count.get(name, 0) + 1

@@ -30,6 +30,7 @@ from plant.interface import LivePlant
 from plant.reporting import measurement_of
 from plant.side import CLOSING, LINK_TICKS, Side
 from wire.actions import Say
+from wire.admission import FASTER
 from wire.clock import time_of
 from wire.codec import encode
 from wire.endpoint import ANYBODY, Route
@@ -69,9 +70,6 @@ WAITING = 0.5
 
 REFUSALS = 20
 """Refused processes that are told of in the log: anybody may hold tokens."""
-
-FASTER = 2.0
-"""So many times as often as itself the plant believes agents to send at most."""
 
 WANTED = 1 << 30
 """While it runs, messages wait for the next step; only tokens and words wake the plant before."""

@@ -70,17 +70,16 @@ class Findings:
 
     def value(self, cell: Cell) -> float:
         """Our number at the place of one of the paper's."""
-        steady = self.results[cell.case][cell.event]
-        if cell.island:
-            steady = self.islands[cell.case][cell.event][cell.island]
-        return float(getattr(steady, cell.quantity))
+        return float(getattr(self._steady(cell), cell.quantity))
 
     def reason(self, cell: Cell) -> str:
         """Why our number there is no steady value; "" where it is one."""
-        steady = self.results[cell.case][cell.event]
+        return self._steady(cell).reasons.get(cell.quantity, "")
+
+    def _steady(self, cell: Cell) -> Steady:
         if cell.island:
-            steady = self.islands[cell.case][cell.event][cell.island]
-        return steady.reasons.get(cell.quantity, "")
+            return self.islands[cell.case][cell.event][cell.island]
+        return self.results[cell.case][cell.event]
 
     def within(self, cell: Cell) -> bool | None:
         """Whether our number there is near enough to the paper's, and steady; None where it is not judged."""

@@ -160,8 +160,7 @@ def _row(
             continue
         values, mixed = steady[event], not island and report.found.apart(case, event)
         row += [
-            "-" if mixed and name in SHARED else _cell(report.experiment, case, event, name, values, island)
-            for name in quantities
+            "-" if mixed and name in SHARED else _cell(report, case, event, name, values, island) for name in quantities
         ]
         if quantities[0] == "f_error_Hz":
             restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
@@ -169,17 +168,18 @@ def _row(
     return tuple(row)
 
 
-def _cell(experiment: str, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
+def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
     """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough.
 
     What is not steady is no number: its reason's first words stand there, and all of it below the table.
     """
+    experiment = report.experiment
     paper = paper_cell(experiment, case, event, quantity, island) if experiment else None
     ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
     text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
     if paper is None:
         return text
-    off = paper.within(math.nan if reason else ours) is False
+    off = report.found.within(paper) is False
     return f"{text} | {paper.paper:.{paper.digits}f}{' !' if off else ''}"
 
 

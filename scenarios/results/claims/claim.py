@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from scenarios.results.findings import Findings
+from scenarios.results.findings import Findings, label
 from scenarios.results.paper_tables import UNITS, Cell, tables_of
 from scenarios.results.tolerances import Number, Quantity
 
@@ -86,7 +86,7 @@ def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim
     table = next(table for table in tables_of(experiment) if table.number == number)
     cells = tuple(cell for cell in table.cells if cell.quantity == quantity)
     unit, tolerance = UNITS[quantity], cells[0].tolerance.value
-    name = "abs(f-60)" if quantity == "f_error_Hz" else quantity
+    name = label(quantity)
 
     def compare(found: Findings) -> tuple[bool, str]:
         absent = [cell for cell in cells if not found.has(cell)]
