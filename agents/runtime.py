@@ -44,7 +44,7 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
-    if wall:  # an agent that is started again is told from its ghost by its later start
+    if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
     side: FreeAgent | AgentSide | None = None
     while side is None or (isinstance(side, FreeAgent) and side.astray):
