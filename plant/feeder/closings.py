@@ -7,6 +7,7 @@ from typing import NamedTuple
 from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Difference, Synchronism
 from plant.feeder.trips import Closing
+from wire.clock import time_of
 from wire.messages import PlantEvent
 
 
@@ -98,10 +99,10 @@ class Closings:
         return notes, events
 
     def _note(self, step: int, difference: Difference) -> None:
-        t = round(step * self._h, 9)
+        t = time_of(step, self._h)
         self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.window.angle))
         del self.joined[:-20]
 
     def _warning(self, step: int, name: str, text: str) -> PlantEvent:
         text = f"switch {self._switches.shown(name)} {text}"
-        return PlantEvent(t=round(step * self._h, 9), kind="warning", subject=name, text=text)
+        return PlantEvent(t=time_of(step, self._h), kind="warning", subject=name, text=text)

@@ -18,6 +18,7 @@ from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Synchronism
 from plant.feeder.trips import trip_event
 from plant.network import Network
+from wire.clock import time_of
 from wire.messages import OFF, PlantEvent
 
 __all__ = ["GRID", "Plant", "Reading"]
@@ -143,7 +144,7 @@ class Plant:
         What is beyond its bounds is limited, and told once; what is no finite number is left out, and told once.
         An inverter that has tripped takes none: it comes back at no load.
         """
-        i, t = self._row[name], round(self.tick * self._T_c, 9)
+        i, t = self._row[name], time_of(self.tick, self._T_c)
         if not (isfinite(P_set) and isfinite(V_set)):
             self._events += self._set_points.refused(name, t)
             return
@@ -225,8 +226,8 @@ class Plant:
         return events
 
     def _time(self, step: int) -> float:
-        """Time of a step (s), to the nanosecond: 0.06 is written and not 0.06000000000000001."""
-        return round(step * self._h, 9)
+        """Time of a step (s)."""
+        return time_of(step, self._h)
 
     def _tell(self, step: int, kind: Literal["inverter", "trip"], subject: str, text: str) -> None:
         self._events.append(PlantEvent(t=self._time(step), kind=kind, subject=subject, text=text))

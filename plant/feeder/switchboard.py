@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from plant.config import SwitchEvent
 from plant.network import Network
+from wire.clock import time_of
 from wire.messages import PlantEvent
 
 _PAST = {"open": "opened", "close": "closed"}
@@ -95,7 +96,7 @@ class Switchboard:
 
     def operate(self, step: int, notes: Mapping[str, str] = MappingProxyType({})) -> list[PlantEvent]:
         """Operate the switches of a step, all at once, and forget it; tells of each what was done and is noted."""
-        t = round(step * self._h, 9)
+        t = time_of(step, self._h)
         events = []
         for name, action, _ in self._at.pop(step):
             known = name in self.closed
