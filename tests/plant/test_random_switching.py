@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import random
+from typing import Literal
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.config import PlantSettings, SwitchEvent
+from plant.config import PlantSettings, Protection, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
 from plant.tables import read_feeder
 
 T_C, H, END = 0.02, 0.002, 5.0
 SWITCHES = ("13-152", "60-160", "sw1_2", "sw2_3")
-BAND = 25.0, 95.0
-"""Frequencies (Hz) that a GFM can have at all: 60 and the bound of its limiters, 200 rad/s, and a bit for the droop."""
+BAND = {"off": (25.0, 95.0), "III": (54.0, 63.0)}
+"""Frequencies (Hz) of who delivers. Without protection a GFM can have 60 and the bound of its limiters, 200 rad/s, and
+a bit for the droop; with it, what lies 0.16 s beyond 56.5 and 62 Hz."""
+
+NO_SOLUTION = ("overload", "out of phase", "voltage collapse")
+PROTECTION = ("voltage", "frequency")
 
 
 def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
@@ -34,14 +39,17 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
     return first, *sorted(rest, key=lambda event: event.t)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_no_schedule_of_switchings_ends_the_plant(seed: int) -> None:
+@pytest.mark.parametrize(("category", "seed"), [*(("off", i) for i in range(20)), *(("III", i) for i in range(10))])
+def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int) -> None:
     """Every row is finite; who delivers has a frequency within bounds, who does not has no power; trips are told."""
     draw = random.Random(f"switchings {seed}")
     factor = draw.uniform(0.8, 2.0)
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
-    plant = Plant(Network(replace(feeder, loads=loads)), PlantSettings(events=schedule(draw), h=H), T_C, T_C)
+    settings = PlantSettings(events=schedule(draw), h=H, protection=Protection(category=category))
+    plant = Plant(Network(replace(feeder, loads=loads)), settings, T_C, T_C)
+    low, high = BAND[category]
+    causes = NO_SOLUTION if category == "off" else (*NO_SOLUTION, *PROTECTION)
 
     events, off = [], set[str]()
     for _ in range(round(END / T_C)):
@@ -54,10 +62,10 @@ def test_no_schedule_of_switchings_ends_the_plant(seed: int) -> None:
         for name, reading in plant.measure().items():
             assert np.isfinite([reading.P, reading.Q, reading.V, reading.f]).all()
             if reading.P or reading.Q:
-                assert BAND[0] < reading.f < BAND[1]
+                assert low < reading.f < high
             else:
                 assert name in off
 
     assert np.isfinite(np.array(plant.take_rows())).all()
     for trip in (event for event in events if event.kind == "trip"):
-        assert "overload" in trip.text or "out of phase" in trip.text or "voltage collapse" in trip.text
+        assert any(cause in trip.text for cause in causes)
