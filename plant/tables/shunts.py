@@ -23,8 +23,13 @@ from plant.tables.plausible import (
 )
 from plant.tables.table import Row, Table
 from wire.keys import check_name
+from wire.messages import OFF, PLANT
 
-TAKEN = {"plant": "the plant sends under it", "grid": "it is the island that the substation feeds"}
+TAKEN = {
+    PLANT: "the plant sends under it",
+    "grid": "it is the island that the substation feeds",
+    OFF: "it stands in place of an island for an inverter that is out of service",
+}
 """Names that no inverter can have, and why."""
 
 LOAD_COLUMNS = ("bus", "connection", "model", "P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")

@@ -82,7 +82,7 @@ def test_a_number_off_by_its_unit_is_refused_with_what_was_meant(
     assert found[0].startswith(file)
 
 
-@pytest.mark.parametrize("name", ["PV 2", "pv/2", "a*", "é", "x" * 65, "plant", "grid"])
+@pytest.mark.parametrize("name", ["PV 2", "pv/2", "a*", "é", "x" * 65, "plant", "grid", "off"])
 def test_a_name_that_cannot_go_on_the_wire_is_refused_in_the_table(folder: Path, name: str) -> None:
     """An inverter's name is a part of keys, and neither the plant's nor that of the grid's island."""
     edit(folder, "inverters.csv", 3, name=name)
