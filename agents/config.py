@@ -136,4 +136,5 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     links: str = ""
     """What the links to this agent do to its messages, as text for whoever puts them before it; empty: nothing."""
     max_age: float = MAX_AGE
-    """Wall-clock: a neighbour's state, or a measurement, older than this (s of run time) is not used."""
+    """A measurement that came longer ago than this (s of run time) is not used; wall-clock: nor an older state of a
+    neighbour."""

@@ -77,6 +77,8 @@ class AgentSide(Side):
         """Whether the last report on emulated links is out."""
         self._sensed: Measurement | None = None
         """The last measurement that the link from the plant let through."""
+        self._sensed_at = 0.0
+        """When that came through (s of run time)."""
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -212,7 +214,7 @@ class AgentSide(Side):
             raise RejectedError("unexpected", "no roster has this process on it")
         self._turn.grant(message)
         if is_usable(self._links, message, payload, message.t, self.admission):
-            self._sensed = message
+            self._sensed, self._sensed_at = message, message.t
         self._patience.renew(now)
         self._compute(now)
 
@@ -231,7 +233,11 @@ class AgentSide(Side):
             if isinstance(message, State):
                 self._agent.hear(message)
             elif isinstance(message, Measurement):
-                self._sensed = message
+                self._sensed, self._sensed_at = message, t
+
+    def _fresh(self, t: float) -> Measurement | None:
+        """The own measurement, if it came through not longer ago than `max_age`, as in wall-clock time."""
+        return None if round(t - self._sensed_at, 9) > self._config.max_age else self._sensed
 
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if all that it needs is here."""
@@ -244,10 +250,11 @@ class AgentSide(Side):
             return
         neighbours = tuple(name for name in self._neighbours if name in measurement.roster)
         self._take_arrived(measurement.t)
-        if self._sensed is None or (self._links is not None and self._links.stalled(measurement.t)):
+        fresh = self._fresh(measurement.t)
+        if fresh is None or (self._links is not None and self._links.stalled(measurement.t)):
             state = self._agent.stand_still(measurement)
         else:
-            sensed = replace(self._sensed, seq=measurement.seq, t=measurement.t)
+            sensed = replace(fresh, seq=measurement.seq, t=measurement.t)
             state = self._agent.tick(sensed, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         self._patience.renew(now)

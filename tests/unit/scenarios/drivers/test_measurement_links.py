@@ -53,6 +53,14 @@ def test_it_begins_with_the_first_measurement_that_comes_through() -> None:
     assert len(P_set(rows, 2, 0.5, 2.0)) > 30
 
 
+def test_it_stands_still_again_once_none_has_come_for_a_while() -> None:
+    """A link that is cut in the middle: 0.25 s later the agent ceases to act on the last error it knew of."""
+    rows = rows_of({"cut": True, "from_s": 0.2})
+
+    assert len(P_set(rows, 2, 0.2, 0.44)) > 10
+    assert len(P_set(rows, 2, 0.5, 9.0)) == 1
+
+
 def test_a_newcomer_stands_still_too_until_it_measures() -> None:
     """inv2 leaves at 0.4 s and is back at 0.6 s; its link is cut from then on."""
     rows = rows_of({"cut": True, "from_s": 0.5}, moves=((0.4, "inv2", "leave"), (0.6, "inv2", "join")))
