@@ -18,8 +18,11 @@ LIMIT = 64_000
 NAME = r"[A-Za-z0-9_.-]{1,64}"
 """What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
 
-UNPRINTABLE = "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
-"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing."""
+UNPRINTABLE = (
+    "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
+)
+"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing,
+tags."""
 
 _PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
 

@@ -47,7 +47,8 @@ BODIES: dict[str, dict[str, Any]] = {
 
 TEXTS = (
     "", "x", "inv1", "plant", "x" * 64, "x" * 65, "x" * 200, "x" * 201, "x" * 4000, "x" * 4001, "a b", "a,b", "a/b",
-    "*", "a\n", "\x1b[2Jinv1", "inv1\x00", "\u202e1vni", "inv1\r2026-01-01 ERROR all is lost", "ä", "\ud7ff\U0001f600",
+    "*", "a\n", "\x1b[2Jinv1", "inv1\x00", "\u202e1vni", "inv1\U000e0041", "inv1\r2026-01-01 ERROR all is lost",
+    "ä", "\ud7ff\U0001f600",
 )  # fmt: skip
 """Texts on both sides of any bound; which side, the annotation says."""
 
