@@ -236,14 +236,20 @@ class Plant:
         """Refuse a start that is no equilibrium: a GFM that holds up an island must not be beyond its limits there."""
         units = self._dynamics.inverters
         for k, i in enumerate(units.gfm_at.tolist()):
-            p, low, high = units.set_points[i, 0], units.gfm[k]["P_min"], units.gfm[k]["P_max"]
-            if self._dynamics.network.reduction.online[i] and not low - 1e-9 <= p <= high + 1e-9:
-                kW = self._P_rated[i] / 1e3
-                raise PlantError(
-                    f"no equilibrium at t = 0: {self.inverters[i]} would have to give {p * kW:.0f} kW, it can give "
-                    f"{low * kW:.0f} to {high * kW:.0f} kW (P_min_pu, P_max_pu of [plant.gfm]); set another P_set0_pu, "
-                    "or change the load of its island"
-                )
+            if not self._dynamics.network.reduction.online[i]:
+                continue
+            limits, state, P_rated = units.gfm[k], units.gfm_state[k], self._P_rated[i] / 1e3
+            for what, value, base, unit, low, high in (
+                ("give", units.set_points[i, 0], P_rated, "kW", "P_min", "P_max"),
+                ("give", state["q"], P_rated, "kvar", "Q_min", "Q_max"),
+                ("have an internal voltage of", state["E"], 1.0, "pu", "E_min", "E_max"),
+            ):
+                if not limits[low] - 1e-9 <= value <= limits[high] + 1e-9:
+                    raise PlantError(
+                        f"no equilibrium at t = 0: {self.inverters[i]} would have to {what} {value * base:.5g} {unit}, "
+                        f"it can from {limits[low] * base:.5g} to {limits[high] * base:.5g} {unit} ({low}_pu, "
+                        f"{high}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
+                    )
 
     def _as_row(self, step: int, readings: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> tuple[float, ...]:
         set_points = self._dynamics.inverters.set_points[:, :2] * np.column_stack([self._P_rated, self._V_nom])

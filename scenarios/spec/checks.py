@@ -138,6 +138,18 @@ def check_start(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
                 f"equilibrium ({kW} kW); {'raise' if below else 'lower'} P_set0_pu, or change {key}",
             )
             break
+    for table, (low, high) in (
+        ("gfm", (gfm.V_set_min, gfm.V_set_max)),
+        ("gfl", (gfl.V_set_min, gfl.V_set_max)),
+    ):
+        V = plant.V_set0_pu
+        if mistakes.touch("plant.V_set0_pu") or low <= V <= high:
+            continue
+        mistakes.add(
+            "plant.V_set0_pu",
+            f"{V:g} pu is beyond plant.{table}.V_set_min_pu = {low:g} to V_set_max_pu = "
+            f"{high:g}, which limit every later set-point; choose it within, or change them",
+        )
 
 
 def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistakes) -> None:

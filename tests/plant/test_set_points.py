@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.config import GflParameters, PlantSettings
+from plant.config import GflParameters, GfmParameters, PlantSettings
 from plant.dynamics import Dynamics, PlantError
 from plant.dynamics.kernel import gfl
 from plant.feeder import Plant
@@ -117,3 +117,16 @@ def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused
     """A start at which the overload limiter already acts is no equilibrium: f would dip without an event."""
     with pytest.raises(PlantError, match=r"no equilibrium at t = 0: inv1 would have to give \d+ kW, .*P_set0_pu"):
         Plant(Network(read_feeder("microgrid123")), PlantSettings(P_set0=1.1, gfl=GflParameters(P_max=1.1)), 0.02, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (PlantSettings(V_set0=1.2), r"inv1 would have to have an internal voltage of 1\.\d+ pu, .*E_max_pu"),
+        (PlantSettings(gfm=GfmParameters(Q_max=0.01)), r"inv1 would have to give \d+(\.\d+)? kvar, .*Q_max_pu"),
+    ],
+)
+def test_a_start_beyond_the_limits_of_vars_or_voltage_is_refused(settings: PlantSettings, said: str) -> None:
+    """As with power: 100 kvar would move within the first second, without an event."""
+    with pytest.raises(PlantError, match=f"no equilibrium at t = 0: {said}.*V_set0_pu"):
+        Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

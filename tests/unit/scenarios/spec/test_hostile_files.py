@@ -54,3 +54,12 @@ def test_the_last_line_of_a_command_is_printable(capsys: pytest.CaptureFixture[s
     with pytest.raises(SystemExit):
         fail(['no "\x1b[2J"\nas said'], 2)
     assert capsys.readouterr().err == 'gridpeers: no "\\x1b[2J"\nas said\n'
+
+
+def test_a_first_voltage_beyond_the_bounds_of_set_points_is_refused(tmp_path: Path) -> None:
+    """It would be held at the start only: the first word of an agent would move the voltage without an event."""
+    found = mistakes(tmp_path, BASE + "\n[plant.gfl]\nV_set_min_pu = 1.01\n")
+
+    assert [line.partition(": ")[2][:60] for line in found] == [
+        "plant.V_set0_pu: 1 pu is beyond plant.gfl.V_set_min_pu = 1.01"[:60]
+    ]
