@@ -23,7 +23,7 @@ def test_a_seed_gives_one_schedule_and_every_fault_of_a_process_ends() -> None:
         assert max(action.t for action in actions) == HEAL
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", [3, 6])
 def test_a_run_survives_a_schedule(tmp_path: Path, seed: int) -> None:
     """Kills, freezes, link faults, switchings: the run goes on, no agent outlives it, islands with a leader come back.
 
@@ -34,4 +34,5 @@ def test_a_run_survives_a_schedule(tmp_path: Path, seed: int) -> None:
     assert verdict.broke == ""
     assert verdict.outlived == ()
     assert all(isfinite(f) for f in verdict.f_range)
+    assert verdict.back, f"no island to look at: {verdict}"
     assert all(isfinite(t) for t in verdict.back.values()), verdict
