@@ -30,6 +30,9 @@ STEADY = 2.0
 F_BAND, P_BAND = 0.01, 0.02
 """Band of the frequency (Hz) around nominal, and of the powers (pu of each rating) around each other."""
 
+DARK = "stays de-energised"
+"""Of an island: its inverters have tripped and have not entered service again."""
+
 CLOSING = 10.0
 """Longest wait (s) for all processes to leave after `down`."""
 
@@ -182,12 +185,13 @@ class _Run:
         return found
 
     def is_back(self) -> bool:
-        """Whether every island that should be back has been for `STEADY` seconds."""
-        if self._town.t < HEAL + STEADY:
+        """Whether all agents run again, no leader stands in the dark, and every island has been back for a while."""
+        running = {name for name, status in self._town.status.items() if status.phase == "running"}
+        if self._town.t < HEAL + STEADY or running != {*self._town.plant_config.agents}:
             return False
         back, excused = self.judge()
         until = self._town.t - STEADY - HEAL
-        return all(t <= until for t in back.values()) and not any("is over" in why for why in excused.values())
+        return all(t <= until for t in back.values()) and DARK not in excused.values()
 
     def judge(self) -> tuple[dict[str, float], dict[str, str]]:
         """When each island with a leader came back (s after the heal), and who is excused."""
@@ -207,7 +211,7 @@ class _Run:
             if island in ("", "grid"):
                 excused[island or "unknown"] = "is on the grid" if island else "is not told"
             elif not present:
-                excused[island] = "is de-energised"
+                excused[island] = DARK
             elif not self._leaders & set(present):
                 excused[island] = "has no leader"
             elif p[-1].min() > 0.97 or p[-1].max() < 0.03:
