@@ -98,7 +98,7 @@ def main() -> None:
                     subprocess.run([*command, "link", *arguments.link, "--run", run, "--connect", endpoint], check=True)
                 sizes = watch(up, 60.0 * arguments.minutes, arguments.every)
                 peak = memory(up.pid).get("VmHWM", float("nan"))
-                up.send_signal(signal.SIGINT)
+                up.send_signal(signal.SIGTERM)  # SIGINT is ignored by what was started in the background
                 while up.poll() is None:
                     peak = max(peak, memory(up.pid).get("VmHWM", 0.0))
                     sleep(0.1)
