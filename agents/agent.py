@@ -20,7 +20,7 @@ from wire.messages import OFF, Measurement, Nameplate, State
 
 
 def nameplate_of(config: AgentConfig) -> Nameplate:
-    """What an agent tells of itself."""
+    """Make the nameplate of an agent from its configuration."""
     return Nameplate(
         sender=config.name,
         incarnation=config.incarnation,
@@ -193,9 +193,9 @@ class Agent:
         return self._state(measurement, self._P_set, self._V_set)
 
     def stand_still(self, measurement: Measurement) -> State:
-        """What an agent that is paused, or measures nothing, says at this tick: only that it is there.
+        """Return the state of an agent that is paused, or has no measurement: it only shows that the agent is there.
 
-        When it goes on it begins from what the plant holds.
+        When the agent goes on, it begins from the set-points that the plant holds.
         """
         self.let_go()
         return replace(self._state(measurement, measurement.P_set, measurement.V_set), Q=0.0, island="", idle=True)

@@ -1,4 +1,4 @@
-"""What an agent's side of simulated and of wall-clock time have in common: its routes, and what it reports. Pure."""
+"""Base of an agent's endpoint in both kinds of time: its routes and its reports. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the plant's side of simulated and of wall-clock time have in common: its keys, its agents, its reports. Pure."""
+"""Base of the plant's endpoint in both kinds of time: its keys, its agents and its reports. Pure."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Side(Endpoint):
             self._report_links(last=True)
             self._report(final=True)
 
-    def _forward(self, report: LinkReport, payload: bytes) -> None:
+    def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
         """Pass on what an agent's links did; it closes once it knows that its last report is here."""
         self._publish(self.keys.telemetry, payload)
         if report.final:

@@ -22,7 +22,6 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.emulation.setup import Setup
 from scenarios.live.numbers.departures import Compared, compare
-from scenarios.live.show.events import line_of
 from scenarios.results.claims import CLAIMS, judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
@@ -138,14 +137,14 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     sha256 = {case: record.sha256 for case, record in recorded.items()}
     compared = _compared(request, recorded)
     unlike = {
-        case: {"disturbed": one.disturbed, "departures": _lines(one)}
+        case: {"disturbed": one.disturbed, "departures": one.lines()}
         for case, one in compared.items()
         if one.departures
     }
     disturbed = any(one.disturbed for one in compared.values())
     notes += [
         f"case {case}: {', '.join(one.disturbed)}: not what the scenario means by it, which does not tell of: "
-        f"{'; '.join(_lines(one)[:3])} (all in metrics.json)"
+        f"{'; '.join(one.lines()[:3])} (all in metrics.json)"
         for case, one in compared.items()
         if one.disturbed
     ]
@@ -179,10 +178,6 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, C
         )
         for case, record in recorded.items()
     }
-
-
-def _lines(compared: Compared) -> list[str]:
-    return [line_of(event).strip() for event in compared.departures]
 
 
 def _checked_links(links: str, record: LinkRecord, folder: Path) -> list[str]:

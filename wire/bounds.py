@@ -99,11 +99,22 @@ Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
 QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
 """The same, checked together."""
 
-_is_name = re.compile(NAME).fullmatch
+_PATTERN = re.compile(NAME)
+
+
+def is_name(text: str) -> bool:
+    """Whether a text is a `Name`.
+
+    Examples
+    --------
+    >>> is_name("inv1"), is_name("PV 2")
+    (True, False)
+    """
+    return _PATTERN.fullmatch(text) is not None
 
 
 @lru_cache(maxsize=128)
 def check_names(*names: str) -> None:
     """Check all names of a message at once; those of a sender are the same each time."""
-    if not all(map(_is_name, names)):
+    if not all(map(is_name, names)):
         raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")

@@ -10,10 +10,7 @@ import re
 
 import msgspec
 
-from wire.bounds import MOST_COUNT, NAME
-
-_NAME = re.compile(NAME)
-
+from wire.bounds import MOST_COUNT, is_name
 
 LATEST_ONLY = ("measurement", "state", "status")
 """Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
@@ -50,7 +47,7 @@ def check_name(what: str, name: str) -> None:
         ...
     ValueError: run: "a/b" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."
     """
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise ValueError(
             f'{what}: "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."'
         )
@@ -150,7 +147,7 @@ class Keys:
         """
         root = self._root + "/"
         parts = tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
-        return parts if all(map(_NAME.fullmatch, parts)) else ()
+        return parts if all(map(is_name, parts)) else ()
 
 
 def epoch_of(part: str) -> int | None:
@@ -173,7 +170,7 @@ def run_of_plant(key: str) -> str:
     'demo'
     """
     match key.split("/"):
-        case ("gridpeers", run, "alive", "plant", _) if _NAME.fullmatch(run):
+        case ("gridpeers", run, "alive", "plant", _) if is_name(run):
             return run
     return ""
 

@@ -103,43 +103,29 @@ class Links(Protocol):
         ...
 
 
-def is_taken(links: Links | None, message: AnyMessage, payload: bytes, at: float) -> bool:
-    """Give a message to the link that it came over, if that is an emulated one: it then comes out of `arrived`.
+def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
+    """Whether a message off the wire is of use at once; if not, it may come out of `arrived` later, or never.
+
+    An emulated link takes the message if it came over one. The state of an agent that stands still only keeps the
+    lock-step going: no link carries it, and nobody uses it.
 
     Parameters
     ----------
     links : Links or None
         All links into the receiver.
-    message, payload : AnyMessage, bytes
+    message, payload : State or Measurement, bytes
         What came off the wire.
     at : float
         Now (s of run time, on the receiver's clock).
-
-    Returns
-    -------
-    bool
-        Whether the link has it. Else nothing stands between, and it counts at once.
-    """
-    if links is None or message.sender in links.clear:
-        return False
-    return links.offer(message.sender, message.seq, message.t, at, payload)
-
-
-def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
-    """Whether a message off the wire is of use at once; if not, it may come out of `arrived` later, or never.
-
-    What an agent that stands still says is for the lock-step alone: no link carries it, nobody uses it.
-
-    Parameters
-    ----------
-    links, message, payload, at
-        See `is_taken`.
     who : Admission
         Who speaks.
     """
     if isinstance(message, State) and message.idle:
         return False
-    return not is_taken(links, message, payload, at) and who.passes(message)
+    if links is not None and message.sender not in links.clear:
+        taken = links.offer(message.sender, message.seq, message.t, at, payload)
+        return not taken and who.passes(message)
+    return who.passes(message)
 
 
 def arrived(links: Links | None, now: float, rejects: Rejects, admission: Admission) -> Iterator[AnyMessage]:

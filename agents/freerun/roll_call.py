@@ -33,7 +33,7 @@ class RollCall:
         """Whether it has ever been in touch with a plant; before that, silence proves nothing."""
         self._hearing = Hearing()
         self._crossed: dict[str, tuple[str, float]] = {}
-        """Whose messages came under another's key: under whose, and when the last (s)."""
+        """By sender: the owner of the other key under which its messages came, and the time of the last (s)."""
         self._seen = float("-inf")
         """When the plant was last known to be there, though it measures nothing yet (s)."""
 

@@ -95,7 +95,7 @@ class Introductions:
         """Names on that roster, and their instances."""
         self._asked: set[Peer] = set()
         self._plates: dict[Peer, Nameplate] = {}
-        """What each peer said of itself, once and for all."""
+        """Nameplate of each peer; it never changes."""
         self._believed: dict[str, Peer] = {}
         """Of each name the one that is taken to speak for it."""
         self._known: dict[Peer, bool] = {}

@@ -52,7 +52,7 @@ class Order(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What both plants go through."""
+    """One run: the events and limits that both plants go through."""
 
     text: str
     scenario: str

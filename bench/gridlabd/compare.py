@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from plant.equipment import InverterRow
 
 QUANTITIES = {"f": "Hz", "P": "pu", "Q": "pu", "V": "pu", "P_set": "pu", "V_set": "pu"}
-"""What a row holds of each inverter, and the unit in which it is compared: pu of rating and of nominal voltage."""
+"""Quantities of each inverter in a row, and their units of comparison: pu of rating and of nominal voltage."""
 
 
 class Largest(NamedTuple):

@@ -261,16 +261,7 @@ def _loads(rows: Iterable[Row], V_nom: Mapping[str, float]) -> list[str]:
             else:
                 values[f"constant_impedance_{end}"] = V**2 / S.conjugate()
         phases = "".join(sorted({phase for name in values for phase in name.rpartition("_")[2]}))
-        blocks.append(
-            _block(
-                "load",
-                name=f"load{number}_{row['bus']}",
-                parent=f"n{row['bus']}",
-                phases=phases + "N",
-                nominal_voltage=V_nom[row["bus"]],
-                **values,
-            )
-        )
+        blocks.append(_load(f"load{number}", row["bus"], V_nom, phases, values))
     return blocks
 
 
@@ -282,17 +273,15 @@ def _capacitors(rows: Iterable[Row], V_nom: Mapping[str, float]) -> list[str]:
         Q = {phase: float(row[f"Q_{phase.lower()}_kvar"]) * 1e3 for phase in "ABC"}
         Z = {f"constant_impedance_{phase}": complex(0.0, -(V**2) / var) for phase, var in Q.items() if var}
         phases = "".join(name[-1] for name in Z)
-        blocks.append(
-            _block(
-                "load",
-                name=f"bank{number}_{row['bus']}",
-                parent=f"n{row['bus']}",
-                phases=phases + "N",
-                nominal_voltage=V_nom[row["bus"]],
-                **Z,
-            )
-        )
+        blocks.append(_load(f"bank{number}", row["bus"], V_nom, phases, Z))
     return blocks
+
+
+def _load(name: str, bus: str, V_nom: Mapping[str, float], phases: str, values: Mapping[str, complex]) -> str:
+    """One load object at a bus: its phases, and its powers, currents or impedances by GridLAB-D's names."""
+    return _block(
+        "load", name=f"{name}_{bus}", parent=f"n{bus}", phases=phases + "N", nominal_voltage=V_nom[bus], **values
+    )
 
 
 def _inverters(rows: Iterable[Row], start: Mapping[str, complex], gfm: GfmParameters, gfl: GflParameters) -> list[str]:

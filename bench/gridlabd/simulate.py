@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 STAY = 0
-"""What a module wishes that wants delta mode now; else the time (s) until it does."""
+"""Answer of a module that wants delta mode now; any other answer is the time (s) until it does."""
 
 SWITCH_STATES = {"open": 0, "close": 1}
 """Values of a switch's property `status`."""
@@ -101,7 +101,7 @@ class Core:
 
 
 class Inverter:
-    """What is read of an inverter after every step."""
+    """Quantities of an inverter, read after every step."""
 
     def __init__(self, core: Core, name: str, bus: str, kind: str) -> None:
         forming = kind == "GFM"

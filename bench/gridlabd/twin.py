@@ -153,7 +153,7 @@ class Twin:
         return ()
 
     def _scheduled(self, settings: PlantSettings) -> dict[int, list[tuple[str, str, Any]]]:
-        """What is written at which step: (switch, "status", action) or (inverter, "Pref_max", pu)."""
+        """Writes by step: (switch, "status", action) or (inverter, "Pref_max", pu)."""
         writes: dict[int, list[tuple[str, str, Any]]] = {}
         for event in settings.events:
             name = self._network.switch_name(event.switch)

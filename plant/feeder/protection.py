@@ -66,8 +66,8 @@ class Tripped(NamedTuple):
         >>> print(Tripped(0, "UV2", 0.42, 0.45, 0.16))
         undervoltage 0.42 pu for 0.16 s (UV2: 0.45 pu)
         """
-        unit, digits = ("Hz", 2) if self.function[1] == "F" else ("pu", 2)
-        value = f"{self.value:.{digits}f} {unit}"
+        unit = "Hz" if self.function[1] == "F" else "pu"
+        value = f"{self.value:.2f} {unit}"
         return f"{_WORDS[self.function[:2]]} {value} for {self.time:g} s ({self.function}: {self.threshold:g} {unit})"
 
 

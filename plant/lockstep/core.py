@@ -166,9 +166,6 @@ class PlantSide(Side):
     def _on_ready(self, ready: Ready, payload: bytes, now: float) -> None:
         self._waiting.ready(ready)
 
-    def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
-        self._forward(report, payload)
-
     def _on_nameplate(self, plate: Nameplate, now: float) -> None:
         self.plates[plate.sender] = plate
         self._gather(now)

@@ -46,7 +46,7 @@ def supply_notes(scenario: Scenario, feeder: Feeder) -> tuple[str, ...]:
 
     Switches and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where it is.
     """
-    notes = []
+    notes, rows = [], inverters_of(scenario, feeder)
     for state in _states(scenario, feeder):
         event = state.event
         when = f'event "{event.label}" at {event.t_s:g} s' if event else "the start"
@@ -55,12 +55,13 @@ def supply_notes(scenario: Scenario, feeder: Feeder) -> tuple[str, ...]:
                 f"{when} de-energises {what}: no substation and no grid-forming inverter is connected to them any more"
             )
         for part in state.islands:
-            there = [row for row in inverters_of(scenario, feeder) if (row.bus, "A") in part]
+            there = [row for row in rows if (row.bus, "A") in part]
             rated = sum(row.P_rated for row in there if row.name in state.inverters)
-            if _load(part, feeder) > rated:
+            load = _load(part, feeder)
+            if load > rated:
                 names = ", ".join(row.name for row in there if row.name in state.inverters)
                 notes.append(
-                    f"{when} leaves {_load(part, feeder) / 1e3:.0f} kW of load to an island of {names}, rated "
+                    f"{when} leaves {load / 1e3:.0f} kW of load to an island of {names}, rated "
                     f"{rated / 1e3:.0f} kW together: more than they can feed"
                 )
     return tuple(notes)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import msgspec
 
 from scenarios.live.book import Book
 from scenarios.live.numbers.departures import Compared, compare
-from scenarios.live.show.events import line_of
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find_in
 from scenarios.results.folder import shown, write_whole
@@ -82,7 +80,7 @@ class Account:
             "too_short": [window.label for window in compared.opened.too_short],
             "not_reached": [window.label for window in compared.opened.not_reached],
             "disturbed": compared.disturbed,
-            "departures": _lines(compared),
+            "departures": compared.lines(),
         }
         if recorded.missing:
             by_hand["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
@@ -141,7 +139,7 @@ class Account:
             yield f"too short to be measured: {_named(windows.too_short)}"
         yield from late_moves(compared.measured, self._recorded.events)
         if compared.disturbed:
-            lines = _lines(compared, compared.measured.time.end_s) or ["rows that are missing"]
+            lines = compared.lines(compared.measured.time.end_s) or ["rows that are missing"]
             names = ", ".join(compared.disturbed)
             yield f"{names}: not what the scenario means by it, which does not tell of: {_few(lines)}"
 
@@ -164,8 +162,3 @@ def _few(lines: Sequence[str]) -> str:
     """The first of some lines, and how many there are more."""
     more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
     return f"{'; '.join(lines[:_SHOWN])}{more}"
-
-
-def _lines(compared: Compared, end: float = inf) -> list[str]:
-    """Departures before a time (s), a line each."""
-    return [line_of(event).strip() for event in compared.departures if event.t < end]

@@ -14,6 +14,7 @@ from plant.equipment import Feeder
 from plant.network import Network
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.opened import NEAR, Opened, events_by_hand, opened
+from scenarios.live.show.events import line_of
 from scenarios.results.metrics import Window, windows
 from scenarios.results.moves import as_they_came
 from scenarios.results.steadiness import STEADY
@@ -43,6 +44,10 @@ class Compared:
     remembers whatever happened to it. Also those in whose window rows are missing."""
     unrecorded: tuple[Window, ...]
     """Windows without numbers, as rows are missing at their end, where they are measured."""
+
+    def lines(self, end: float = inf) -> list[str]:
+        """Departures before a time (s), a line each."""
+        return [line_of(event).strip() for event in self.departures if event.t < end]
 
 
 class _Due(NamedTuple):
