@@ -34,9 +34,9 @@ class RateLimit:
     >>> [limit.admit(f"late by {i} ms", now=float(i)) for i in range(3)]
     ['late by 0 ms', None, None]
     >>> limit.admit("late by 9 ms", now=11.0)
-    'late by 9 ms (2 more lines like this one were left out)'
+    'late by 9 ms (2 more of this kind left out)'
     >>> limit.admit("late by 9 ms", now=11.5), limit.left_out()
-    (None, ['1 more lines like this one were left out: late by 9 ms'])
+    (None, ['1 more of this kind left out, the last: late by 9 ms'])
     """
 
     def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:
@@ -59,9 +59,9 @@ class RateLimit:
             self._left[kind] = left + 1, text
             return None
         self._allowed[kind] = allowed - 1.0, now
-        return f"{text} ({left} more lines like this one were left out)" if left else text
+        return f"{text} ({left} more of this kind left out)" if left else text
 
     def left_out(self) -> list[str]:
         """Take out what is yet to be told of lines that were left out, e.g. at the end."""
         left, self._left = self._left, {}
-        return [f"{count} more lines like this one were left out: {text}" for count, text in left.values()]
+        return [f"{count} more of this kind left out, the last: {text}" for count, text in left.values()]

@@ -88,6 +88,8 @@ class FreeAgent(Side):
         self._roll_call = RollCall(config.name, self.heard, self._peers)
         self._leaving = ""
         """Why it leaves, once the plant has been told."""
+        self._ran = False
+        """Whether it has ticked in the present life of the plant."""
         self._left = 0
         """Periods since then."""
         self._forget_everybody()
@@ -265,6 +267,7 @@ class FreeAgent(Side):
         """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
         if self._followed not in (0, epoch):
             self._hold("the plant has a new life; starts from what it measures")
+            self._ran = False
             self._orders.restart()
             self.heard.forget(PLANT)
         self._followed = epoch
@@ -339,8 +342,9 @@ class FreeAgent(Side):
             return
         if self.phase != "running":
             self.phase = "running"
-            m = measurement
-            self._say(f"joins at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
+            m, joins = measurement, "goes on" if self._ran else "joins"
+            self._say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
+            self._ran = True
         young = self._young(now)
         ages = {name: self.heard.age(name, now) for name in young}
         state = replace(self._agent.tick(measurement, young, ages), seq=self.tally.sent)

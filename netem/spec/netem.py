@@ -44,13 +44,14 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         parts = tuple(part for entry in self.partitions for part in entry.over(timeline))
         return msgspec.structs.replace(self, partitions=parts)
 
-    def mistakes(self, names: Sequence[str], microgrids: Mapping[str, str], end_s: float) -> list[Mistake]:
+    def mistakes(self, names: Sequence[str] | None, microgrids: Mapping[str, str], end_s: float) -> list[Mistake]:
         """Everything that is wrong, each with the path of its key, e.g. `link[2].loss.p`.
 
         Parameters
         ----------
-        names : Sequence[str]
-            All inverters that are or may come, in the order of their table.
+        names : Sequence[str] or None
+            All inverters that are or may come, in the order of their table; None if they are not known, as the feeder
+            could not be read: then what does not depend on them is checked.
         microgrids : Mapping[str, str]
             The microgrid of each.
         end_s : float
@@ -65,6 +66,8 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             found += below(f"partition[{i}]", wrong + _too_late(partition.from_s, end_s))
         for i, node in enumerate(self.nodes):
             found += below(f"node[{i}]", node.mistakes(names) + _too_late(node.from_s, end_s))
+        if names is None:
+            return found or self._contradictions_of_nodes()
         return found or self._contradictions(names, microgrids)
 
     def _contradictions(self, names: Sequence[str], microgrids: Mapping[str, str]) -> list[Mistake]:

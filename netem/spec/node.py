@@ -45,10 +45,10 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     skew: Skew | None = None
     """How wrong its clock is."""
 
-    def mistakes(self, names: Sequence[str]) -> list[Mistake]:
-        """Values that cannot be meant."""
+    def mistakes(self, names: Sequence[str] | None) -> list[Mistake]:
+        """Values that cannot be meant; without names of agents any may be one."""
         found = wrong_times(self.from_s, self.to_s) + seconds("slow_s", self.slow_s, "a computing delay")
-        if self.name not in names:
+        if names is not None and self.name not in names:
             found.append(Mistake("name", f'no agent "{self.name}"; {suggestion(self.name, names, "agents")}'))
         if not (self.kill or self.pause or self.slow_s or self.skew):
             found.append(Mistake("", "does nothing; give it kill, pause, slow_s or skew"))

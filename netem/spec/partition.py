@@ -105,13 +105,18 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
                 )
         return tuple(found)
 
-    def mistakes(self, names: Sequence[str], microgrids: Mapping[str, str]) -> list[Mistake]:
-        """Values that cannot be meant, names that nobody has, and partitions that part nobody."""
+    def mistakes(self, names: Sequence[str] | None, microgrids: Mapping[str, str]) -> list[Mistake]:
+        """Values that cannot be meant, names that nobody has, and partitions that part nobody.
+
+        Without names of agents any may be one.
+        """
         found = wrong_times(self.from_s, self.to_s)
         given = [key for key in ("groups", "by", "alone") if getattr(self, key)]
         if len(given) != 1:
             got = f"got {' and '.join(given)}" if given else "got none"
             found.append(Mistake("", f'a partition needs one of groups, by = "microgrid" or alone = "inv1"; {got}'))
+        if names is None:
+            return found
         known = [*names, *dict.fromkeys(microgrids.values())]
         lower = {name.lower() for name in microgrids.values()} | {*names, PLANT}
         if self.alone and self.alone not in names:

@@ -94,15 +94,15 @@ def _side(text: str, whole: str) -> Side:
     return Side(names)
 
 
-def objections(text: str, names: Iterable[str], microgrids: Mapping[str, str]) -> list[str]:
+def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, str]) -> list[str]:
     """All that is wrong with a pattern: it is none, it names somebody unknown, or it means no link at all.
 
     Parameters
     ----------
     text : str
         The pattern.
-    names : Iterable[str]
-        All inverters, spare ones included.
+    names : Iterable[str] or None
+        All inverters, spare ones included; None if they are not known, and any name may be one.
     microgrids : Mapping[str, str]
         The microgrid of each.
 
@@ -117,6 +117,8 @@ def objections(text: str, names: Iterable[str], microgrids: Mapping[str, str]) -
         pattern = parse(text)
     except ValueError as error:
         return [str(error)]
+    if names is None:
+        return []
     agents = list(names)
     groups = list(dict.fromkeys(microgrids[name] for name in agents if name in microgrids))
     known = [*agents, *groups, PLANT, ANY]

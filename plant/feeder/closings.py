@@ -52,7 +52,7 @@ class Closings:
             return ""
         return (
             f"switch {self._switches.shown(name)} not closed: its sides are {difference}; allowed are "
-            f"{difference.window}; try again when they are in step, or close it without the check"
+            f"{difference.window}; {difference.way_out}, or close it without the check"
         )
 
     def check_waiting(self, step: int) -> list[PlantEvent]:

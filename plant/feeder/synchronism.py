@@ -21,6 +21,10 @@ _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0
 """Up to which rating (VA): frequency (Hz), voltage (pu), angle (deg)."""
 
 
+LOCKED = 0.01
+"""Difference of frequency (Hz) below which two islands count as held at one frequency: a beat lasts 100 s and more."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Difference:
     """Difference across an open switch between two separate live islands."""
@@ -40,6 +44,26 @@ class Difference:
     def within(self) -> bool:
         """Whether the two sides may be joined."""
         return self.angle <= self.window.angle and self.f <= self.window.f and self.V <= self.window.V
+
+    @property
+    def way_out(self) -> str:
+        """What brings the two sides within the window, as the start of a sentence.
+
+        Examples
+        --------
+        >>> apart = {"switch": "sw", "V": 0.0, "window": Window(angle=10.0, f=0.1, V=0.03)}
+        >>> Difference(angle=90.0, f=0.05, **apart).way_out
+        'try again: the angle passes through zero every 20 s'
+        >>> Difference(angle=90.0, f=0.001, **apart).way_out
+        'at equal frequencies the angle stays: change the load or the set-points of one side'
+        >>> Difference(angle=3.0, f=0.5, **apart).way_out
+        'try again when frequencies and voltages have come closer'
+        """
+        if self.f > self.window.f or self.V > self.window.V:
+            return "try again when frequencies and voltages have come closer"
+        if self.f < LOCKED:
+            return "at equal frequencies the angle stays: change the load or the set-points of one side"
+        return f"try again: the angle passes through zero every {1.0 / self.f:.2g} s"
 
     def __str__(self) -> str:
         return f"{self.angle:.1f} deg, {self.f:.3f} Hz and {100.0 * self.V:.1f} % of voltage apart"

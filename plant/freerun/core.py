@@ -257,14 +257,14 @@ class FreePlant(Side):
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         self.admission.take(state)
         self._heard.came(state.sender, now)
-        self._silence.heard(state.sender, self.tick)
+        self._silence.heard(state.sender)
         if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
             self._heard.keep(state)
 
     def _on_status(self, status: AgentStatus, payload: bytes, now: float) -> None:
         if status.sender in self.plates:  # one comes before its nameplate now and then
             self.admission.check(status)
-            self._silence.reported(status, self.tick)
+            self._silence.reported(status)
 
     def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
         self._publish(self.keys.telemetry, payload)
@@ -277,7 +277,7 @@ class FreePlant(Side):
         if self.phase not in ("gathering", "running"):
             return
         self.plates[name] = plate
-        self._silence.joined(name, self.tick)
+        self._silence.joined(name)
         self._connect(name, True, now)
         self._note(name, f"{name} joined")
         self.ordering.send(self.plates, now)
@@ -326,7 +326,7 @@ class FreePlant(Side):
         overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
         t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
         order, said, receivers = self.ordering.give(text, t, reply_to)
-        noted = f"order {order.seq} to links: {said}, from t = {t:.2f} s on"
+        noted = f"order {order.seq} to links: {said}" + (f", from t = {t:.2f} s on" if receivers else "")
         self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=noted))
         return order, said, receivers
 
@@ -404,7 +404,7 @@ class FreePlant(Side):
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
         if slipped:
-            self._warn(f"hopelessly late: the schedule was put off by {slipped:.3f} s of wall time", now)
+            self._warn(f"fell {slipped:.3f} s of wall time behind; all later steps are put off by as much", now)
         if not self.pacer.take_failure(of=self._ticks):
             return
         speed = self.config.speed
@@ -448,7 +448,7 @@ class FreePlant(Side):
             self.abort(str(error), now)
             return True
         self.tick += 1
-        for name, text in self._silence.take(self.tick):
+        for name, text in self._silence.take(now):
             self._note(name, text)
         self._reporter.collect()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1:

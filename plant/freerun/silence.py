@@ -1,14 +1,15 @@
-"""Agents that take part and are not heard: not by the plant, or not by a neighbour. Pure; times are ticks of the plant.
+"""Agents that take part and are not heard: not by the plant, or not by a neighbour. Pure.
 
 A frozen agent keeps its token for Zenoh's lease of 2 s, and two hosts that lose the path between them may both keep
 theirs to the plant. The neighbours leave such a state out after `max_age`, so the run is another one from then on. The
 plant sees the first by the age of the agent's last state, and is told the second by the ages in `AgentStatus`.
+
+Ages are counted in time for which the plant itself listened: while it stood still, states came that it has not read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import ceil
 
 from wire.messages import AgentStatus
 
@@ -18,6 +19,12 @@ itself finds out meanwhile."""
 
 ACQUAINTANCE = 1.0
 """Time (s, wall) after a join in which agents may not have heard each other yet."""
+
+LISTENED = 2.0
+"""Control periods between two steps of the plant that count as time in which it listened; what is beyond it slept."""
+
+RECENT = 3.0
+"""Control periods within which an agent must have been heard here, if it is told that a neighbour does not hear it."""
 
 
 class Silence:
@@ -35,35 +42,42 @@ class Silence:
     Examples
     --------
     >>> silence = Silence(max_age=0.25, T_c=0.02, period=0.02)
-    >>> silence.joined("inv2", tick=0); silence.heard("inv2", tick=10)
-    >>> list(silence.take(22)), list(silence.take(23))
-    ([], [('inv2', 'inv2 is silent: no state for 0.25 s, nothing comes from it')])
-    >>> silence.heard("inv2", tick=40); list(silence.take(41))
+    >>> silence.joined("inv2"); list(silence.take(now=5.0))
+    []
+    >>> [told for step in range(1, 14) for told in silence.take(now=5.0 + 0.02 * step)]
+    [('inv2', 'inv2 is silent: no state for 0.25 s, nothing comes from it')]
+    >>> silence.heard("inv2"); list(silence.take(now=5.28))
     [('inv2', 'inv2 is heard again')]
+    >>> list(silence.take(now=9.0))
+    []
     """
 
     def __init__(self, max_age: float, T_c: float, period: float) -> None:
-        self._max_age = max_age
-        self._limit = max_age / T_c
-        self._settling, self._acquaintance = ceil(SETTLING / period), ceil(ACQUAINTANCE / period)
-        self._joined: dict[str, int] = {}
-        self._last: dict[str, int] = {}
-        """Tick of the last state of each agent, or of its join."""
+        self._max_age, self._period = max_age, period
+        self._limit = max_age * period / T_c
+        """The same in wall time (s)."""
+        self._clock = 0.0
+        """Time (s, wall) for which the plant has listened."""
+        self._now: float | None = None
+        """When that was last brought up to date (s)."""
+        self._joined: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+        """When each agent was heard last, or joined."""
         self._holding: set[str] = set()
         """Agents that say that they have no measurement."""
         self._silent: set[str] = set()
-        self._unheard: dict[str, dict[str, int]] = {}
-        """Of each agent the neighbours that it does not hear, and from which tick on that is to be told."""
+        self._unheard: dict[str, dict[str, float]] = {}
+        """Of each agent the neighbours that it does not hear, and from when on that is to be told."""
         self._told: dict[str, set[str]] = {}
         """Those of whom it has been told."""
 
-    def joined(self, name: str, tick: int) -> None:
+    def joined(self, name: str) -> None:
         """Note that an agent takes part from now on."""
-        self._joined[name] = self._last[name] = tick
+        self._joined[name] = self._last[name] = self._clock
 
-    def heard(self, name: str, tick: int) -> None:
+    def heard(self, name: str) -> None:
         """Note a state that came off the wire."""
-        self._last[name] = tick
+        self._last[name] = self._clock
         self._holding.discard(name)
 
     def forget(self, name: str) -> None:
@@ -77,30 +91,33 @@ class Silence:
         for told in self._told.values():
             told.discard(name)
 
-    def reported(self, status: AgentStatus, tick: int) -> None:
+    def reported(self, status: AgentStatus) -> None:
         """Note what an agent says of its neighbours; while it does not tick, it uses nobody's state anyway."""
         if status.sender not in self._joined:
             return
         if status.phase != "running":
-            if tick >= self._joined[status.sender] + self._settling:  # before, it waits for its first measurement
+            if self._clock >= self._joined[status.sender] + SETTLING:  # before, it waits for its first measurement
                 self._holding.add(status.sender)
             return
-        unheard, before = {}, self._unheard.get(status.sender, {})
+        unheard: dict[str, float] = {}
+        before = self._unheard.get(status.sender, {})
         for name, age in zip(status.neighbours, status.ages, strict=False):
             if 0.0 <= age <= self._max_age or name not in self._joined:
                 continue
-            since = tick + self._settling
+            since = self._clock + SETTLING
             if age < 0.0:  # never heard since one of the two joined, or since the agent last stood still
-                since = max(since + ceil(self._limit), self._acquainted(status.sender, name))
+                since = max(since + self._limit, self._acquainted(status.sender, name))
             unheard[name] = before.get(name, since)
         # a neighbour that is no longer named has lost its token there: it is not heard either
         named = set(status.neighbours)
         self._unheard[status.sender] = {name: at for name, at in before.items() if name not in named} | unheard
 
-    def take(self, tick: int) -> Iterator[tuple[str, str]]:
-        """Whose silence began or ended by this tick, each with a sentence."""
+    def take(self, now: float) -> Iterator[tuple[str, str]]:
+        """Whose silence began or ended by a step of the plant at this time (s, wall), each with a sentence."""
+        self._clock += 0.0 if self._now is None else min(max(0.0, now - self._now), LISTENED * self._period)
+        self._now = now
         for name, last in self._last.items():
-            if tick - last > self._limit:
+            if self._clock - last > self._limit:
                 if name not in self._silent:
                     self._silent.add(name)
                     why = "it says that it has no measurement" if name in self._holding else "nothing comes from it"
@@ -109,18 +126,19 @@ class Silence:
                 self._silent.discard(name)
                 yield name, f"{name} is heard again"
         for name in self._unheard:
-            yield from self._take_unheard(name, tick)
+            yield from self._take_unheard(name)
 
-    def _take_unheard(self, name: str, tick: int) -> Iterator[tuple[str, str]]:
+    def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
         """Neighbours whom an agent has ceased to hear, or hears again. Whom nobody hears is told of as silent."""
         unheard = {other: at for other, at in self._unheard[name].items() if other in self._last}
         told = self._told.setdefault(name, set())
         back = sorted(other for other in told if other not in unheard and other in self._last)
         told.intersection_update(unheard)
+        recent = self._clock - RECENT * self._period
         news = [
             other
             for other, at in unheard.items()
-            if at <= tick and other not in told and other not in self._silent and tick - self._last[other] <= 2
+            if at <= self._clock and other not in told and other not in self._silent and self._last[other] >= recent
         ]
         told.update(news)
         if back:
@@ -129,5 +147,5 @@ class Silence:
             others = ", ".join(news)
             yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, though one came here"
 
-    def _acquainted(self, *names: str) -> int:
-        return max(self._joined[name] for name in names) + self._acquaintance
+    def _acquainted(self, *names: str) -> float:
+        return max(self._joined[name] for name in names) + ACQUAINTANCE

@@ -84,12 +84,12 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         >>> heal.in_words([Link("inv4", "inv7"), Link("inv7", "inv4"), Link("inv1", "inv4")])
         'inv4 <-> inv7, inv1 -> inv4: healed'
         >>> heal.in_words([])
-        '* <-> *: no link has a fault, so nothing was healed'
+        '* <-> *: no link has a fault, nothing to heal'
         """
         if self.fault is not None:
             return str(self)
         if not impaired:
-            return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, so nothing was healed"
+            return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, nothing to heal"
         return f"{_listed(impaired)}: healed"
 
     def to_text(self) -> str:

@@ -198,7 +198,7 @@ def _give(
         setup, agent = links_of_run(visit)
         check(order, setup)
         outcome = give(visit, order)
-    typer.echo(f"{outcome.said}; from t = {outcome.t:.2f} s on")
+    typer.echo(f"{outcome.said}; from t = {outcome.t:.2f} s on" if outcome.changes_links else outcome.said)
     if outcome.acknowledged:
         typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
     if outcome.absent:

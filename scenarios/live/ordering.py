@@ -50,6 +50,11 @@ class Outcome:
     deaf: Mapping[str, str] = field(default_factory=dict)
     """Receivers that have refused, and why."""
 
+    @property
+    def changes_links(self) -> bool:
+        """Whether it changes what any link does."""
+        return bool(self.acknowledged or self.silent or self.absent or self.deaf)
+
 
 def links_of_run(visit: Visit) -> tuple[Setup, AgentConfig]:
     """What the processes of a run were told of its links, and of one of its agents.

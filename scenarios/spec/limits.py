@@ -31,16 +31,12 @@ def limits_of(scenario: Scenario, case: str) -> tuple[PowerLimit, ...]:
 
 
 def check_limits(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
-    """Who is limited is a GFL of the scenario, by a power that it could have, at an event that there is."""
+    """Who is limited is a GFL of the scenario, by a power that it could have."""
     for i, event in enumerate(scenario.events):
         _check(f"event[{i}].P_max_kW", event.P_max_kW, scenario, feeder, mistakes)
-    labels = [event.label for event in scenario.events]
     for name, case in scenario.cases.items():
         for label, limits in case.P_max_kW.items():
-            path = f"case.{name}.P_max_kW"
-            if label not in labels:
-                mistakes.add(path, f'no event "{label}"; {suggestion(label, labels, "events")}')
-            _check(f"{path}.{label}", limits, scenario, feeder, mistakes)
+            _check(f"case.{name}.P_max_kW.{label}", limits, scenario, feeder, mistakes)
 
 
 def _check(path: str, limits: Mapping[str, float], scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:

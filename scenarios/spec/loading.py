@@ -13,7 +13,15 @@ import msgspec
 from plant.equipment import Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
-from scenarios.spec.checks import check_cases, check_names, check_start, check_step, check_switches, check_times
+from scenarios.spec.checks import (
+    check_cases,
+    check_events,
+    check_names,
+    check_start,
+    check_step,
+    check_switches,
+    check_times,
+)
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
@@ -114,12 +122,13 @@ def check_tables(
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
+    check_events(scenario, mistakes)
+    check_netem(scenario, feeder, mistakes)
     if feeder:
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
         check_limits(scenario, feeder, mistakes)
         check_start(scenario, feeder, mistakes)
-        check_netem(scenario, feeder, mistakes)
         check_supply(scenario, feeder, mistakes)
     return scenario, feeder
 

@@ -31,7 +31,7 @@ def check_moves(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
     known = (*(row.name for row in feeder.inverters), *(row.name for row in feeder.spares))
     for i, event in enumerate(scenario.events):
         if event.leave or event.join:
-            rule = "agents leave and join at ticks"
+            rule = "the period at which agents leave and join"
             multiple(f"event[{i}].t_s", event.t_s, "time.T_c_s", scenario.time.T_c_s, rule, mistakes)
         named: set[str] = set()
         for key, names in (("leave", event.leave), ("join", event.join)):

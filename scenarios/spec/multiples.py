@@ -15,7 +15,7 @@ def multiple(path: str, value: float, of: str, step: float, rule: str, mistakes:
     value, step : float
         Both (s).
     rule : str
-        Why it must be one.
+        What takes place at such times, as an end of the sentence.
     mistakes : Mistakes
         Takes the mistake.
     """
@@ -23,7 +23,9 @@ def multiple(path: str, value: float, of: str, step: float, rule: str, mistakes:
         return
     near = f"{max(round(value / step), 1) * step:.9g}"
     key = of.rpartition(".")[2]
-    mistakes.add(path, f"{value:g} s is not a multiple of {key} = {step:g} s: {rule}; the nearest is {near}")
+    mistakes.add(
+        path, f"{value:g} s is not a multiple of {key} = {step:g} s{rule and f', {rule}'}; the nearest is {near}"
+    )
 
 
 def divides(path: str, step: float, of: str, value: float, mistakes: Mistakes) -> None:

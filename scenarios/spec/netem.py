@@ -80,10 +80,13 @@ def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenari
     return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
 
 
-def check_netem(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
-    """Links, groups and agents exist, values are plausible, and no two entries contradict each other."""
-    rows = inverters_of(scenario, feeder)
-    names = tuple(row.name for row in rows)
+def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -> None:
+    """Links, groups and agents exist, values are plausible, and no two entries contradict each other.
+
+    Without a feeder, which could not be read, nobody's name is known, and the rest is checked.
+    """
+    rows = inverters_of(scenario, feeder) if feeder else ()
+    names = tuple(row.name for row in rows) if feeder else None
     microgrids = {row.name: row.microgrid for row in rows}
     T_c = scenario.time.T_c_s
 

@@ -162,6 +162,10 @@ def test_it_holds_while_no_measurement_comes_and_returns_from_what_the_plant_hol
     assert len(held) <= 0.25 / T_C
     assert held[-1].P_set > before.P_set
     assert [state.P_set for state in lab.decided()] == [70e3]
+    assert [line.split(" at ")[0] for line in lab.said[-2:]] == [
+        "inv1: no measurement of late; holds",
+        "inv1: goes on",
+    ]
 
 
 def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:

@@ -144,10 +144,10 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     lab.step()
 
     assert (first["said"], first["receivers"]) == ("inv2 -> inv1: healed", ["inv1"])
-    assert (again["said"], again["receivers"]) == ("all links: no link has a fault, so nothing was healed", [])
+    assert (again["said"], again["receivers"]) == ("all links: no link has a fault, nothing to heal", [])
     assert [event.text.partition(", from")[0] for event in lab.events("link")[1:]] == [
         "order 2 to links: inv2 -> inv1: healed",
-        "order 3 to links: all links: no link has a fault, so nothing was healed",
+        "order 3 to links: all links: no link has a fault, nothing to heal",
     ]
     assert (links.impaired(4.9), links.impaired(5.0)) == ((), ("inv1",))
 

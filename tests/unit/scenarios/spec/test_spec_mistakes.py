@@ -166,6 +166,49 @@ def test_all_mistakes_come_at_once_in_the_order_of_lines(tmp_path: Path) -> None
     ]
 
 
+def test_an_unknown_feeder_hides_only_what_depends_on_it(tmp_path: Path) -> None:
+    """Links, agents' faults and events are checked without it; whose names are right cannot be known."""
+    text = ISLANDING.replace('feeder = "microgrid123"', 'feeder = "microgrid124"').replace('open = ["60-160"]', "")
+    text += """
+[[case.IV.link]]
+on = "inv1 <-> anybody"
+from_s = 9.0
+delay = 0.1
+[[case.IV.link]]
+on = "inv1"
+delay = 0.1
+[[node]]
+name = "inv2"
+pause = true
+from_s = 1.0
+"""
+
+    found = mistakes(tmp_path, text)
+
+    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
+        "plant.feeder",
+        "event[1]",
+        "case.IV.link[0].from_s",
+        "case.IV.link[1].on",
+        "node[0].pause",
+    ]
+
+
+def test_an_event_off_the_grid_has_its_place_among_the_others_nevertheless(tmp_path: Path) -> None:
+    """Two mistakes of one time are told together."""
+    text = ISLANDING.replace("t_s = 4.0", "t_s = 0.9995").replace("end_s = 7.0", "end_s = 0.501")
+
+    found = [re.sub(r".*?: ([^:]*: .*?)[;,(].*", r"\1", line) for line in mistakes(tmp_path, text)]
+
+    assert found == [
+        "time.end_s: 0.501 s is not a multiple of T_c_s = 0.02 s",
+        'event[0].t_s: event "event1" at 1 s does not come before the end at 0.501 s',
+        "event[1].t_s: 0.9995 s is not a multiple of h_s = 0.002 s",
+        'event[1].t_s: event "event2" at 0.9995 s does not come before the end at 0.501 s',
+        'event[1].t_s: event "event2" at 0.9995 s is written after "event1" at 1 s',
+    ]
+
+
 def test_a_wrong_load_set_does_not_hide_a_wrong_switch(tmp_path: Path) -> None:
     """The switches are checked on the feeder even where its load set does not exist."""
     text = ISLANDING.replace('load_set = "event2"', 'load_set = "x"').replace('"60-160"', '"60-161"')

@@ -77,7 +77,7 @@ def test_moves_survive_the_runs_copy(tmp_path: Path) -> None:
             r'event\[2\].join: "inv3" is there already at 3 s; .* let it leave',
         ),
         ('join = ["inv2"]', "", r'event\[2\]: event "return" does nothing; give it open, close, leave, join, P_max_kW'),
-        ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s: .* nearest is 2"),
+        ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
         ('join = ["inv2"]', 'joins = ["inv2"]', r'event\[2\].joins: unknown key; did you mean "join"\?'),
     ],
 )
