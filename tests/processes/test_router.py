@@ -94,7 +94,7 @@ def test_a_router_may_come_last_die_and_come_back(desk: Desk, router: Router) ->
     watch.expect("the plant has been silent for")
     router.start()
     for name, agent in agents.items():
-        agent.expect(f"{name}: joins at t = ")
+        agent.expect(f"{name}: goes on at t = ")
     watch.expect(r"inv1 .* inv4,7 ")
     code, text = desk.type("down")
 

@@ -64,7 +64,7 @@ def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Pa
 
         hosts.heal(3)
         for name in ("inv7", "inv8", "inv9"):
-            agents[name].expect(f"{name}: joins at t = ")
+            agents[name].expect(f"{name}: goes on at t = ")
         watch.expect(r"inv1 .* inv2-9 ")
         watch.expect(r"inv9 .* inv1-8 ")
         code, text = desk.type("down", prefix=hosts.at(3))
