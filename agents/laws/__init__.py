@@ -1,0 +1,1 @@
+"""Control laws: the contract, and one published law a file. Pure."""

@@ -1,0 +1,159 @@
+"""The contract of a control law: one object per inverter, called once a control period, in per unit. Pure.
+
+A law sees its own inverter (`Own`) and what its neighbours share (`Neighbour`), and returns the set-points of the next
+period (`SetPoints`). All it may remember are its own attributes. It asks for no time, file, randomness or network: the
+same calls give the same results in one process and in many.
+
+The agent that holds a law decides when to call it: not while the inverter is connected to the grid or out of service,
+nor without a fresh measurement. When it calls again after such a pause, it calls `start` first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from wire.parameters import Range, Unit, values_of
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
+"""What most laws share beside their set-points."""
+
+
+class Own(NamedTuple):
+    """What a law knows of its own inverter. Per unit: powers of P_rated, voltages of V_nom, frequencies of f_nom."""
+
+    name: str
+    """Name of the inverter."""
+    leader: bool
+    """Whether it is grid-forming: g_i = 1 in (12)-(15)."""
+    t: float
+    """Run time of the measurement (s)."""
+    P: float
+    """Measured real power (pu)."""
+    Q: float
+    """Measured reactive power (pu)."""
+    V: float
+    """Measured terminal voltage (pu)."""
+    e: float
+    """Measured frequency error (f - f_nom)/f_nom (pu)."""
+    P_set: float
+    """Own set-point of real power (pu): what the law returned last, or what the plant held at `start`."""
+    V_set: float
+    """Own set-point of voltage (pu)."""
+    m_p: float
+    """P-f droop (pu frequency per pu power)."""
+    m_q: float
+    """Q-V droop (pu voltage per pu reactive power)."""
+    P_rated: float
+    """Rating (W)."""
+    V_nom: float
+    """Nominal line-to-neutral voltage (V)."""
+    f_nom: float
+    """Nominal frequency (Hz)."""
+    P_saturated: int = 0
+    """1 if the inverter gives less than P_set asks and cannot give more, -1 if more and cannot less, else 0."""
+    V_saturated: int = 0
+    """The same of V_set."""
+
+
+class Neighbour(NamedTuple):
+    """What a law knows of a neighbour whose last state counts. Per unit of the neighbour's own rating."""
+
+    name: str
+    """Name of the inverter."""
+    leader: bool
+    """Whether it is grid-forming."""
+    age: float
+    """Age of the state (s of run time)."""
+    weight: float
+    """Weight from 0 to 1 that the agent gives the state for its age; see `[handling]`."""
+    P_set: float
+    """Its set-point of real power (pu)."""
+    V_set: float
+    """Its set-point of voltage (pu)."""
+    Q: float
+    """Its measured reactive power (pu)."""
+    m_p: float
+    """Its P-f droop (pu)."""
+    m_q: float
+    """Its Q-V droop (pu)."""
+    P_rated: float
+    """Its rating (W)."""
+    shared: Mapping[str, float] = NOTHING
+    """What its law shares beside these."""
+
+
+class SetPoints(NamedTuple):
+    """What a law decides."""
+
+    P_set: float
+    """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
+    V_set: float
+    """Set-point of voltage (pu of own nominal); the agent limits it to V_set_min, V_set_max."""
+    shared: Mapping[str, float] = NOTHING
+    """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
+    send: bool = True
+    """Whether the neighbours are told. If not, they keep the last state that they heard."""
+
+
+class Law:
+    """Base of all laws. Parameters are annotated attributes (`wire.parameters`).
+
+    Parameters
+    ----------
+    **parameters
+        Values of the parameters that do not keep their default.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong, unknown or missing.
+
+    Examples
+    --------
+    >>> class Hold(Law):
+    ...     '''Stay below a set-point.'''
+    ...     most: Annotated[float, Unit("pu"), Range(0, 1)] = 1.0
+    ...     def step(self, own, neighbours, T):
+    ...         return SetPoints(min(own.P_set, self.most), own.V_set)
+    >>> Hold(most=0.5).most
+    0.5
+    >>> Hold(most=2)
+    Traceback (most recent call last):
+        ...
+    ValueError: most: must be from 0 to 1 pu, got 2
+    """
+
+    source: ClassVar[str] = ""
+    """Publication that the law is from."""
+
+    P_set_min: Annotated[float, Unit("pu"), Range(-1, 1), "Lower limit of P_set."] = 0.0
+    P_set_max: Annotated[float, Unit("pu"), Range(0, inf), "Upper limit of P_set."] = 1.0
+    V_set_min: Annotated[float, Unit("pu"), Range(0, 1), "Lower limit of V_set."] = 0.9
+    V_set_max: Annotated[float, Unit("pu"), Range(1, inf), "Upper limit of V_set."] = 1.1
+
+    def __init__(self, **parameters: Any) -> None:
+        for name, value in values_of(type(self), parameters).items():
+            setattr(self, name, value)
+
+    def start(self, own: Own) -> None:
+        """Begin, or begin again, from the set-points that the plant holds: forget what was remembered."""
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Decide the set-points of one control period.
+
+        Parameters
+        ----------
+        own : Own
+            The own inverter.
+        neighbours : Sequence[Neighbour]
+            Those whose states count, in the order of the inverters; empty if there is none.
+        T : float
+            Control period (s).
+        """
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End: give back what was opened."""

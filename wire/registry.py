@@ -1,0 +1,190 @@
+"""Registries: what a user can plug in, found by a registered name, an entry point, or `module:Name`.
+
+A registry knows its own objects, those that a decorator has added in this process, and those of installed distributions
+(entry points of its group). A reference `module:Name` needs no registration: the module is imported from the Python
+path, or from the folder of the scenario that names it. So another process finds the same object from the same text.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
+from typing import Any, Generic, TypeVar
+
+from wire.nearest import suggestion
+from wire.printable import printable
+
+T = TypeVar("T")
+
+NOTEBOOK = "__main__"
+"""Module of what is defined in a notebook or in the script that runs: no other process can import it."""
+
+
+class PluginError(ValueError):
+    """A reference that leads to nothing usable; its text says why and what to write."""
+
+
+class Registry(Generic[T]):
+    """Everything of one kind that can be plugged in.
+
+    Parameters
+    ----------
+    kind, plural : str
+        What is registered, for messages: "law", "laws".
+    objection : Callable[[Any], str]
+        Why an object is none of this kind, as the end of a sentence; "" if it is one.
+    own : dict[str, str], optional
+        References (`module:Name`) of those that come with gridpeers, by name; imported when they are asked for.
+
+    Examples
+    --------
+    >>> greetings = Registry("greeting", "greetings", lambda it: "" if callable(it) else "it cannot be called",
+    ...     own={"print": "builtins:print"})
+    >>> @greetings.register("hello")
+    ... def hello(): return "hello"
+    >>> greetings.resolve("hello") is hello, greetings.resolve("print") is print, greetings.names
+    (True, True, ('print', 'hello'))
+    >>> greetings.resolve("helo")
+    Traceback (most recent call last):
+        ...
+    wire.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings are print, hello; ...
+    """
+
+    def __init__(
+        self, kind: str, plural: str, objection: Callable[[Any], str], own: dict[str, str] | None = None
+    ) -> None:
+        self.kind, self.plural = kind, plural
+        self._objection = objection
+        self._own = dict(own or {})
+        self._added: dict[str, T] = {}
+
+    @property
+    def group(self) -> str:
+        """Group of entry points by which an installed distribution adds to this registry."""
+        return f"gridpeers.{self.plural.replace(' ', '_')}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names that can be resolved, gridpeers' own first."""
+        return tuple(dict.fromkeys((*self._own, *self._added, *_entry_points(self.group))))
+
+    def register(self, name: str) -> Callable[[T], T]:
+        """Return a decorator that adds an object under a name, for this process; a name is never taken over.
+
+        Raises
+        ------
+        PluginError
+            If gridpeers, or another module, has an object of this name.
+        """
+
+        def add(it: T) -> T:
+            before = self._added.get(name)
+            same = before is not None and _home(before) == _home(it)  # a cell of a notebook that is run again
+            if name in self._own or (before is not None and not same):
+                raise PluginError(f'there is a {self.kind} "{name}" already; choose another name')
+            self._check(it, name)
+            self._added[name] = it
+            return it
+
+        return add
+
+    def resolve(self, reference: str, folder: str = "") -> T:
+        """Return the object of a name or of a reference `module:Name`.
+
+        Parameters
+        ----------
+        reference : str
+            Registered name, name of an entry point, or `module:Name`.
+        folder : str, optional
+            Where the module is looked for if it is not on the Python path.
+
+        Raises
+        ------
+        PluginError
+            If there is none, or it is none of this kind.
+        """
+        if reference in self._added:
+            return self._added[reference]
+        if reference in self._own:
+            return self._imported(self._own[reference], "")
+        if reference in _entry_points(self.group):
+            return self._imported(_entry_points(self.group)[reference], "")
+        if ":" in reference:
+            return self._imported(reference, folder)
+        text = f'there is no {self.kind} "{reference}"; {suggestion(reference, self.names, self.plural)}'
+        raise PluginError(f"{text}; your own is written module:Name")
+
+    def portable(self, reference: str) -> str:
+        """Return the text by which another process finds the same object: `module:Name` for what a decorator added.
+
+        Raises
+        ------
+        PluginError
+            If it is defined in a notebook or script, where no other process can import it.
+        """
+        module, _, name = reference.partition(":")
+        if reference in self._added:
+            module, name = _home(self._added[reference])
+        elif not name:
+            return reference
+        if module == NOTEBOOK:
+            raise PluginError(
+                f"the {self.kind} {name} is defined in a notebook or in the script that runs, where other processes "
+                f'cannot import it; move it to a module, or run with driver="inprocess"'
+            )
+        return f"{module}:{name}"
+
+    def _imported(self, reference: str, folder: str) -> T:
+        module_name, _, name = reference.partition(":")
+        if module_name == NOTEBOOK:
+            module: Any = sys.modules[NOTEBOOK]
+        else:
+            module = self._module(module_name, reference, folder)
+        found = module
+        for part in name.split("."):
+            try:
+                found = getattr(found, part)
+            except AttributeError:
+                there = [key for key, value in vars(module).items() if not key.startswith("_") and self._fits(value)]
+                hint = suggestion(part, there, self.plural)
+                raise PluginError(f'{reference}: module {module_name} has no "{part}"; {hint}') from None
+        self._check(found, reference)
+        return found  # type: ignore[no-any-return]
+
+    def _module(self, name: str, reference: str, folder: str) -> Any:
+        if folder and folder not in sys.path:
+            sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
+        try:
+            if name not in sys.modules and find_spec(name) is None:
+                place = f" in {folder} or" if folder else ""
+                text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
+                raise PluginError(f"{reference}: {text}")
+            return importlib.import_module(name)
+        except PluginError:
+            raise
+        except Exception as error:  # whatever a user's module does while it is imported
+            text = printable(f"{type(error).__name__}: {error}", 300)
+            raise PluginError(f"{reference}: importing {name} failed: {text}") from error
+
+    def _fits(self, it: Any) -> bool:
+        return not self._objection(it)
+
+    def _check(self, it: Any, reference: str) -> None:
+        if why := self._objection(it):
+            raise PluginError(f"{reference} is no {self.kind}: {why}")
+
+
+def _home(it: Any) -> tuple[str, str]:
+    """Module and name under which an object can be imported."""
+    kind = it if hasattr(it, "__qualname__") else type(it)
+    return str(kind.__module__), str(kind.__qualname__)
+
+
+@cache
+def _entry_points(group: str) -> dict[str, str]:
+    """References of a group's entry points, by name."""
+    return {point.name: point.value for point in metadata.entry_points(group=group)}
