@@ -30,7 +30,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Let a test that keeps real time wait until it is alone, and all others until it is over."""
     if not hasattr(item.config, "workerinput"):  # one process runs all tests
         return (yield)
-    alone = item.path.relative_to(Path(__file__).parent).parts[0] in REAL_TIME
+    tests = Path(__file__).parent
+    alone = any(item.path.is_relative_to(tests / folder) for folder in REAL_TIME)  # doctests stand elsewhere
     folders: pytest.TempPathFactory = item.config._tmp_path_factory  # type: ignore[attr-defined]
     with (folders.getbasetemp().parent / "real-time.lock").open("w") as lock:  # the workers' folders stand side by side
         fcntl.flock(lock, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
