@@ -113,6 +113,7 @@ def _reproduce(
 def _told(whole: object) -> list[str]:
     """The end in lines: every claim that does not hold, and the counts."""
     from scenarios.reproduce.found import Reproduction
+    from scenarios.results.headline import headline
 
     assert isinstance(whole, Reproduction)
     lines = []
@@ -121,8 +122,5 @@ def _told(whole: object) -> list[str]:
             if verdict.status != "PASS":
                 lines.append(f"{verdict.status:7}  {result.part.name}: {verdict.claim.text}  {verdict.found}")
                 lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
-    counts, (near, judged, _) = whole.counts(), whole.within()
-    tables = f"{near} of {judged} numbers of the tables within tolerance; " if judged else ""
-    held = f"{counts['PASS']} of {len(whole.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
-    took = f"{whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of processor time"
-    return [*lines, f"{tables}{held}, {counts['FAIL']} failed ({took})."]
+    took = f"It took {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of processor time."
+    return [*lines, *headline(whole.numbers), whole.claims, took]

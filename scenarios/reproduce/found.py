@@ -13,7 +13,8 @@ from typing import Any
 from scenarios.reproduce.parts import Part, Picture
 from scenarios.results.claims import Verdict
 from scenarios.results.findings import Findings
-from scenarios.results.paper_tables import PaperTable
+from scenarios.results.headline import Number, numbers
+from scenarios.results.paper_tables import Cell, PaperTable
 from scenarios.run import versions
 
 
@@ -74,11 +75,17 @@ class Reproduction:
         statuses = [verdict.status for verdict in self.verdicts]
         return {status: statuses.count(status) for status in dict.fromkeys(("PASS", "FAIL", "MISS", *statuses))}
 
-    def within(self) -> tuple[int, int, int]:
-        """How many of the tables' numbers are within their tolerance, are judged, and are not judged."""
-        cells = [(cell, result.found) for result in self.results for table in result.tables for cell in table.cells]
-        judged = [found.within(cell) for cell, found in cells if cell.tolerance.value is not None]
-        return sum(map(bool, judged)), len(judged), len(cells) - len(judged)
+    @property
+    def numbers(self) -> list[Number]:
+        """All numbers of the tables, ours beside the paper's."""
+        return [number for result in self.results for number in numbers(result.found, result.tables)]
+
+    @property
+    def claims(self) -> str:
+        """How many claims hold, in words."""
+        counts = self.counts()
+        held = f"{counts['PASS']} of {len(self.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
+        return f"{held}, {counts['FAIL']} failed."
 
 
 def machine() -> str:
@@ -103,10 +110,12 @@ def metrics_json(whole: Reproduction) -> str:
             "island": cell.island,
             "quantity": cell.quantity,
             "paper": cell.paper,
-            "ours": None if result.found.reason(cell) else result.found.value(cell),
+            "ours": _ours(result, cell),
             **({"reason": reason} if (reason := result.found.reason(cell)) else {}),
             "tolerance": cell.tolerance.value,
             "within": result.found.within(cell),
+            "within_relative": cell.within_relative(ours) if (ours := _ours(result, cell)) is not None else None,
+            "within_factor": cell.within_factor(ours) if ours is not None else None,
         }
         for result in whole.results
         for table in result.tables
@@ -146,6 +155,11 @@ def metrics_json(whole: Reproduction) -> str:
         ],
     }
     return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
+
+
+def _ours(result: Result, cell: Cell) -> float | None:
+    """Our number at the place of the paper's; None where it is not steady."""
+    return None if result.found.reason(cell) else result.found.value(cell)
 
 
 def _plain(value: Any) -> Any:

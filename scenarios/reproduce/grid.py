@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from scenarios.reproduce.found import Result
 from scenarios.results.paper_tables import HEADINGS, Cell, PaperTable
-from scenarios.results.tolerances import Quantity
+from scenarios.results.tolerances import MQSI_FACTOR, V_RELATIVE, Quantity
 
 
 class Entry(NamedTuple):
@@ -17,8 +17,8 @@ class Entry(NamedTuple):
     """With a digit more than the paper prints."""
     off: str
     """Ours less the paper's."""
-    within: bool | None
-    """None: not judged."""
+    judged: tuple[tuple[str, bool], ...]
+    """Every judgement: by what, "" for the tolerance of its table, and whether it passes."""
 
 
 class Line(NamedTuple):
@@ -54,15 +54,27 @@ def tolerances(table: PaperTable) -> list[str]:
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)
         value = cell.tolerance.value
-        bound = "not judged by its number" if value is None else f"within {value:g}"
+        bound = f"told by a factor of {MQSI_FACTOR.value:g} only" if value is None else f"within {value:g}"
         found.append(f"{HEADINGS[quantity]}: {bound}; {cell.tolerance.reason}")
+        if cell.relative is not None:
+            found.append(f"{HEADINGS[quantity]}, beside its own size: {100 * V_RELATIVE.value:g} % {V_RELATIVE.reason}")
     return found
 
 
 def _entry(cell: Cell, result: Result) -> Entry:
-    ours = result.found.value(cell)
-    digits = cell.digits + 1
-    if reason := result.found.reason(cell):
-        return Entry(f"{cell.paper:.{cell.digits}f}", reason.partition(":")[0], "-", result.found.within(cell))
+    ours, reason = result.found.value(cell), result.found.reason(cell)
+    digits, paper = cell.digits + 1, f"{cell.paper:.{cell.digits}f}"
+    if reason:
+        return Entry(paper, reason.partition(":")[0], "-", _judged(cell, float("nan")))
     off = round(ours - cell.paper, digits) + 0.0  # no "-0.000"
-    return Entry(f"{cell.paper:.{cell.digits}f}", f"{ours:.{digits}f}", f"{off:+.{digits}f}", cell.within(ours))
+    times = f" ({ours / cell.paper:.2g} times)" if cell.tolerance.value is None else ""
+    return Entry(paper, f"{ours:.{digits}f}", f"{off:+.{digits}f}{times}", _judged(cell, ours))
+
+
+def _judged(cell: Cell, ours: float) -> tuple[tuple[str, bool], ...]:
+    by = {
+        "": cell.within(ours),
+        f"{100 * V_RELATIVE.value:g} %": cell.within_relative(ours),
+        f"factor {MQSI_FACTOR.value:g}": cell.within_factor(ours),
+    }
+    return tuple((name, holds) for name, holds in by.items() if holds is not None)

@@ -5,26 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from scenarios.reproduce.found import Reproduction, Result, machine
-from scenarios.reproduce.grid import lines, tolerances
+from scenarios.reproduce.grid import Entry, lines, tolerances
 from scenarios.reproduce.page import PAPER
 from scenarios.results.claims import Verdict
+from scenarios.results.headline import headline
 from scenarios.results.paper_tables import HEADINGS
 from scenarios.run import versions
 
-_MARKS = {True: "yes", False: "**NO**", None: "not judged"}
+_MARKS = {True: "yes", False: "**NO**"}
 
 
 def markdown(whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
     """Text of report.md."""
-    counts, (near, judged, open_) = whole.counts(), whole.within()
     head = [
         "# The paper, reproduced",
         "",
         f"{PAPER}.",
         "",
-        f"{counts['PASS']} of {len(whole.verdicts)} claims hold, {counts['MISS']} missed for a reason that is told, "
-        f"{counts['FAIL']} failed. {near} of {judged} numbers of the tables are within tolerance; {open_} more are "
-        "shown only.",
+        *(f"- {line}" for line in (*headline(whole.numbers), whole.claims)),
         "",
         f"Driver {whole.driver}, seed {whole.seed}, {whole.started}; {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of "
         f"processor time. {machine()}. {'; '.join(f'{name} {version}' for name, version in versions().items())}.",
@@ -45,7 +43,7 @@ def _part(result: Result) -> Iterator[str]:
         for quantity in table.quantities:
             header += [f"{HEADINGS[quantity]}: paper", "ours", "difference", "within"]
         rows = [
-            (line.label, *(text for e in line.entries for text in (e.paper, e.ours, e.off, _MARKS[e.within])))
+            (line.label, *(text for e in line.entries for text in (e.paper, e.ours, e.off, _within(e))))
             for line in lines(table, result)
         ]
         yield from (f"### Table {table.number}. {table.title}", "", *_rows(header, rows), "")
@@ -55,6 +53,11 @@ def _part(result: Result) -> Iterator[str]:
     for picture, path in result.figures.items():
         yield from (f"![{picture.title}](figures/{path.name})", "", f"**{picture.title}.** {picture.note}".strip(), "")
         yield from _claims([verdict for verdict in result.verdicts if verdict.claim.figure == picture.key])
+
+
+def _within(entry: Entry) -> str:
+    """Every judgement of a number."""
+    return "; ".join(f"{name} {_MARKS[holds]}".strip() for name, holds in entry.judged)
 
 
 def _claims(verdicts: Sequence[Verdict]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from scenarios.reproduce.found import Reproduction, Result, machine
 from scenarios.reproduce.grid import Entry, lines, tolerances
 from scenarios.results.claims import Verdict
+from scenarios.results.headline import headline
 from scenarios.results.paper_tables import HEADINGS, PaperTable
 from scenarios.run import versions
 
@@ -33,16 +34,16 @@ def html(whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
 
 
 def _head(whole: Reproduction) -> Iterator[str]:
-    counts, (near, judged, open_) = whole.counts(), whole.within()
+    counts = whole.counts()
     yield "<h1>The paper, reproduced</h1>"
     yield f'<p class="source">{escape(PAPER)}.</p>'
     yield '<div class="summary">'
     yield f"<p><b>{counts['PASS']}</b> of {len(whole.verdicts)} claims hold</p>"
     yield f"<p><b>{counts['MISS']}</b> missed, for a reason that is told</p>"
     yield f'<p class="{"bad" if counts["FAIL"] else ""}"><b>{counts["FAIL"]}</b> failed</p>'
-    if judged:
-        yield f"<p><b>{near}</b> of {judged} numbers of the tables within tolerance ({open_} more are shown only)</p>"
     yield "</div>"
+    if whole.numbers:
+        yield "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in headline(whole.numbers)) + "</ul>"
     yield "<table class='contents'><tr><th>part</th><th>claims</th><th>took</th></tr>"
     for result in whole.results:
         statuses = [verdict.status for verdict in result.verdicts]
@@ -134,9 +135,11 @@ def _mark(status: str) -> str:
 
 
 def _within(entry: Entry) -> str:
-    if entry.within is None:
-        return '<span class="open" title="not judged">○</span>'
-    return '<span class="ok" title="within">✓</span>' if entry.within else '<span class="off" title="off">✗</span>'
+    """A mark for every judgement of a number."""
+    marks = {True: '<span class="ok" title="within">✓</span>', False: '<span class="off" title="off">✗</span>'}
+    return "; ".join(
+        marks[holds] + (f' <span class="small">{escape(name)}</span>' if name else "") for name, holds in entry.judged
+    )
 
 
 def _embedded(path: Path) -> str:

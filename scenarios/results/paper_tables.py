@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from scenarios.results.tolerances import TABLE, Number, Quantity, Tolerance
+from scenarios.results.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, Number, Quantity, Tolerance
 
 HEADINGS: dict[Quantity, str] = {
     "f_error_Hz": "abs(f-60) Hz",
@@ -59,6 +59,26 @@ class Cell:
         Both count at the precision of the computation: the paper's printed 0.14 stands for exactly 0.14.
         """
         return None if self.tolerance.value is None else abs(ours - self.paper) <= self.tolerance.value
+
+    @property
+    def relative(self) -> float | None:
+        """Largest difference beside the number's own size; None for all but V_error.
+
+        It is no less than half of the last digit that the paper prints: its 0.000 stands for all below 0.0005.
+        """
+        if self.quantity != "V_error":
+            return None
+        return max(V_RELATIVE.value * self.paper, 0.5 * 10.0**-self.digits)
+
+    def within_relative(self, ours: float) -> bool | None:
+        """Whether our number is near enough beside its own size; None where that is not judged."""
+        return None if self.relative is None else abs(ours - self.paper) <= self.relative
+
+    def within_factor(self, ours: float) -> bool | None:
+        """Whether a number that is not judged by a difference is at most a factor off; None where it is so judged."""
+        if self.tolerance.value is not None:
+            return None
+        return self.paper / MQSI_FACTOR.value <= ours <= self.paper * MQSI_FACTOR.value
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from scenarios.results.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
+from scenarios.results.headline import headline, numbers
 from scenarios.results.metrics import Steady
 from scenarios.results.paper_tables import DIGITS, HEADINGS, UNITS, paper_cell, tables_of
 from scenarios.results.steadiness import STEADY
@@ -74,7 +75,7 @@ def plain(report: Report) -> str:
         for verdict in report.verdicts:
             lines.append(f"{verdict.status:7}  {verdict.claim.text:{width}}  {verdict.found}")
             lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
-        blocks.append("\n".join([*lines, _count(report.verdicts)]))
+        blocks.append("\n".join([*lines, *_summary(report)]))
     blocks += [f"NOTE  {note}" for note in report.notes]
     blocks.append(f"Results: {report.folder}")
     return "\n\n".join(blocks) + "\n"
@@ -103,7 +104,7 @@ def show(report: Report, console: Console) -> None:
         if verdict.status == "MISS":
             console.print(f"{'':7}  [dim]{escape(verdict.claim.known_miss)}[/dim]", highlight=False)
     if report.verdicts:
-        console.print(_count(report.verdicts), "\n", highlight=False)
+        console.print(escape("\n".join(_summary(report))), "\n", highlight=False)
     for note in report.notes:
         console.print(f"[yellow]NOTE[/yellow]  {escape(note)}", highlight=False)
     console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
@@ -212,6 +213,11 @@ def _plain_grid(grid: Grid) -> str:
         )
         lines.append("  ".join(cells).rstrip())
     return "\n".join([*lines, *([grid.legend] if grid.legend else [])])
+
+
+def _summary(report: Report) -> list[str]:
+    """How many claims hold, and how near the paper's tables are."""
+    return [_count(report.verdicts), *headline(numbers(report.found, tables_of(report.experiment)))]
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:

@@ -72,6 +72,15 @@ TABLE: dict[tuple[Number, Quantity], Tolerance] = {
 }
 """Tolerances by table and quantity."""
 
+V_RELATIVE = Bound(
+    0.25,
+    "of the paper's own V_error: as much as printing hides of 0.002, which it prints most often; a zero passes no such "
+    "bound, as it passes one of 0.003 pu (1)",
+)
+MQSI_FACTOR = Bound(
+    2.0, f"how many times an MQSI may be the paper's, or the paper's it, to be told as near: it {_PLACES}"
+)
+
 WITHIN = Bound(1.0, 'the paper: "in less than 1 s" (s)')
 F_NONE = Bound(0.01, "half of the smallest residual that is not 0 in Table I is far above it (Hz)")
 IV_MQSI = Bound(0.1, "twice what Table II has for case IV, 0.05")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.claims.claim import Claim, Judge, near_the_table, seconds
+from scenarios.results.claims.claim import Claim, Judge, near_relatively, near_the_table, seconds
 from scenarios.results.findings import Findings
 from scenarios.results.tolerances import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
 
@@ -60,6 +60,7 @@ COMMUNICATION: tuple[Claim, ...] = (
     near_the_table("communication", "IV", "f_error_Hz"),
     near_the_table("communication", "IV", "MPSI"),
     near_the_table("communication", "IV", "V_error"),
+    near_relatively("communication", "IV"),
     Claim(
         name="MQSI_order",
         text=f"MQSI: full, then link failure, then reduced, and that below {REDUCED_MQSI.value:g}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.claims.claim import Claim, near_the_table
+from scenarios.results.claims.claim import Claim, near_relatively, near_the_table
 from scenarios.results.findings import Findings
 from scenarios.results.tolerances import AT_LIMIT, EQUAL, F_NONE, HEADROOM_GONE, MQSI_UNMOVED
 
@@ -61,6 +61,7 @@ INTERMITTENCY: tuple[Claim, ...] = (
     near_the_table("intermittency", "III", "MPSI"),
     near_the_table("intermittency", "III", "f_error_Hz"),
     near_the_table("intermittency", "III", "V_error"),
+    near_relatively("intermittency", "III"),
     Claim(
         name="saturated_at_their_limit",
         text="inverters 2, 5 and 8 give what they have",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.claims.claim import Claim, Judge, by_event, near_the_table, ratio, seconds
+from scenarios.results.claims.claim import Claim, Judge, by_event, near_relatively, near_the_table, ratio, seconds
 from scenarios.results.findings import Findings
 from scenarios.results.tolerances import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN, Quantity
 
@@ -59,6 +59,12 @@ ISLANDING: tuple[Claim, ...] = (
     near_the_table("islanding", "I", "f_error_Hz"),
     near_the_table("islanding", "I", "MPSI"),
     near_the_table("islanding", "II", "V_error"),
+    near_relatively(
+        "islanding",
+        "II",
+        known_miss="II, event2: 0.000 asks for terminals within 0.0005 pu of nominal, and ours lie up to 0.004 pu from "
+        "it; IV: with equal vars they lie 0.003 pu from it, and 3 s after event1 still settle (docs/reproduction.md)",
+    ),
     Claim(
         name="only_IV_restores",
         figure="islanding",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.claims.claim import Claim, near_the_table
+from scenarios.results.claims.claim import Claim, near_relatively, near_the_table
 from scenarios.results.findings import Findings
 from scenarios.results.tolerances import EQUAL
 
@@ -30,6 +30,12 @@ SWITCHING: tuple[Claim, ...] = (
     near_the_table("switching", "V", "f_error_Hz"),
     near_the_table("switching", "V", "MPSI"),
     near_the_table("switching", "V", "V_error"),
+    near_relatively(
+        "switching",
+        "V",
+        known_miss="0.000 asks for terminals within 0.0005 pu of nominal; with equal vars those of one of our "
+        "microgrids lie 0.002 pu apart (docs/reproduction.md)",
+    ),
     near_the_table("switching", "V", "MQSI"),
     Claim(
         name="three_islands",

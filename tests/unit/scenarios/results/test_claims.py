@@ -90,6 +90,16 @@ def test_a_known_miss_is_told_with_its_reason() -> None:
     assert missed.claim.known_miss
 
 
+@pytest.mark.parametrize("V_error", [0.0, 0.00126])
+def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
+    """What a tolerance of 0.003 pu passes, a zero for 0.001 or a quarter more than it at 0.002, is told as a miss."""
+    results = changed("III", "event2", V_error=V_error)
+
+    assert verdict("table_II_V_error", results).status == "PASS"
+    assert verdict("table_II_V_error_relative", results).status == "MISS"
+    assert "7 of 8, at most off by" in verdict("table_II_V_error_relative", results).found
+
+
 def test_a_claim_about_a_case_that_was_left_out_is_not_judged() -> None:
     """With case IV alone, what compares cases is not run, and what is about IV is judged."""
     verdicts = {verdict.claim.name: verdict for verdict in judged({"IV": paper()["IV"]})}
