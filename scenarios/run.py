@@ -62,6 +62,8 @@ class Request(Ran):
     driver: Driver
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
+    figures: bool = True
+    """Whether the figures are drawn."""
 
 
 def run(request: Request, progress: Progress) -> Report:
@@ -149,7 +151,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         if one.disturbed
     ]
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike))
-    _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
+    if request.figures:
+        _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     report = Report(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from wire.printable import printable
 
@@ -36,10 +36,13 @@ class Mistakes:
         Name of the file as the user gave it.
     text : str
         Its text, to find the lines of the keys.
+    changed : Collection[str], optional
+        Keys that were changed since, in Python; a mistake in or below one of them has no line.
     """
 
-    def __init__(self, file: str, text: str = "") -> None:
+    def __init__(self, file: str, text: str = "", changed: Collection[str] = ()) -> None:
         self.file = file
+        self._changed = changed
         self._lines = lines_of_keys(text)
         self._found: list[tuple[int, str]] = []
         self._paths: set[str] = set()
@@ -47,6 +50,9 @@ class Mistakes:
     def add(self, path: str, text: str) -> None:
         """Note a mistake at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
         self._paths.add(path)
+        if any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed):
+            self._found.append((0, f"replace: {path}: {text}"))
+            return
         line = self._line_of(path)
         where = f"{self.file}:{line}" if line else self.file
         self._found.append((line, f"{where}: {path}: {text}" if path else f"{where}: {text}"))

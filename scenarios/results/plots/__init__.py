@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.available import available_power
@@ -20,11 +23,45 @@ __all__ = [
     "Drawing",
     "available_power",
     "case_style",
+    "draw",
     "draw_all",
+    "figures_of",
     "microgrids",
     "overview",
     "plug_and_play",
 ]
+
+
+def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
+    """Return how each figure of a run is drawn, by its name."""
+    figures: dict[str, Callable[[], Figure]] = {
+        "frequency": lambda: single(drawing, frequency),
+        "MPSI": lambda: single(drawing, MPSI),
+        "voltage": lambda: single(drawing, voltage),
+        "MQSI": lambda: single(drawing, MQSI),
+        "power_GFM": lambda: powers(drawing, GFM=True),
+        "power_GFL": lambda: powers(drawing, GFM=False),
+        "overview": lambda: overview(drawing),
+    }
+    if drawing.moves:
+        figures["plug-n-play"] = lambda: plug_and_play(drawing)
+    if drawing.limited:
+        figures["available-power"] = lambda: available_power(drawing)
+    if drawing.islands:
+        figures |= {f"microgrids_{case}": partial(microgrids, drawing, case) for case in drawing.histories}
+    return figures
+
+
+def draw(drawing: Drawing, name: str) -> Figure:
+    """Draw one figure of a run in the style of all.
+
+    Raises
+    ------
+    KeyError
+        If the run has no figure of this name.
+    """
+    with mpl.rc_context(PAGE):
+        return figures_of(drawing)[name]()
 
 
 def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
@@ -36,24 +73,11 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    files = []
     with mpl.rc_context(PAGE):
-        figures = {
-            "frequency.png": single(drawing, frequency),
-            "MPSI.png": single(drawing, MPSI),
-            "voltage.png": single(drawing, voltage),
-            "MQSI.png": single(drawing, MQSI),
-            "power_GFM.png": powers(drawing, GFM=True),
-            "power_GFL.png": powers(drawing, GFM=False),
-            "overview.png": overview(drawing),
-        }
-        if drawing.moves:
-            figures["plug-n-play.png"] = plug_and_play(drawing)
-        if drawing.limited:
-            figures["available-power.png"] = available_power(drawing)
-        if drawing.islands:
-            figures |= {f"microgrids_{case}.png": microgrids(drawing, case) for case in drawing.histories}
-        for name, figure in figures.items():
-            partial = folder / f".{name}"
-            figure.savefig(partial, format="png")
-            partial.replace(folder / name)
-    return tuple(folder / name for name in figures)
+        for name, make in figures_of(drawing).items():
+            unfinished, file = folder / f".{name}.png", folder / f"{name}.png"
+            make().savefig(unfinished, format="png")
+            unfinished.replace(file)
+            files.append(file)
+    return tuple(files)

@@ -47,10 +47,33 @@ def put(tree: Tree, path: str, value: Any) -> None:
     Raises
     ------
     PathError
+        If a list has no such entry, or a table that the user names (a case) is not there and is not given whole.
+    """
+    way = steps(path)
+    node, last = _parent(tree, way, whole=isinstance(value, Mapping)), way[-1]
+    node[last] = value
+
+
+def remove(tree: Tree, path: str) -> None:
+    """Take a key, a table or an entry out of the tables of a scenario; a key that is not written stays so.
+
+    Raises
+    ------
+    PathError
         If a list has no such entry, or a table that the user names (a case) is not there.
     """
-    node: Any = tree
     way = steps(path)
+    node, last = _parent(tree, way, whole=False), way[-1]
+    if isinstance(last, int) or last in node:
+        del node[last]
+
+
+def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
+    """Return the table or list that the last step of a way is in, made if it is left to its defaults.
+
+    A table that the user names may be new if it is given as a `whole`.
+    """
+    node: Any = tree
     for depth, (step, following) in enumerate(zip(way, [*way[1:], None], strict=True)):
         here = _written(way[: depth + 1])
         if isinstance(step, int):
@@ -59,12 +82,12 @@ def put(tree: Tree, path: str, value: Any) -> None:
                 raise PathError(f"there is no {here}; the scenario writes {count} of them, counted from 0")
         elif not isinstance(node, dict):
             raise PathError(f"{_written(way[:depth])} is no table, so that it has no key {step}")
-        elif depth == 1 and way[0] in _named_tables() and step not in node:
+        elif depth == 1 and way[0] in _named_tables() and step not in node and not (whole and following is None):
             raise PathError(f"there is no {here}; {suggestion(step, node, f'tables of {way[0]}')}")
         if following is None:
-            node[step] = value
-        else:
-            node = node[step] if isinstance(step, int) else node.setdefault(step, [] if _numbered(following) else {})
+            break
+        node = node[step] if isinstance(step, int) else node.setdefault(step, [] if _numbered(following) else {})
+    return node
 
 
 def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], path: str = "") -> Iterator[tuple[str, Any]]:

@@ -1,0 +1,88 @@
+"""gridpeers as a library: scenarios, runs, results, sweeps and predictions in Python.
+
+>>> import gridpeers as gp
+>>> scenario = gp.load("islanding").replace({"gains.k_p": 0.001})
+>>> list(scenario.cases)
+['I', 'II', 'III', 'IV']
+
+`scenario.run("IV")` gives a `Result`: its `history`, `metrics`, `events` and `links` are pandas tables, `plot()` draws
+it, and `save(folder)` writes the folder that the command `gridpeers run` writes. docs/python.md has the whole face.
+
+Nothing heavy is imported before it is used: the command line and every agent's process start through this package.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from gridpeers.origin import check_origin
+
+check_origin()
+
+if TYPE_CHECKING:
+    from agents.laws.law import Law, Neighbour, Own, SetPoints
+    from gridpeers.result import Result, Results, read
+    from gridpeers.scenario import Scenario, load
+    from scenarios.results.folder import FolderError
+    from scenarios.run import BrokenRunError
+    from scenarios.spec.loading import catalogue
+    from scenarios.spec.mistakes import ScenarioError
+    from wire.parameters import Range, Unit
+
+_HOME = {
+    "BrokenRunError": "scenarios.run",
+    "FolderError": "scenarios.results.folder",
+    "Law": "agents.laws.law",
+    "Neighbour": "agents.laws.law",
+    "Own": "agents.laws.law",
+    "Range": "wire.parameters",
+    "Result": "gridpeers.result",
+    "Results": "gridpeers.result",
+    "Scenario": "gridpeers.scenario",
+    "ScenarioError": "scenarios.spec.mistakes",
+    "SetPoints": "agents.laws.law",
+    "Unit": "wire.parameters",
+    "catalogue": "scenarios.spec.loading",
+    "load": "gridpeers.scenario",
+    "read": "gridpeers.result",
+}
+"""Module of each public name; it is imported when the name is first used (PEP 562)."""
+
+__all__ = [
+    "BrokenRunError",
+    "FolderError",
+    "Law",
+    "Neighbour",
+    "Own",
+    "Range",
+    "Result",
+    "Results",
+    "Scenario",
+    "ScenarioError",
+    "SetPoints",
+    "Unit",
+    "catalogue",
+    "load",
+    "read",
+]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """Import a public name on its first use."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("gridpeers")
+        if name not in _HOME:
+            from wire.nearest import suggestion
+
+            raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
+        found = globals()[name] = getattr(import_module(_HOME[name]), name)
+        return found
+
+
+def __dir__() -> list[str]:
+    """Return the public names, for completion in a notebook."""
+    return [*__all__, "__version__"]

@@ -1,0 +1,114 @@
+"""The files of a run as pandas tables."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from scenarios.results.history import History
+from scenarios.results.links import COLUMNS
+
+UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
+"""Units of a history's index and quantities."""
+
+METRIC_UNITS = {"f_error_Hz": "Hz", "V_error": "pu", "t_restore_s": "s", "t_load_s": "s"}
+"""Units of the metrics that are no pure numbers."""
+
+
+def history_frame(history: History) -> pd.DataFrame:
+    """Return a case with columns (inverter, quantity) over time; the units are in its `attrs`.
+
+    Examples
+    --------
+    >>> row = (0.0, 60.0, 3e5, 1e4, 2400.0, 3.1e5, 2401.0)
+    >>> frame = history_frame(History.of(("inv1",), [row]))
+    >>> float(frame["inv1"]["P"][0.0]), frame.attrs["units"]["P"]
+    (300000.0, 'W')
+    """
+    quantities = [name for name in UNITS if name != "t"]
+    values = np.stack([getattr(history, name) for name in quantities], axis=2).reshape(len(history.t), -1)
+    columns = pd.MultiIndex.from_product([history.inverters, quantities], names=["inverter", "quantity"])
+    frame = pd.DataFrame(values, index=pd.Index(history.t, name="t"), columns=columns)
+    frame.attrs["units"] = dict(UNITS)
+    return frame
+
+
+def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Return the metrics of a case, a row per window; what is no steady value is nan, with its reason in `reasons`.
+
+    Examples
+    --------
+    >>> frame = metrics_frame({"event1": {"MPSI": None, "V_error": 0.5, "reasons": {"MPSI": "nothing shared"}}})
+    >>> frame.loc["event1"].tolist()
+    [nan, 0.5, 'MPSI: nothing shared']
+    """
+    rows = {
+        label: {name: value for name, value in window.items() if not isinstance(value, dict)}
+        for label, window in windows.items()
+    }
+    frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("window")
+    frame = frame.apply(pd.to_numeric)
+    frame["reasons"] = [
+        "; ".join(f"{name}: {text}" for name, text in window.get("reasons", {}).items()) for window in windows.values()
+    ]
+    frame.attrs["units"] = {name: unit for name, unit in METRIC_UNITS.items() if name in frame}
+    return frame
+
+
+def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the windows among what metrics.json holds of a case."""
+    return {label: value for label, value in case.items() if isinstance(value, dict) and "f_error_Hz" in value}
+
+
+def events_frame(file: Path) -> pd.DataFrame:
+    """Return what happened, from events.csv."""
+    return _from_csv(file, {"t_s": float})
+
+
+def links_frame(file: Path) -> pd.DataFrame:
+    """Return the fate of every message on emulated links, from links.csv; without the file there are no rows."""
+    return _from_csv(file, {"seq": int, "t_s": float, "delay_s": _float_or_nan}, COLUMNS)
+
+
+def read_metrics(folder: Path) -> dict[str, Any]:
+    """Return what metrics.json of a run folder holds."""
+    found: dict[str, Any] = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    return found
+
+
+def _from_csv(
+    file: Path, kinds: Mapping[str, Callable[[str], Any]], without: Sequence[str] | None = None
+) -> pd.DataFrame:
+    """Return the rows of a file, to the last bit of its numbers; units go from its header into `attrs`.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    kinds : Mapping
+        How the columns that are no texts are read.
+    without : Sequence[str], optional
+        Header of the empty table if there is no such file.
+    """
+    if without is not None and not file.exists():
+        header, rows = list(without), []
+    else:
+        with file.open(encoding="utf-8", newline="") as opened:
+            header, *rows = csv.reader(opened)
+    columns = dict(zip(header, zip(*rows, strict=True) if rows else ([] for _ in header), strict=True))
+    units = {name: "s" for name in header if name.endswith("_s")}
+    frame = pd.DataFrame(
+        {name.removesuffix("_s"): [kinds.get(name, str)(text) for text in column] for name, column in columns.items()}
+    )
+    frame.attrs["units"] = {name.removesuffix("_s"): unit for name, unit in units.items()}
+    return frame
+
+
+def _float_or_nan(text: str) -> float:
+    return float(text) if text else float("nan")

@@ -1,0 +1,311 @@
+"""What a run came to: its tables and figures, read from its folder; `save` copies the folder, `read` opens one."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+import weakref
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import pandas as pd
+
+from gridpeers import frames
+from plant.equipment import Feeder
+from plant.tables import read_feeder
+from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.folder import FolderError, refusal, shown, write_whole
+from scenarios.results.history import History, Plates, read_history
+from scenarios.results.moves import as_they_came
+from scenarios.spec import model
+from scenarios.spec.loading import read_toml
+from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.moves import inverters_of
+from scenarios.spec.reading import read_tables
+from wire.messages import PlantEvent
+from wire.nearest import suggestion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class RunFolder:
+    """A run folder; a temporary one is removed when nobody holds a result of it any more.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    temporary : bool
+        Whether it is to be removed.
+    """
+
+    def __init__(self, path: Path, *, temporary: bool = False) -> None:
+        self.path = path
+        self._removal = weakref.finalize(self, shutil.rmtree, path, ignore_errors=True) if temporary else None
+
+    def keep(self) -> None:
+        """Leave a temporary folder where it is."""
+        if self._removal is not None:
+            self._removal.detach()
+
+
+class Results(Mapping[str, "Result"]):
+    """Results of several cases of one run, by case.
+
+    It is made by `Scenario.run()` and by `gridpeers.read`.
+    """
+
+    def __init__(self, folder: RunFolder, spec: model.Scenario, feeder: Feeder) -> None:
+        self._folder, self._spec, self._feeder = folder, spec, feeder
+        self.numbers = frames.read_metrics(folder.path)
+        """What metrics.json holds."""
+        self._results = {case: Result(self, case) for case in spec.cases}
+
+    def __getitem__(self, case: str) -> Result:
+        if case not in self._results:
+            raise KeyError(f'no case "{case}"; {suggestion(str(case), self._results, "cases")}')
+        return self._results[case]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._results)
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+    @property
+    def spec(self) -> model.Scenario:
+        """The scenario as it was run."""
+        return self._spec
+
+    @property
+    def folder(self) -> Path:
+        """Folder with the files of the run (docs/results.md)."""
+        return self._folder.path
+
+    @property
+    def driver(self) -> str:
+        """What ran it: "inprocess", "processes", or "by hand"."""
+        return str(self.numbers["driver"])
+
+    @property
+    def report(self) -> str:
+        """What the command `gridpeers run` prints at the end."""
+        return (self.folder / "report.txt").read_text(encoding="utf-8")
+
+    @property
+    def metrics(self) -> pd.DataFrame:
+        """Metrics of all cases, a row per (case, window)."""
+        frame = pd.concat({case: result.metrics for case, result in self.items()}, names=["case"])
+        frame.attrs["units"] = next(iter(self.values())).metrics.attrs["units"]
+        return frame
+
+    @property
+    def sha256(self) -> dict[str, str]:
+        """Hash of each case's history."""
+        return {case: result.sha256 for case, result in self.items()}
+
+    def plot(self, figure: str = "overview") -> Figure:
+        """Draw all cases in one figure.
+
+        Parameters
+        ----------
+        figure : str
+            Name of a figure of the run folder: "overview", "frequency", "MPSI", "voltage", "MQSI", "power_GFM",
+            "power_GFL", and those that belong to what happens in this scenario.
+
+        Raises
+        ------
+        ValueError
+            If the run has no such figure.
+        """
+        return _drawn(self.drawing(self._results), figure)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the run folder as the command does, figures included.
+
+        Parameters
+        ----------
+        folder : str or Path
+            New or empty.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        FolderError
+            If there is something in it, or it cannot be written.
+        """
+        from scenarios.results.plots import draw_all
+
+        folder = Path(folder)
+        try:
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                kind = "is not empty" if folder.is_dir() else "is a file"
+                raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
+            shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+            text = self.report.replace(f"Results: {shown(self.folder)}/\n", f"Results: {shown(folder)}/\n")
+            write_whole(folder / "report.txt", text)
+            if not (folder / "plots").exists():
+                draw_all(self.drawing(self._results), folder / "plots")
+        except OSError as error:
+            raise FolderError(refusal(folder, error)) from error
+        return folder
+
+    def drawing(self, cases: Mapping[str, Result]) -> Drawing:
+        """Return what the figures of some cases share (`scenarios.results.plots`)."""
+        spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
+        plates = Plates.of(inverters_of(spec, self._feeder))
+        histories = {case: result.record for case, result in cases.items()}
+        *_, last = cases.values()  # in wall-clock time each case has its own events
+        rows = last.events.itertuples(index=False)
+        events = [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
+        return drawing_of(spec, self._feeder, plates, histories, as_they_came(spec, events))
+
+    def __repr__(self) -> str:
+        return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"
+
+
+class Result:
+    """What one case came to.
+
+    It is made by `Scenario.run(case)` and by `gridpeers.read`. Its tables are read from the run folder when they are
+    first asked for.
+    """
+
+    def __init__(self, run: Results, case: str) -> None:
+        self._run = run
+        self.case = case
+        """Name of the case."""
+
+    @property
+    def spec(self) -> model.Scenario:
+        """The scenario as it was run."""
+        return self._run.spec
+
+    @property
+    def folder(self) -> Path:
+        """Folder with the files of the run (docs/results.md)."""
+        return self._run.folder
+
+    @property
+    def driver(self) -> str:
+        """What ran it: "inprocess", "processes", or "by hand"."""
+        return self._run.driver
+
+    @cached_property
+    def record(self) -> History:
+        """The recorded rows as numpy arrays, by quantity."""
+        return read_history(self.folder / self.case / "history.csv")
+
+    @cached_property
+    def history(self) -> pd.DataFrame:
+        """Terminal quantities over time: columns (inverter, quantity), index t (s), units in `attrs["units"]`."""
+        return frames.history_frame(self.record)
+
+    @cached_property
+    def metrics(self) -> pd.DataFrame:
+        """Metrics, a row per window; nan with a reason (column `reasons`) where there is no steady value."""
+        return frames.metrics_frame(frames.windows_of(self._whole))
+
+    @cached_property
+    def events(self) -> pd.DataFrame:
+        """What happened in the plant and to the agents: time t (s), kind, subject, text."""
+        return frames.events_frame(self.folder / self.case / "events.csv")
+
+    @cached_property
+    def links(self) -> pd.DataFrame:
+        """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
+        return frames.links_frame(self.folder / self.case / "links.csv")
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the bytes of the history: equal runs have equal ones."""
+        return hashlib.sha256((self.folder / self.case / "history.csv").read_bytes()).hexdigest()
+
+    @property
+    def links_sha256(self) -> str:
+        """SHA-256 of all fates of messages on emulated links; "" without such links."""
+        return str(self._whole.get("links_sha256", ""))
+
+    @property
+    def report(self) -> str:
+        """What the command `gridpeers run` prints at the end, of all cases of the run."""
+        return self._run.report
+
+    def plot(self, figure: str = "overview") -> Figure:
+        """Draw the case.
+
+        Parameters
+        ----------
+        figure : str
+            As in `Results.plot`.
+
+        Raises
+        ------
+        ValueError
+            If the run has no such figure.
+        """
+        return _drawn(self._run.drawing({self.case: self}), figure)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the run folder as the command does, with all cases of the run; see `Results.save`."""
+        return self._run.save(folder)
+
+    @property
+    def _whole(self) -> dict[str, Any]:
+        """What metrics.json holds of the case."""
+        return self._run.numbers["cases"][self.case]  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
+
+
+def read(folder: str | Path) -> Result | Results:
+    """Open the folder of a run, whoever made it: `Result.save`, `gridpeers run` or `gridpeers up`.
+
+    Returns
+    -------
+    Result or Results
+        A `Result` if the run has one case, else `Results`.
+
+    Raises
+    ------
+    FolderError
+        If it is no folder of a run, or of one that did not come to its end.
+    """
+    path = Path(folder)
+    if not (path / "status.txt").is_file():
+        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt")
+    status = (path / "status.txt").read_text(encoding="utf-8").strip()
+    if status != "complete":
+        raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
+    try:
+        text, tables = read_toml(path / "scenario.toml")
+        mistakes = Mistakes(str(path / "scenario.toml"), text)
+        spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
+        mistakes.raise_if_any()
+        feeder = read_feeder(spec.plant.feeder, spec.plant.load_set)
+        results = Results(RunFolder(path), spec, feeder)
+    except (OSError, ValueError, KeyError) as error:
+        text = "; ".join(getattr(error, "mistakes", ())) or str(error)
+        raise FolderError(f"{folder}: cannot be read: {text}") from error
+    return next(iter(results.values())) if len(results) == 1 else results
+
+
+def _drawn(drawing: Drawing, name: str) -> Figure:
+    from scenarios.results.plots import draw, figures_of
+
+    if "IPython" in sys.modules:
+        import matplotlib.pyplot as _  # a notebook shows figures once this is imported  # noqa: F401
+    names = figures_of(drawing)
+    if name not in names:
+        raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, names, "figures")}')
+    return draw(drawing, name)

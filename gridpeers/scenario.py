@@ -1,0 +1,250 @@
+"""A scenario in Python: loaded, built or changed; always checked; run to a result."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+from gridpeers.values import plain
+from scenarios.spec import model
+from scenarios.spec.loading import check_tables, find_scenario, read_toml
+from scenarios.spec.mistakes import Mistakes, ScenarioError
+from scenarios.sweep.file.paths import PathError, Tree, put, remove
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from gridpeers.result import Result, Results
+    from gridpeers.running import How
+    from plant.equipment import Feeder
+    from scenarios.run import Driver
+
+
+def load(name_or_path: str | Path) -> Scenario:
+    """Read and check a scenario.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A scenario of the catalogue (`gridpeers.catalogue()` names them), or the path of a file.
+
+    Raises
+    ------
+    ScenarioError
+        With every mistake of the file and of its feeder.
+
+    Examples
+    --------
+    >>> load("islanding")
+    <Scenario islanding: cases I, II, III, IV; 2 events; 7 s; 9 inverters on 134 buses>
+    """
+    path = find_scenario(str(name_or_path))
+    text, tree = read_toml(path)
+    return Scenario._of(tree, path, text)
+
+
+class Scenario:
+    """An experiment: a feeder, its inverters, what happens to them, and the cases of control that are compared.
+
+    A scenario is checked when it is made, so one in hand can be run; it never changes.
+
+    Parameters
+    ----------
+    **tables
+        The keys and tables of a scenario file (`gridpeers doc scenario`): `time={"end_s": 7}`, `event=[{...}]`,
+        `case={"IV": {...}}`. Paths in them are seen from the working directory.
+
+    Raises
+    ------
+    ScenarioError
+        With every mistake in them.
+
+    Examples
+    --------
+    >>> Scenario(
+    ...     name="mine",
+    ...     time={"end_s": 2.0},
+    ...     event=[{"label": "islanding", "t_s": 1.0, "open": ["13-152"]}],
+    ...     case={"ring": {"secondary": "all", "graph": "ring"}},
+    ... )
+    <Scenario mine: case ring; 1 event; 2 s; 9 inverters on 134 buses>
+    """
+
+    def __init__(self, **tables: Any) -> None:
+        mistakes = Mistakes("Scenario(...)")
+        tree: Tree = {}
+        for key, value in tables.items():
+            try:
+                tree[key] = plain(value)
+            except ValueError as error:
+                mistakes.add(key, str(error))
+        self._set(tree, Path("scenario.toml").absolute(), "", frozenset(), mistakes)
+
+    @classmethod
+    def _of(cls, tree: Tree, path: Path, text: str) -> Scenario:
+        """Make one of a file's tables."""
+        self = cls.__new__(cls)
+        self._set(tree, path, text, frozenset(), Mistakes(path.name, text))
+        return self
+
+    def _set(self, tree: Tree, path: Path, text: str, changed: frozenset[str], mistakes: Mistakes) -> None:
+        self._tree, self._path, self._text, self._changed = tree, path, text, changed
+        spec, feeder = check_tables(tree, path, mistakes)
+        mistakes.raise_if_any()
+        assert feeder is not None
+        self._spec, self._feeder = spec, feeder
+
+    def replace(self, changes: Mapping[str, Any]) -> Scenario:
+        """Return a scenario with some keys changed.
+
+        Parameters
+        ----------
+        changes : Mapping[str, Any]
+            Values by the dotted path of their keys, e.g. `gains.k_p`, `case.IV.graph`, `event[0].t_s`, `case.IV.link`.
+            A table replaces a whole table, and can make a new case: `{"case.V": {...}}`. None takes a key out, so that
+            its default holds. A class or a function becomes its reference `module:Name`.
+
+        Raises
+        ------
+        ScenarioError
+            With everything that is wrong with the changes, and with the scenario that they make.
+
+        Examples
+        --------
+        >>> load("islanding").replace({"gains.k_p": 0.001, "case.IV.graph": "ring"}).cases["IV"].graph
+        'ring'
+        >>> load("islanding").replace({"gains.k_p": "much", "case.VI.graph": "ring"})
+        Traceback (most recent call last):
+            ...
+        scenarios.spec.mistakes.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
+        replace: gains.k_p: must be a number, got "much"
+        """
+        tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
+        mistakes = Mistakes(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
+        for path, value in changes.items():
+            try:
+                if value is None:
+                    remove(tree, path)
+                else:
+                    put(tree, path, plain(value))
+            except (PathError, ValueError) as error:
+                mistakes.add(path, str(error))
+        new = type(self).__new__(type(self))
+        new._set(tree, self._path, self._text, changed, mistakes)
+        return new
+
+    def check(self) -> tuple[str, ...]:
+        """Try whether the plant can start, and return notes on what the events de-energise or overload.
+
+        Raises
+        ------
+        ScenarioError
+            If the feeder has no operating point to start from.
+        """
+        from scenarios.operating_point import start_problem
+        from scenarios.spec.supply import supply_notes
+
+        if problem := start_problem(self._spec, self._feeder):
+            raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])
+        return supply_notes(self._spec, self._feeder)
+
+    @overload
+    def run(self, case: str, driver: Driver = ..., **how: Unpack[How]) -> Result: ...
+    @overload
+    def run(
+        self, case: list[str] | tuple[str, ...] | None = ..., driver: Driver = ..., **how: Unpack[How]
+    ) -> Results: ...
+    def run(
+        self, case: str | list[str] | tuple[str, ...] | None = None, driver: Driver = "inprocess", **how: Unpack[How]
+    ) -> Result | Results:
+        """Run a case, or several.
+
+        Parameters
+        ----------
+        case : str or list of str, optional
+            Name of one case, which gives a `Result`; several names, or none for all, give `Results`.
+        driver : {"inprocess", "processes"}
+            All in this process, or a plant process and a process per agent over Zenoh. In simulated time both give the
+            same bytes.
+        clock : {"simulated", "wall"}
+            Lock-step, or real time, which needs the driver "processes".
+        speed : float
+            In real time: seconds of the run per second, from 0.1 to 50.
+        strict : bool
+            In real time: whether the run breaks when it cannot keep pace.
+        progress : Callable[[str, float, float], None], optional
+            Told the case, the time that it has reached (s) and its end (s).
+
+        Returns
+        -------
+        Result or Results
+
+        Raises
+        ------
+        ScenarioError
+            If there is no such case, driver or clock.
+        BrokenRunError
+            If a case could not be finished; the text says where the log is.
+        """
+        from gridpeers.running import run
+
+        results = run(self, [case] if isinstance(case, str) else case, driver, **how)
+        return results[case] if isinstance(case, str) else results
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario, and of its run folders."""
+        return self._spec.name
+
+    @property
+    def title(self) -> str:
+        """One line on what it is."""
+        return self._spec.title
+
+    @property
+    def cases(self) -> dict[str, model.Case]:
+        """Cases by name."""
+        return dict(self._spec.cases)
+
+    @property
+    def events(self) -> tuple[model.Event, ...]:
+        """What happens, in the order of time."""
+        return self._spec.events
+
+    @property
+    def feeder(self) -> Feeder:
+        """Tables of the feeder."""
+        return self._feeder
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of the inverters, those that join later last."""
+        from scenarios.spec.moves import inverters_of
+
+        return tuple(row.name for row in inverters_of(self._spec, self._feeder))
+
+    @property
+    def spec(self) -> model.Scenario:
+        """All keys as typed values, defaults included (`scenarios.spec.model`)."""
+        return self._spec
+
+    def to_toml(self) -> str:
+        """Return the text of a scenario file with every key spelled out."""
+        from scenarios.spec.writing import to_toml
+
+        return to_toml(self._spec, {})
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and self._spec == other._spec and self._feeder == other._feeder
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        cases, events, feeder = self._spec.cases, len(self._spec.events), self._feeder
+        return (
+            f"<Scenario {self.name}: case{'s' * (len(cases) != 1)} {', '.join(cases)}; "
+            f"{events} event{'s' * (events != 1)}; {self._spec.time.end_s:g} s; "
+            f"{len(self.inverters)} inverters on {len(feeder.buses)} buses>"
+        )

@@ -1,0 +1,116 @@
+"""Results in Python: the tables of a run, and the same folder as the command's."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import gridpeers as gp
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.record import Tape
+from scenarios.spec.configs import configs
+
+
+@pytest.fixture(scope="module")
+def scenario() -> gp.Scenario:
+    """Half a second on either side of islanding, links that lose messages."""
+    changes = {"time.end_s": 1.5, "event": [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]}
+    return gp.load("islanding").replace({**changes, "case.IV.link": [{"on": "* <-> *", "loss": 0.2}]})
+
+
+@pytest.fixture(scope="module")
+def run(scenario: gp.Scenario) -> gp.Result:
+    """One case of it."""
+    return scenario.run("IV")
+
+
+def test_a_run_has_the_bytes_of_the_drivers_own_history(scenario: gp.Scenario, run: gp.Result) -> None:
+    """The face adds nothing to a run: its hash is that of the telemetry."""
+    plant, agents = configs(scenario.spec, scenario.feeder, "IV")
+    tape = Tape()
+    run_inprocess(plant, agents, tape)
+
+    assert run.sha256 == tape.finish(1.5, 0.01).sha256
+
+
+def test_a_history_is_a_table_by_inverter_and_quantity_with_units(run: gp.Result) -> None:
+    """Columns (inverter, quantity), time as the index, units beside."""
+    history = run.history
+
+    assert history["inv1"].columns.tolist() == ["f", "P", "Q", "V", "P_set", "V_set"]
+    assert history.index.name == "t"
+    assert len(history) == 151
+    assert history.attrs["units"]["Q"] == "var"
+    assert history["inv1"]["f"].iloc[-1] == run.record.f[-1, 0]
+
+
+def test_metrics_events_and_links_are_those_of_the_files(run: gp.Result) -> None:
+    """A row per window, an event per row, a row per message on an emulated link."""
+    assert run.metrics.index.tolist() == ["islanding"]
+    assert run.metrics.attrs["units"]["f_error_Hz"] == "Hz"
+    assert run.events["kind"].iloc[0] == "switch"
+    lost = run.links["delay"].isna()
+    assert 0.1 < lost.mean() < 0.3
+    assert run.links_sha256
+
+
+def test_a_saved_run_is_read_back_the_same_and_has_its_figures(run: gp.Result, tmp_path: Path) -> None:
+    """The folder is that of the command, and what is read from it is what was saved."""
+    run.save(tmp_path / "kept")
+
+    again = gp.read(tmp_path / "kept")
+
+    assert isinstance(again, gp.Result)
+    assert again.sha256 == run.sha256
+    for table in ("history", "metrics", "events", "links"):
+        pd.testing.assert_frame_equal(getattr(again, table), getattr(run, table))
+    assert (tmp_path / "kept" / "plots" / "overview.png").is_file()
+    assert again.report.endswith(f"Results: {tmp_path / 'kept'}/\n")
+
+
+def test_a_folder_with_something_in_it_is_not_written_to(run: gp.Result, tmp_path: Path) -> None:
+    """What is there stays as it was."""
+    (tmp_path / "mine.txt").write_text("mine")
+
+    with pytest.raises(gp.FolderError, match="is not empty"):
+        run.save(tmp_path)
+
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_what_is_no_finished_run_is_not_read(tmp_path: Path) -> None:
+    """A folder of something else, and one of a run that broke, are told in one line."""
+    with pytest.raises(gp.FolderError, match="no folder of a run"):
+        gp.read(tmp_path)
+    (tmp_path / "status.txt").write_text("broken: interrupted\n")
+    with pytest.raises(gp.FolderError, match='its status is "broken: interrupted"'):
+        gp.read(tmp_path)
+
+
+def test_several_cases_are_results_by_case(scenario: gp.Scenario) -> None:
+    """A run of several cases is a mapping, with the metrics of all in one table."""
+    runs = scenario.run(["I", "II"])
+
+    assert list(runs) == ["I", "II"]
+    assert runs.metrics.index.tolist() == [("I", "islanding"), ("II", "islanding")]
+    assert runs["I"].sha256 != runs["II"].sha256
+    assert len(runs.plot().axes) == len(runs["I"].plot().axes) == 4
+    with pytest.raises(KeyError, match="no case"):
+        runs["IV"]
+    with pytest.raises(ValueError, match=r'no figure "frequenzy".*did you mean "frequency"'):
+        runs.plot("frequenzy")
+
+
+def test_a_temporary_folder_goes_with_its_results(scenario: gp.Scenario) -> None:
+    """A session with many runs leaves nothing behind."""
+    run = scenario.run("I")
+    folder = run.folder
+    assert folder.is_dir()
+
+    del run
+    gc.collect()
+
+    assert not folder.exists()

@@ -1,0 +1,106 @@
+"""Scenarios in Python: built, changed and checked in the same words as their files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gridpeers as gp
+
+TABLES = {
+    "name": "mine",
+    "time": {"end_s": 1.0},
+    "event": [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}],
+    "case": {"ring": {"secondary": "all", "graph": "ring"}},
+}
+
+
+def test_a_scenario_of_keyword_tables_is_the_scenario_of_the_same_file(tmp_path: Path) -> None:
+    """The keys in Python are those of the file."""
+    built = gp.Scenario(**TABLES)
+    file = tmp_path / "mine.toml"
+    file.write_text(built.to_toml())
+
+    assert gp.load(file) == built
+
+
+def test_every_mistake_of_a_change_comes_at_once_and_names_its_key() -> None:
+    """Paths that lead nowhere, wrong types and values out of range are told together, without a line of the file."""
+    with pytest.raises(gp.ScenarioError) as caught:
+        gp.load("islanding").replace({"case.VI.graph": "ring", "gains.k_p": "much", "time.T_c_s": 20, "gians": {}})
+
+    assert [line.partition(": ")[0] for line in caught.value.mistakes] == ["replace"] * 4
+    assert all(
+        key in str(caught.value) for key in ("case.VI", "gains.k_p: must be", "time.T_c_s", "gians: unknown key")
+    )
+
+
+def test_a_mistake_that_a_change_makes_elsewhere_keeps_its_line() -> None:
+    """A key that was not changed is found in the file."""
+    with pytest.raises(gp.ScenarioError, match=r"islanding\.toml:\d+: event\[1\]\.t_s"):
+        gp.load("islanding").replace({"time.end_s": 2.0})
+
+
+def test_a_change_leaves_the_scenario_that_it_starts_from() -> None:
+    """A scenario never changes, and neither does what was given."""
+    before, link = gp.load("islanding"), {"on": "* <-> *", "delay": 0.1}
+
+    after = before.replace({"case.IV.link": [link], "seed": 5})
+
+    assert before == gp.load("islanding") != after
+    assert len(after.cases["IV"].netem.links) == 1
+    assert link == {"on": "* <-> *", "delay": 0.1}
+
+
+def test_a_table_makes_a_new_case_and_none_takes_a_key_out() -> None:
+    """A case that is given whole is new; what is taken out has its default."""
+    scenario = gp.load("islanding").replace({"case.V": {"secondary": "all", "graph": "ring"}, "case.I": None})
+
+    assert list(scenario.cases) == ["II", "III", "IV", "V"]
+    assert gp.load("islanding").replace({"seed": None}).spec.seed == 1
+
+
+def test_numpy_values_and_classes_become_what_a_file_would_hold() -> None:
+    """An array's element is a number, and a class the reference by which another process finds it."""
+    scenario = gp.load("islanding").replace({"gains.k_p": np.linspace(0.001, 0.002, 2)[0]})
+
+    assert scenario.spec.gains.k_p == 0.001
+    with pytest.raises(gp.ScenarioError, match='there is no "collections:Counter"'):
+        gp.load("islanding").replace({"case.IV.graph": Counter})
+
+
+def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
+    """An object without a value, and a class that nobody can import, are mistakes as all others."""
+
+    class Inside:
+        pass
+
+    with pytest.raises(gp.ScenarioError) as caught:
+        gp.load("islanding").replace({"seed": object(), "title": Inside})
+
+    assert "replace: seed: a scenario cannot hold a object" in str(caught.value)
+    assert "replace: title: " in str(caught.value)
+    assert "defined inside a function" in str(caught.value)
+
+
+def test_check_returns_what_events_overload() -> None:
+    """Notes tell what the events take away."""
+    assert any("de-energises" in note for note in gp.load("islanding").check())
+
+
+def test_an_unknown_case_driver_or_clock_is_one_line() -> None:
+    """What cannot be run is told before anything starts."""
+    scenario = gp.load("islanding")
+
+    for words, text in (
+        ({"case": "VI"}, 'no case "VI"'),
+        ({"case": "IV", "driver": "process"}, 'did you mean "processes"'),
+        ({"case": "IV", "clock": "wall"}, "needs a process per agent"),
+        ({"case": "IV", "speed": 2.0}, "no pace to keep"),
+    ):
+        with pytest.raises(gp.ScenarioError, match=text) as caught:
+            scenario.run(**words)  # type: ignore[call-overload]
+        assert "\n" not in str(caught.value)
