@@ -82,7 +82,7 @@ def main() -> None:
         "--link", nargs=argparse.REMAINDER, help='last: words for gridpeers link, e.g. set "* -> inv1" --loss 0.1'
     )
     arguments = parser.parse_args()
-    command = [sys.executable, "-P", "-c", "from scenarios.cli import main; main()"]
+    command = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()"]
     with tempfile.TemporaryDirectory(prefix="gridpeers-memory-") as folder:
         endpoint, run = rendezvous(), f"memory{os.getpid()}"
         words = ["up", arguments.scenario, "--run", run, "--listen", endpoint, "--speed", f"{arguments.speed:g}"]

@@ -45,8 +45,8 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     Examples
     --------
     >>> frame = metrics_frame({"event1": {"MPSI": None, "V_error": 0.5, "reasons": {"MPSI": "nothing shared"}}})
-    >>> frame.loc["event1"].tolist()
-    [nan, 0.5, 'MPSI: nothing shared']
+    >>> bool(frame["MPSI"].isna()["event1"]), frame["reasons"]["event1"]
+    (True, 'MPSI: nothing shared')
     """
     rows = {
         label: {name: value for name, value in window.items() if not isinstance(value, dict)}

@@ -64,8 +64,10 @@ def run(
     return Results(folder, spec, scenario.feeder)
 
 
-def with_cases(spec: model.Scenario, names: Iterable[str] | None) -> model.Scenario:
+def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:
     """Return a scenario with some of its cases; all if none is named.
+
+    An `option` of the command line heads every mistake.
 
     Raises
     ------
@@ -83,12 +85,12 @@ def with_cases(spec: model.Scenario, names: Iterable[str] | None) -> model.Scena
     chosen = list(names)
     unknown = [name for name in chosen if name not in spec.cases] if chosen else [""]
     if unknown:
-        raise ScenarioError(f'no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in unknown)
+        raise ScenarioError(f'{option}no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in unknown)
     return msgspec.structs.replace(spec, cases={name: rule for name, rule in spec.cases.items() if name in chosen})
 
 
-def check_how(driver: str, clock: str, speed: float, *, strict: bool) -> None:
-    """Check how a scenario is to be run.
+def check_how(driver: str, clock: str, speed: float, *, strict: bool, dash: str = "") -> None:
+    """Check how a scenario is to be run; `dash` stands before the words' names: "--" on a command line.
 
     Raises
     ------
@@ -97,16 +99,19 @@ def check_how(driver: str, clock: str, speed: float, *, strict: bool) -> None:
     """
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
         if value not in choices:
-            raise ScenarioError([f'{word}: there is no "{value}"; {suggestion(str(value), choices, "choices")}'])
+            raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(str(value), choices, "choices")}'])
     low, high = SPEEDS
+    wrong = ""
     if clock == "simulated":
         if speed != 1.0 or strict:
             name = "strict" if strict else "speed"
-            raise ScenarioError([f'{name}: simulated time has no pace to keep; use it with clock="wall"'])
+            wrong = f"{dash}{name}: simulated time has no pace to keep; use it with {dash}clock wall"
     elif driver == "inprocess":
-        raise ScenarioError(['clock "wall" needs a process per agent; use driver="processes"'])
+        wrong = f"{dash}clock wall: needs a process per agent; use {dash}driver processes"
     elif not low <= speed <= high:
-        raise ScenarioError([f"speed: must be from {low:g} to {high:g} (1 is real time), got {speed:g}"])
+        wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {speed:g}"
+    if wrong:
+        raise ScenarioError([wrong])
 
 
 def _silent(case: str, t: float, end: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typer.testing import CliRunner
 
-from scenarios import cli
+from gridpeers.cli import app as cli
 
 
 def invoke(*words: str) -> tuple[int, str]:

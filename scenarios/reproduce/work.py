@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +13,6 @@ from typing import Any
 from msgspec.structs import replace
 
 from plant.equipment import Feeder
-from scenarios.remaining import Tell
 from scenarios.reproduce import banks, topology
 from scenarios.reproduce.found import Result
 from scenarios.reproduce.parts import Part
@@ -23,6 +22,9 @@ from scenarios.results.folder import new_folder
 from scenarios.results.paper_tables import paper_cell, tables_of
 from scenarios.run import Driver, Request, run
 from scenarios.spec import Scenario, load_scenario
+
+Tell = Callable[[str, float], None]
+"""Told what is being done, and how much of all is done."""
 
 
 class Work:

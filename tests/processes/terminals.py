@@ -32,7 +32,7 @@ class Terminal:
 
     def __init__(self, words: Sequence[str], folder: Path, prefix: Sequence[str] = ()) -> None:
         self.words = list(words)
-        command = [*prefix, sys.executable, "-P", "-c", "from scenarios.cli import main; main()", *words]
+        command = [*prefix, sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", *words]
         self._process = subprocess.Popen(
             command,
             cwd=folder,

@@ -19,7 +19,7 @@ SHORT = HEAD.replace("end_s = 7.0", "end_s = 1.5") + ISLANDING[ISLANDING.index("
 
 def command(*words: str) -> list[str]:
     """The command line as a user's shell would start it."""
-    return [sys.executable, "-c", "from scenarios.cli import main; main()", *words]
+    return [sys.executable, "-c", "from gridpeers.cli.app import main; main()", *words]
 
 
 def test_with_processes_the_command_gives_the_bytes_of_one_process(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def test_watch_is_a_table_until_a_key_quits(tmp_path: Path, key: bytes, status: 
         desk.open("plant", "calm.toml", "--listen", endpoint, "--wait", "0").expect("t = 0; speed")
         master, slave = pty.openpty()
         before = termios.tcgetattr(slave)
-        words = [sys.executable, "-P", "-c", "from scenarios.cli import main; main()", "watch", "--run", "lab"]
+        words = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "watch", "--run", "lab"]
         watch = subprocess.Popen(
             [*words, "--connect", endpoint],
             stdin=slave,

@@ -62,7 +62,7 @@ def many(sweep_file: Write) -> Path:
 @contextmanager
 def command(*words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
     """The command in a session of its own, as in a terminal of its own; nothing of it outlives the test."""
-    line = [sys.executable, "-u", "-c", "from scenarios.cli import main; main()", "sweep", *words]
+    line = [sys.executable, "-u", "-c", "from gridpeers.cli.app import main; main()", "sweep", *words]
     with subprocess.Popen(
         line, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:

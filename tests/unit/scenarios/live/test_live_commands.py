@@ -9,8 +9,9 @@ import msgspec
 import pytest
 
 from agents.config import AgentConfig
+from gridpeers.cli.commands import options
 from plant.config import PlantConfig
-from scenarios.live import commands, place
+from scenarios.live import place
 from scenarios.live.setup import Wishes, set_up
 from scenarios.spec import load_scenario
 from tests.command_line import invoke
@@ -33,7 +34,7 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
 
 def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
     """The help must not import what the place needs, so it has its own copy."""
-    assert (commands.RUN, commands.ENDPOINT) == (place.RUN, place.ENDPOINT)
+    assert (options.RUN, options.ENDPOINT) == (place.RUN, place.ENDPOINT)
 
 
 @pytest.mark.parametrize(

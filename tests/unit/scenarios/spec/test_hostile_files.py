@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.cli.usage import fail
 from scenarios.spec import load_scenario
 from scenarios.spec.catalogue import CATALOGUE
-from scenarios.usage import fail
 from tests.scenario_files import mistakes, written
 
 BASE = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import typer
 
-from scenarios.cli import app
+from gridpeers.cli.app import app
 from scenarios.spec import load_scenario
 from scenarios.spec.loading import CATALOGUE
 from tests.command_line import invoke

@@ -10,7 +10,7 @@ from typing import Any
 from typer import BadParameter
 from typer.core import TyperGroup
 
-from scenarios.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import BAD_INPUT, fail
 from wire.nearest import suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]

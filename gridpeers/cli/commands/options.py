@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import BAD_INPUT, fail, require
 
 if TYPE_CHECKING:
     from scenarios.live.visit import Visit

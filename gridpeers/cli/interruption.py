@@ -6,8 +6,8 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from gridpeers.cli.usage import INTERRUPTED, TERMINATED
 from scenarios.run import TerminatedError
-from scenarios.usage import INTERRUPTED, TERMINATED
 
 
 @contextmanager

@@ -47,7 +47,7 @@ def test_help_does_not_wait_for_heavy_modules() -> None:
     import subprocess
 
     heavy = {"numba", "numpy", "scipy", "matplotlib", "zenoh"}
-    code = f"import sys, scenarios.cli; print(sorted({heavy} & set(sys.modules)))"
+    code = f"import sys, gridpeers.cli.app; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
     assert done.stdout.strip() == "[]"
@@ -257,3 +257,10 @@ def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytes
     assert code == 130
     assert text == "gridpeers: interrupted; what came until then is in here/\n"
     assert Path("here/status.txt").read_text() == "broken: interrupted from the keyboard\n"
+
+
+def test_the_version_is_told_without_a_command() -> None:
+    """`gridpeers --version` names the installed release."""
+    from importlib.metadata import version
+
+    assert invoke("--version") == (0, f"gridpeers {version('gridpeers')}\n")

@@ -7,7 +7,7 @@ import threading
 import pytest
 from rich.console import Console
 
-from scenarios import progress, remaining
+from gridpeers.cli import progress, remaining
 from scenarios.drivers.ports import PortError, check_port
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, fail, load, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, load, refuse, require
 
 if TYPE_CHECKING:
     from scenarios.experiments.registry import FromScenario, FromSweep
@@ -62,7 +62,7 @@ def experiment(
 
 def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Result:
     """Do what is left of the sweep, and draw."""
-    from scenarios.sweep.command import check_packages, finish
+    from gridpeers.cli.commands.sweep import check_packages, finish
 
     check_packages()
     import pyarrow.parquet as pq
@@ -88,9 +88,9 @@ def _told(source: FromScenario, folder: Path) -> Result:
 
     from rich.console import Console
 
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.progress import progress
     from scenarios.experiments.told import Told
-    from scenarios.interruption import exit_code, interruptible
-    from scenarios.progress import progress
     from scenarios.results.folder import FolderError, new_folder, shown
     from scenarios.results.history import read_history
     from scenarios.run import BrokenRunError, Request

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, refuse, require
 
 if TYPE_CHECKING:
     from scenarios.sweep.file import Plan
@@ -81,8 +81,8 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     """
     from rich.console import Console
 
-    from scenarios.interruption import exit_code, interruptible
-    from scenarios.remaining import remaining
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.remaining import remaining
     from scenarios.results.folder import FolderError, refusal, shown
     from scenarios.sweep.folder import SweepFolder
     from scenarios.sweep.study import study

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from scenarios.live.options import RUN, Connect, Run, Wait, told, visit_to
-from scenarios.mistyped import Commands
-from scenarios.usage import BROKEN, fail
+from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, told, visit_to
+from gridpeers.cli.mistyped import Commands
+from gridpeers.cli.usage import BROKEN, fail
 
 if TYPE_CHECKING:
     from agents.config import AgentConfig

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from scenarios.cli import main
+from gridpeers.cli.app import main
 
 
 @pytest.mark.parametrize(("words", "said"), [

@@ -14,13 +14,15 @@ PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 1
 
 def load(name: str) -> tuple[Scenario, Feeder]:
     """Read and check a scenario and its feeder, or end with every mistake in them."""
-    from scenarios.spec import ScenarioError, load_scenario
+    from gridpeers.scenario import load as load_face
+    from scenarios.spec import ScenarioError
 
     if not name:
         fail(["no scenario was named; `gridpeers list` shows those of the catalogue"], BAD_INPUT)
 
     try:
-        return load_scenario(name)
+        scenario = load_face(name)
+        return scenario.spec, scenario.feeder
     except ScenarioError as error:
         refuse(error)
 
@@ -36,15 +38,15 @@ def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     """The scenario with the cases and the seed of the command line."""
     import msgspec
 
-    from wire.nearest import suggestion
+    from gridpeers.running import with_cases
+    from scenarios.spec import ScenarioError
 
     if case is not None:
-        names = list(dict.fromkeys(name.strip() for name in case.split(",") if name.strip()))
-        unknown = [name for name in names if name not in spec.cases]
-        if unknown or not names:
-            wrong = unknown or [case]
-            fail([f'--case: no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in wrong], BAD_INPUT)
-        spec = msgspec.structs.replace(spec, cases={name: spec.cases[name] for name in spec.cases if name in names})
+        names = [name.strip() for name in case.split(",") if name.strip()]
+        try:
+            spec = with_cases(spec, names or [case], option="--case: ")
+        except ScenarioError as error:
+            refuse(error)
     return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from scenarios.interruption import exit_code, interruptible
+from gridpeers.cli.interruption import exit_code, interruptible
 
 
 @pytest.fixture(autouse=True)

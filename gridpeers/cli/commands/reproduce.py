@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, require
 from scenarios.reproduce.parts import CHOICES, chosen
-from scenarios.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, require
 
 _NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
 
@@ -63,8 +63,8 @@ def _reproduce(
 
     from rich.console import Console
 
-    from scenarios.interruption import exit_code, interruptible
-    from scenarios.remaining import remaining
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.remaining import remaining
     from scenarios.reproduce.found import Reproduction
     from scenarios.reproduce.work import Work
     from scenarios.reproduce.writing import write

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scenarios.live.link_commands import link
-from scenarios.live.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
-from scenarios.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
+from gridpeers.cli.commands.link import link
+from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:

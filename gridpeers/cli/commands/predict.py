@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.usage import BAD_INPUT, BROKEN, chosen, fail, load, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, chosen, fail, load, require
 
 
 def predict(

@@ -1,0 +1,1 @@
+"""Commands, one or a few that belong together a file. What one needs is imported when it is used."""

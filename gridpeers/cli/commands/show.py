@@ -1,0 +1,72 @@
+"""Commands that show what there is: `list`, `check`, `doc`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, fail, load, require
+
+
+class Topic(StrEnum):
+    """Values of the argument of `doc`."""
+
+    keys = "keys"
+    messages = "messages"
+    scenario = "scenario"
+
+
+def list_() -> None:
+    """List the scenarios that come with gridpeers.
+
+    Example:  gridpeers list
+    """
+    from scenarios.spec import catalogue
+
+    names = catalogue()
+    width = max(map(len, names), default=0)
+    for name in names:
+        spec, _ = load(name)
+        typer.echo(f"{name:{width}}  {spec.title}. Cases: {', '.join(spec.cases)}")
+
+
+def check(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a scenario file, or a name from the catalogue.")],
+) -> None:
+    """Check a scenario file and its feeder for mistakes.
+
+    All mistakes are told at once. A file without any is tried: whether its feeder has an operating point to start from.
+    Notes tell what its events de-energise.
+
+    Exit code: 0 it can be run, 2 it has mistakes.
+
+    Example:  gridpeers check my-islanding.toml
+    """
+    spec, feeder = load(file)
+    require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
+
+    from scenarios.operating_point import start_problem
+    from scenarios.spec.supply import supply_notes
+
+    if problem := start_problem(spec, feeder):
+        fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
+    for note in supply_notes(spec, feeder):
+        typer.echo(f"NOTE  {note}")
+    typer.echo(
+        f"{file}: can be run: {len(spec.cases)} case(s) {', '.join(spec.cases)}; {len(spec.events)} event(s); "
+        f"{spec.time.end_s:g} s; {len(feeder.inverters)} inverters on {len(feeder.buses)} buses"
+    )
+
+
+def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario", help="What to print.")]) -> None:
+    """Print a reference page that is made from the code.
+
+    keys and messages are those of the wire; scenario is the scenario file, with units and defaults.
+
+    Example:  gridpeers doc scenario
+    """
+    from scenarios.results.reference import page
+
+    typer.echo(page(topic.value), nl=False)
