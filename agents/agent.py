@@ -7,12 +7,15 @@ neighbour. SI on the wire, per unit inside: the neighbours' ratings come from th
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import inf
 
 from msgspec.structs import replace
 
 from agents.config import AgentConfig
-from agents.handling import Follows, Worth, gains_in_force
-from agents.law import P_set_step, V_set_step
+from agents.handling import Follows, Worth
+from agents.laws.call import LawError, begun, decided
+from agents.laws.in_force import law_in_force
+from agents.laws.law import NOTHING, Law, Neighbour, Own
 from agents.slip import Slips
 from agents.topology import in_neighbours
 from wire.codec import RejectedError, decode, encode
@@ -44,6 +47,27 @@ def check_nameplate(config: AgentConfig) -> None:
         raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
 
 
+SPEAKS = 0.5
+"""Part of the age at which neighbours drop a state, after which they are told at the latest, whatever the law says."""
+
+
+def neighbour_of(plate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
+    """Return what a law is told of a neighbour, per unit of the neighbour's own rating."""
+    return Neighbour(
+        name=plate.sender,
+        leader=plate.kind == "GFM",
+        age=age,
+        weight=weight,
+        P_set=state.P_set / plate.P_rated,
+        V_set=state.V_set / plate.V_nom,
+        Q=state.Q / plate.P_rated,
+        m_p=plate.m_p,
+        m_q=plate.m_q,
+        P_rated=plate.P_rated,
+        shared=state.shared,
+    )
+
+
 class Agent:
     """State of one agent.
 
@@ -51,6 +75,8 @@ class Agent:
     ----------
     config : AgentConfig
         Who it is and the run's rule.
+    law : Law, optional
+        What decides its set-points; the paper's, with the configuration's gains, if left out.
 
     Examples
     --------
@@ -65,8 +91,15 @@ class Agent:
     300000.0
     """
 
-    def __init__(self, config: AgentConfig) -> None:
+    def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
         self.config = config
+        self.fault = ""
+        """What the law did that it must not; then the agent stands still, and the inverter is on primary droop."""
+        self._law = law_in_force(config.control) if law is None else law
+        self._law_runs = False
+        """Whether the law has decided since it was last on hold."""
+        self._sent_at = 0.0
+        """When neighbours were told last (s of run time)."""
         self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._heard: dict[str, State] = {}
@@ -74,8 +107,7 @@ class Agent:
         self._takes_part = config.control.secondary == "all" or (config.control.secondary == "GFM" and self._leader)
         handling = config.control.handling
         self._worth = Worth(handling)
-        self._gains = gains_in_force(config.control.gains, handling)
-        self._kappa_c = handling.kappa_c if handling.weights == "degree-normalised" else None
+        self._silent_at_most = SPEAKS * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
         self._stops = handling.anti_windup == "conditional"
         self._is_told_islands = handling.islands == "switches"
         self._slips = Slips(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
@@ -112,6 +144,7 @@ class Agent:
     def let_go(self) -> None:
         """Have the next tick start from the set-points that its measurement shows, as the first one does."""
         self._P_set = self._V_set = None
+        self._law_runs = False
         self._islands = ("", "")
 
     def shares_island(self, name: str) -> bool:
@@ -135,13 +168,15 @@ class Agent:
 
     def hear(self, state: State) -> None:
         """Note the latest state of somebody whose nameplate is known. Who may speak, `wire.admission` has checked."""
+        if state.quiet:
+            return  # its law does not tell: what it told last stands
         self._heard[state.sender] = state
         self._worth.arrived(state.sender)
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
     ) -> State:
-        """Decide the set-points of this tick, (12)-(15).
+        """Decide the set-points of this tick, as the law has it.
 
         Parameters
         ----------
@@ -159,6 +194,8 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
+        if self.fault:
+            return self.stand_still(measurement)
         if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds
             self.let_go()
             return self._state(measurement, measurement.P_set, measurement.V_set)
@@ -171,26 +208,25 @@ class Agent:
             self._P_set, self._V_set = measurement.P_set, measurement.V_set
             self._follows_P.begin()
             self._follows_V.begin()
-        y_bar, z_bar, d = self._means(measurement.t, neighbours, ages)
+            self._law_runs = False
+        around = self._around(measurement.t, neighbours, ages)
+        shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
-            gains, T = self._gains, config.T_c
-            P_set = self._P_set / config.P_rated
-            V_set = self._V_set / config.V_nom
-            e = (measurement.f - config.f_nom) / config.f_nom
-            z = config.m_q * measurement.Q / config.P_rated
-            v = measurement.V / config.V_nom
-            P_side, V_side = self._in_vain(measurement, e) if self._stops else (0, 0)
-            # A saturated leader that cannot lessen the frequency error is a follower: it does not integrate it.
-            leader = self._leader and -e * P_side <= 0.0
-            P_set = P_set_step(
-                P_set, y_bar, d, e, leader=leader, m_p=config.m_p, gains=gains, T=T, kappa_c=self._kappa_c
-            )
-            V_next = V_set_step(V_set, z, z_bar, d, v, leader=self._leader, gains=gains, T=T)
-            if (V_next - V_set) * V_side <= 0.0:
-                V_set = V_next
-            self._P_set = P_set * config.P_rated
-            self._V_set = V_set * config.V_nom
-        return self._state(measurement, self._P_set, self._V_set)
+            own = self._own(measurement)
+            try:
+                if not self._law_runs:
+                    begun(self._law, own)
+                    self._law_runs = True
+                P_set, V_set, shared, send = decided(self._law, own, around, config.T_c)
+            except LawError as error:
+                self.fault = f"law {config.control.law.name}: {error}"
+                return replace(self.stand_still(measurement), fault=self.fault)
+            self._P_set, self._V_set = P_set * config.P_rated, V_set * config.V_nom
+        send = send or measurement.t - self._sent_at >= self._silent_at_most - 1e-9
+        if send:
+            self._sent_at = measurement.t
+        state = self._state(measurement, self._P_set, self._V_set)
+        return replace(state, shared=dict(shared), quiet=not send) if shared or not send else state
 
     def stand_still(self, measurement: Measurement) -> State:
         """Return the state of an agent that is paused, or has no measurement: it only shows that the agent is there.
@@ -224,23 +260,40 @@ class Agent:
                 slips.heard(name, self._heard[name].t, self._heard[name].angle)
         return frozenset(name for name in neighbours if slips.apart(name, t))
 
-    def _means(
-        self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None
-    ) -> tuple[float, float, float]:
-        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
-        heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
-        worth = self._worth.at_tick(
-            {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
+    def _own(self, m: Measurement) -> Own:
+        """What the law knows of the own inverter."""
+        config, e = self.config, (m.f - self.config.f_nom) / self.config.f_nom
+        assert self._P_set is not None
+        assert self._V_set is not None
+        P_saturated, V_saturated = self._in_vain(m, e) if self._stops else (0, 0)
+        return Own(
+            name=config.name,
+            leader=self._leader,
+            t=m.t,
+            P=m.P / config.P_rated,
+            Q=m.Q / config.P_rated,
+            V=m.V / config.V_nom,
+            e=e,
+            z=config.m_q * m.Q / config.P_rated,
+            P_set=self._P_set / config.P_rated,
+            V_set=self._V_set / config.V_nom,
+            m_p=config.m_p,
+            m_q=config.m_q,
+            P_rated=config.P_rated,
+            V_nom=config.V_nom,
+            f_nom=config.f_nom,
+            P_saturated=P_saturated,
+            V_saturated=V_saturated,
         )
-        y = z = d = 0.0
-        for name, r in worth.items():
-            plate, state = self._known[name], heard[name]
-            y += r * plate.m_p * (state.P_set / plate.P_rated)
-            z += r * plate.m_q * (state.Q / plate.P_rated)
-            d += r
-        if d == 0.0:
-            return 0.0, 0.0, 0.0
-        return y / d, z / d, d if self._kappa_c is None else d / len(worth)
+
+    def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
+        """What the law knows of the neighbours that count."""
+        heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
+        aged = {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
+        return [
+            neighbour_of(self._known[name], heard[name], aged[name], weight)
+            for name, weight in self._worth.at_tick(aged).items()
+        ]
 
     def _in_vain(self, measurement: Measurement, e: float) -> tuple[int, int]:
         """Sides on which P and V have long been off (3), (7) and (4), (8) with the set-points that the plant holds."""

@@ -75,6 +75,28 @@ GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
 """How nameplates become neighbours; "links" takes the listed pairs."""
 
 
+class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Which control law an agent runs, and what carries it: a Python class, a program, or an FMU."""
+
+    use: str = "consensus"
+    """Registered name of a class, or `module:Class`; "consensus" is the paper's law, with `Gains` and `Handling`."""
+    command: tuple[str, ...] = ()
+    """Program and arguments, in place of a class; one JSON line a tick on its standard input and output."""
+    fmu: str = ""
+    """Path of an FMU, in place of a class."""
+    parameters: dict[str, float | int | bool | str] = {}
+    """Parameters that do not keep their default."""
+    folder: str = ""
+    """Where the module, the program or the FMU is looked for."""
+    time_limit: float = 1.0
+    """Longest time (s of real time) of one step; a law that takes longer has failed. > 0."""
+
+    @property
+    def name(self) -> str:
+        """The law, for people."""
+        return " ".join(self.command) or self.fmu or self.use
+
+
 class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The run's rule of control: who takes part and who listens to whom.
 
@@ -94,6 +116,8 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Gains of the law."""
     handling: Handling = Handling()
     """What becomes of bad links and of saturation."""
+    law: LawChoice = LawChoice()
+    """Control law."""
 
 
 class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,7 +1,7 @@
 """What an agent makes of late, lost and missing states, and of a saturated inverter: table `[handling]`. Pure.
 
-The law is the paper's, `agents.law`; here is decided with which weights c_ij, gains and limits it is called. With
-r_ij, from 0 to 1, what the state of neighbour j is worth to i (`Worth`), and d_i the number of neighbours that count:
+The law is `agents.laws.consensus`; here is decided with which weights c_ij, gains and limits it is called. With r_ij,
+from 0 to 1, what the state of neighbour j is worth to i (`Worth`), and d_i the number of neighbours that count:
 
 - weights "paper": c_ij = r_ij. The gain of the consensus on y = m_p P_set is kappa = m_p/k_p.
 - weights "degree-normalised": c_ij = r_ij/d_i. The gain is kappa_c, that of the leader's frequency error stays kappa:

@@ -90,6 +90,21 @@ Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
 """Cycles: the farthest frequency for the longest time."""
 
+MOST_SHARED = 16
+"""Values that a law may share beside its set-points."""
+
+SHARED_LIMIT = 1e12
+"""Largest of these, either way."""
+
+Shared = Annotated[
+    dict[
+        Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,31}\Z")],
+        Annotated[float, msgspec.Meta(ge=-SHARED_LIMIT, le=SHARED_LIMIT)],
+    ],
+    msgspec.Meta(max_length=MOST_SHARED),
+]
+"""What a law shares, by names of its own choice."""
+
 MOST = 1000
 """Most inverters in a run: one row of telemetry on more would not fit into a message."""
 

@@ -36,6 +36,7 @@ from wire.bounds import (
     QuickNames,
     Rating,
     Reply,
+    Shared,
     Text,
     Time,
     Voltage,
@@ -144,6 +145,15 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     idle: bool = False
     """Whether the agent stands still: paused, or without a measurement. In wall-clock time it then says nothing; in
     simulated time the tick waits for this state, which nobody uses."""
+    shared: Shared = {}
+    """What the law of the agent shares beside its set-points."""
+    quiet: bool = False
+    """Whether the law does not tell the neighbours: they keep what they heard last, the plant takes the set-points. In
+    wall-clock time such a state goes to the plant alone, under a key of its own; in simulated time it keeps time."""
+    skipped: Count = 0
+    """Quiet states since the last that was not: no neighbour has missed those numbers. In wall-clock time only."""
+    fault: Text = ""
+    """What the law of the agent did that it must not; from then on the agent stands still."""
 
     def __post_init__(self) -> None:
         check_names(self.sender, self.island or self.sender)

@@ -11,7 +11,6 @@ nor without a fresh measurement. When it calls again after such a pause, it call
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -38,6 +37,8 @@ class Own(NamedTuple):
     """Measured terminal voltage (pu)."""
     e: float
     """Measured frequency error (f - f_nom)/f_nom (pu)."""
+    z: float
+    """m_q q, q measured, as in (14) and (15) (pu)."""
     P_set: float
     """Own set-point of real power (pu): what the law returned last, or what the plant held at `start`."""
     V_set: float
@@ -129,10 +130,10 @@ class Law:
     source: ClassVar[str] = ""
     """Publication that the law is from."""
 
-    P_set_min: Annotated[float, Unit("pu"), Range(-1, 1), "Lower limit of P_set."] = 0.0
-    P_set_max: Annotated[float, Unit("pu"), Range(0, inf), "Upper limit of P_set."] = 1.0
-    V_set_min: Annotated[float, Unit("pu"), Range(0, 1), "Lower limit of V_set."] = 0.9
-    V_set_max: Annotated[float, Unit("pu"), Range(1, inf), "Upper limit of V_set."] = 1.1
+    P_set_min: Annotated[float, Unit("pu"), Range(-100, 100), "Lower limit of P_set."] = 0.0
+    P_set_max: Annotated[float, Unit("pu"), Range(-100, 100), "Upper limit of P_set."] = 1.0
+    V_set_min: Annotated[float, Unit("pu"), Range(0, 10), "Lower limit of V_set."] = 0.9
+    V_set_max: Annotated[float, Unit("pu"), Range(0, 10), "Upper limit of V_set."] = 1.1
 
     def __init__(self, **parameters: Any) -> None:
         for name, value in values_of(type(self), parameters).items():

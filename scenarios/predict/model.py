@@ -1,6 +1,6 @@
 r"""The whole loop, law and plant, as one linear map from tick to tick, with delays in ticks and losses.
 
-The law is `agents.law`'s, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c), b_i = 1 - exp(-kappa_i T_c):
+The law is `agents.laws.consensus`'s, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c), b_i = 1 - exp(-kappa_i T_c):
 
 .. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e_i(k - m_i)
 
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from agents.law import towards
+from agents.laws.consensus import towards
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.response import PlantModel, response
 from scenarios.results.history import Floats

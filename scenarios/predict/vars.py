@@ -1,7 +1,7 @@
 r"""Voltage and vars: the law (14), (15) on the plant's own sensitivities, without lags, with delays in ticks.
 
 With q = S V_set and v = H V_set around an operating point (droops included, all filters at rest) and the factors a_i,
-b_i of `agents.law.V_factors` the law is
+b_i of `agents.laws.consensus.V_factors` the law is
 
 .. math:: V(k) = V(k-1) - a \big(m_q S\, V(k-1-l) - D^{-1} A\, m_q S\, V(k-2-l-n)\big) - b H\, V(k-1-l)
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.law import V_factors
+from agents.laws.consensus import V_factors
 from scenarios.predict.closed_form import settling
 from scenarios.predict.fleet import Fleet
 from scenarios.predict.model import AT_REST

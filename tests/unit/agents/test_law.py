@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.config import Gains, Handling
 from agents.handling import gains_in_force
-from agents.law import P_set_step, V_set_step, alpha_in_force, towards
+from agents.laws.consensus import P_set_step, V_set_step, alpha_in_force, towards
 
 Matrix = NDArray[np.float64]
 

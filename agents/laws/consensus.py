@@ -59,9 +59,13 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
 
 from __future__ import annotations
 
-from math import exp
+from collections.abc import Sequence
+from math import exp, inf
+from typing import Annotated, Any
 
 from agents.config import Gains
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+from wire.parameters import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:
@@ -231,3 +235,62 @@ def V_set_step(
     if leader:
         change -= b * (v - 1.0)
     return min(max(V_set + change, gains.V_set_min), gains.V_set_max)
+
+
+class Consensus(Law):
+    """The paper's law, (12)-(15): leaders restore frequency and voltage, all agree on shares of load and vars.
+
+    Its parameters are those of `Gains`, where a scenario writes them, with what `[handling]` makes of them.
+    """
+
+    source = (
+        "Singhal et al., Consensus Control for Coordinating Grid-Forming and Grid-Following Inverters in Microgrids, "
+        "IEEE Trans. Smart Grid 2022"
+    )
+
+    k_p: Annotated[float, Unit("s"), Range(1e-9, inf), "P_set gain; kappa = m_p/k_p is the rate (1/s)."] = 0.0007
+    k_q: Annotated[float, Unit("s"), Range(1e-9, inf), "V_set gain."] = 0.25
+    alpha: Annotated[float, Range(0, inf), "Weight of the voltage error in (15), leaders only."] = 1.0
+    beta_GFM: Annotated[float, Range(0, inf), "Weight of equal var sharing in (15)."] = 1.0
+    beta_GFL: Annotated[float, Range(0, inf), "Weight of equal var sharing in (14)."] = 1.0
+    alpha_min: Annotated[float, Range(0, inf), "Least weight of a small voltage error, for V_full."] = 0.0
+    V_full: Annotated[float, Unit("pu"), Range(0, inf), "Voltage error from which on alpha counts in full."] = 0.0
+    kappa_c: Annotated[
+        float, Unit("1/s"), Range(0, inf), "Gain of the consensus on m_p P_set over its mean; 0: m_p/k_p, over its sum."
+    ] = 0.0
+
+    def __init__(self, **parameters: Any) -> None:
+        super().__init__(**parameters)
+        self._gains = Gains(**{name: getattr(self, name) for name in Gains.__struct_fields__})
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Decide the set-points of one control period, (12) and (14) for a follower, (13) and (15) for a leader."""
+        y_bar, z_bar, d = self._means(neighbours)
+        # A saturated leader that cannot lessen the frequency error is a follower: it does not integrate it.
+        leader = own.leader and -own.e * own.P_saturated <= 0.0
+        P_set = P_set_step(
+            own.P_set,
+            y_bar,
+            d,
+            own.e,
+            leader=leader,
+            m_p=own.m_p,
+            gains=self._gains,
+            T=T,
+            kappa_c=self.kappa_c or None,
+        )
+        V_set = V_set_step(own.V_set, own.z, z_bar, d, own.V, leader=own.leader, gains=self._gains, T=T)
+        if (V_set - own.V_set) * own.V_saturated > 0.0:
+            V_set = own.V_set
+        return SetPoints(P_set, V_set)
+
+    def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:
+        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
+        y = z = d = 0.0
+        for other in neighbours:
+            y += other.weight * other.m_p * other.P_set
+            z += other.weight * other.m_q * other.Q
+            d += other.weight
+        if d == 0.0:
+            return 0.0, 0.0, 0.0
+        return y / d, z / d, d / len(neighbours) if self.kappa_c else d

@@ -1,0 +1,22 @@
+"""The paper's law with the gains of a scenario and what `[handling]` makes of them. Pure."""
+
+from __future__ import annotations
+
+import msgspec
+
+from agents.config import Control
+from agents.handling import gains_in_force
+from agents.laws.consensus import Consensus
+
+
+def law_in_force(control: Control) -> Consensus:
+    """Return the paper's law for one inverter.
+
+    Examples
+    --------
+    >>> law_in_force(Control(secondary="all", graph="full")).k_p
+    0.0007
+    """
+    gains = gains_in_force(control.gains, control.handling)
+    kappa_c = control.handling.kappa_c if control.handling.weights == "degree-normalised" else 0.0
+    return Consensus(**msgspec.structs.asdict(gains), kappa_c=kappa_c)
