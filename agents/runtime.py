@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+from contextlib import closing
 from time import time_ns
 
 from msgspec.structs import replace
 
+from agents.carriers.make import make_law
 from agents.config import AgentConfig
 from agents.freerun import FreeAgent
+from agents.laws.law import Law
 from agents.lockstep import AgentSide
 from wire.driver.drive import StoppedError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
@@ -46,19 +49,12 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     wall = config.clock == "wall"
     if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
-    side: FreeAgent | AgentSide | None = None
-    while side is None or (isinstance(side, FreeAgent) and side.astray):
-        session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
-        try:
-            if side is None:
-                try:
-                    links = make_links(config.name, config.links)
-                    side = (FreeAgent if wall else AgentSide)(config, session.id, links)
-                except ValueError as error:
-                    raise ConfigurationError(str(error)) from None
-            _take_part(side, session, log)
-        finally:
-            session.close()
+    try:
+        law = make_law(config.control)
+    except ValueError as error:
+        raise ConfigurationError(f"{config.name}: {error}") from None
+    with closing(law):
+        side = _one_session_after_the_other(config, make_links, law, log)
     if side.rejects.counts:
         log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
     if not side.failed:
@@ -70,6 +66,26 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     if wall:
         raise ConfigurationError(failed)
     return failed
+
+
+def _one_session_after_the_other(
+    config: AgentConfig, make_links: MakeLinks, law: Law, log: logging.Logger
+) -> FreeAgent | AgentSide:
+    """Take part with one session, and with a new one as long as the last had gone astray."""
+    side: FreeAgent | AgentSide | None = None
+    while side is None or (isinstance(side, FreeAgent) and side.astray):
+        session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
+        try:
+            if side is None:
+                try:
+                    links = make_links(config.name, config.links)
+                    side = (FreeAgent if config.clock == "wall" else AgentSide)(config, session.id, links, law)
+                except ValueError as error:
+                    raise ConfigurationError(str(error)) from None
+            _take_part(side, session, log)
+        finally:
+            session.close()
+    return side
 
 
 def _take_part(side: FreeAgent | AgentSide, session: Session, log: logging.Logger) -> None:

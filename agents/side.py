@@ -6,6 +6,7 @@ from math import inf
 
 from agents.agent import Agent, check_nameplate
 from agents.config import AgentConfig
+from agents.laws.law import Law
 from wire.codec import RejectedError, encode
 from wire.endpoint import Route
 from wire.links import Links
@@ -27,11 +28,15 @@ class Side(PlantFollower):
         Which process this is, unique in the run; part of the agent's token.
     links : Links or None
         What the links to it do to its messages.
+    law : Law or None
+        What decides its set-points; None is the paper's.
     rate : float, optional
         Most messages of one sender per s of run time; see `wire.admission`.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None, rate: float = inf) -> None:
+    def __init__(
+        self, config: AgentConfig, instance: str, links: Links | None, law: Law | None, rate: float = inf
+    ) -> None:
         super().__init__(config.name, config.run, rate)
         check_nameplate(config)
         self.stopped = ""
@@ -41,7 +46,7 @@ class Side(PlantFollower):
         self.plant_seen = False
         """Whether the plant's token was ever there."""
         self._config, self._name, self._instance = config, config.name, instance
-        self._agent = Agent(config)
+        self._agent = Agent(config, law)
         self._links = links
         self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
         self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)

@@ -71,6 +71,8 @@ class Reporter:
         self._incarnation, self._plant = incarnation, plant
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
+        self._quiet: dict[float, int] = {}
+        """States that their neighbours were not told of, by run time (s)."""
         self.seq = 0
         """Number of the next Telemetry, or of the one that is being sent."""
         self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
@@ -88,6 +90,10 @@ class Reporter:
         self._events.append(event)
         self.latest.append(event)
 
+    def note_quiet(self, t: float) -> None:
+        """Count a state that its neighbours were not told of, at run time t (s)."""
+        self._quiet[t] = self._quiet.get(t, 0) + 1
+
     def report(
         self,
         t: float,
@@ -104,8 +110,8 @@ class Reporter:
         inverters = self._plant.inverters
         bytes_per_row = _NUMBER_BYTES * (1 + VALUES * len(inverters)) + 8
         at_once = max(1, LIMIT // 2 // bytes_per_row)
-        rows, events = self._rows, self._events
-        self._rows, self._events = [], []
+        rows, events, quiet = self._rows, self._events, tuple(self._quiet.items())
+        self._rows, self._events, self._quiet = [], [], {}
         while True:
             part, rows = rows[:at_once], rows[at_once:]
             yield Telemetry(
@@ -123,6 +129,7 @@ class Reporter:
                 awaited=() if rows else awaited,
                 impaired=impaired,
                 others=others,
+                quiet=() if rows else quiet,
             )
             others = 0
             self.seq += 1

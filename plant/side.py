@@ -17,7 +17,7 @@ from wire.codec import RejectedError, encode
 from wire.endpoint import Endpoint, Route
 from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, LinkReport, Nameplate, Pacing, State, Stop
+from wire.messages import PLANT, LinkReport, Nameplate, Pacing, PlantEvent, State, Stop
 from wire.printable import printable
 
 CLOSING = 2.0
@@ -115,6 +115,14 @@ class Side(Endpoint):
     def _on_nameplate(self, plate: Nameplate, now: float) -> None:
         """Take in an agent that has said who it is."""
         raise NotImplementedError
+
+    def _note_state(self, state: State) -> None:
+        """Note what a state says beside its set-points: a law that has failed, or that does not tell its neighbours."""
+        if state.fault:
+            text = f"{state.sender}: {state.fault}; its agent stands still, its inverter stays on primary droop"
+            self._reporter.note(PlantEvent(t=self.t, kind="law", subject=state.sender, text=printable(text)))
+        if state.quiet:
+            self._reporter.note_quiet(self.t)
 
     def _gone(self, name: str, instance: str) -> None:
         """Note that a process is gone: what still comes from it is a ghost's."""

@@ -12,7 +12,7 @@ import msgspec
 
 from wire.bounds import MOST_COUNT, is_name
 
-LATEST_ONLY = ("measurement", "state", "status")
+LATEST_ONLY = ("measurement", "state", "set_points", "status")
 """Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
 
 
@@ -82,6 +82,10 @@ class Keys:
     def state(self, inverter: str) -> str:
         """What the agent of an inverter decided."""
         return f"{self._root}/state/{inverter}"
+
+    def set_points(self, inverter: str) -> str:
+        """What the agent of an inverter decided and does not tell its neighbours (wall-clock time)."""
+        return f"{self._root}/set_points/{inverter}"
 
     def ready(self, inverter: str) -> str:
         """An agent hears its neighbours on a roster."""

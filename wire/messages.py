@@ -304,7 +304,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: Time
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "warning"]
+    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "law", "warning"]
     """What sort of event."""
     subject: Label
     """The switch, island or agent concerned."""
@@ -360,6 +360,8 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
     impaired: Names = ()
     """Agents between whom and the plant an emulated fault holds now; only in wall-clock time."""
+    quiet: Annotated[tuple[tuple[Time, Count], ...], msgspec.Meta(max_length=2000)] = ()
+    """Run time (s), and how many states of that tick the neighbours were not told of, as the laws had it."""
     others: Count = 0
     """Messages of other types on this key since the Telemetry before; only in wall-clock time. So a recorder knows
     whether it has got them all."""

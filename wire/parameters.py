@@ -160,16 +160,30 @@ def _objection(parameter: Parameter, value: Any) -> str:
         value = msgspec.convert(value, parameter.type)
     except msgspec.ValidationError:
         return f"must be {_named(parameter.type)}, got {shown}"
-    unit = f" {parameter.unit}" if parameter.unit else ""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        low, high = parameter.range.low, parameter.range.high
-        if not math.isfinite(value):
-            return f"must be a finite number, got {shown}"
-        if not low <= value <= high:
-            bounds = f"from {low:g} to {high:g}" if math.isfinite(low + high) else f"at least {low:g}"
-            bounds = f"at most {high:g}" if math.isinf(low) else bounds
-            return f"must be {bounds}{unit}, got {shown}"
+        return range_objection(value, parameter.range, parameter.unit)
     return ""
+
+
+def range_objection(value: Any, allowed: Range, unit: str) -> str:
+    """Return why a value is no number within a range, "" if it is.
+
+    Examples
+    --------
+    >>> range_objection(70, Range(0.0, 60.0), "s")
+    'must be from 0 to 60 s, got 70'
+    """
+    shown = printable(str(value), 60)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return f"must be a number, got {shown}"
+    low, high = allowed.low, allowed.high
+    if not math.isfinite(value):
+        return f"must be a finite number, got {shown}"
+    if low <= value <= high:
+        return ""
+    bounds = f"from {low:g} to {high:g}" if math.isfinite(low + high) else f"at least {low:g}"
+    bounds = f"at most {high:g}" if math.isinf(low) else bounds
+    return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
 
 
 def _named(kind: Any) -> str:

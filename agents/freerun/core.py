@@ -30,6 +30,7 @@ from agents.freerun.orders import Orders
 from agents.freerun.peers import Peers
 from agents.freerun.roll_call import RollCall
 from agents.freerun.tally import Phase, Tally
+from agents.laws.law import Law
 from agents.side import REPORT_TICKS, Side
 from wire.actions import Fetch, Listen, Say
 from wire.admission import FASTER
@@ -61,12 +62,14 @@ class FreeAgent(Side):
         Which process this is, unique in the run; part of the agent's token.
     links : Links, optional
         What the links to it do to its messages.
+    law : Law, optional
+        What decides its set-points; the paper's if left out.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        super().__init__(config, instance, links, rate=FASTER / config.T_c)
+        super().__init__(config, instance, links, law, rate=FASTER / config.T_c)
         self._followed = 0
         """Epoch of the plant that was followed last; 0 before the first."""
         self._orders = Orders(config.name, config.incarnation, links)
@@ -92,6 +95,8 @@ class FreeAgent(Side):
         """Whether it has ticked in the present life of the plant."""
         self._left = 0
         """Periods since then."""
+        self._skipped = 0
+        """States since the last that neighbours were sent."""
         self._forget_everybody()
 
     def _forget_everybody(self) -> None:
@@ -115,7 +120,8 @@ class FreeAgent(Side):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         keys, name = self.keys, self._name
-        return keys.state(name), keys.leave(name), keys.status(name), keys.report(name), keys.obeyed(name)
+        own = (keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.obeyed)
+        return tuple(key(name) for key in own)
 
     @property
     def over(self) -> bool:
@@ -287,7 +293,8 @@ class FreeAgent(Side):
 
     def _came(self, message: State | Measurement, now: float) -> None:
         """Note what came off the wire, and how many did not."""
-        self.tally.lost += self.admission.take(message)
+        missed = self.admission.take(message)
+        self.tally.lost += max(0, missed - message.skipped) if isinstance(message, State) else missed
         self.heard.came(message.sender, now)
 
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
@@ -345,6 +352,8 @@ class FreeAgent(Side):
             m, joins = measurement, "goes on" if self._ran else "joins"
             self._say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
             self._ran = True
+        if self._agent.fault:
+            return
         young = self._young(now)
         ages = {name: self.heard.age(name, now) for name in young}
         state = replace(self._agent.tick(measurement, young, ages), seq=self.tally.sent)
@@ -353,7 +362,18 @@ class FreeAgent(Side):
         self.tally.sent += 1
         if self.tally.ticks % REPORT_TICKS == 0:
             self._report_links()
-        self._publish(self.keys.state(self._name), encode(state))
+        self._tell(state)
+
+    def _tell(self, state: State) -> None:
+        """Send a state to everybody, or to the plant alone if the law does not tell the neighbours."""
+        if state.fault:
+            self._say(f"{state.fault}; stands still, its inverter stays on primary droop")
+        if state.quiet:
+            self._skipped += 1
+            self._publish(self.keys.set_points(self._name), encode(state))
+        else:
+            state, self._skipped = replace(state, skipped=self._skipped) if self._skipped else state, 0
+            self._publish(self.keys.state(self._name), encode(state))
 
     def _publish_status(self, now: float) -> None:
         status = self.tally.take_status(

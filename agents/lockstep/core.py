@@ -28,6 +28,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import AgentConfig
+from agents.laws.law import Law
 from agents.lockstep.introductions import Ask, Confirm, Hear, Introductions, Peer, Step
 from agents.lockstep.turn import Turn
 from agents.side import REPORT_TICKS, Side
@@ -57,12 +58,14 @@ class AgentSide(Side):
         Which process this is, unique in the run; part of the agent's token.
     links : Links, optional
         What the links to it do to its messages.
+    law : Law, optional
+        What decides its set-points; the paper's if left out.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None) -> None:
-        super().__init__(config, instance, links)
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
+        super().__init__(config, instance, links, law)
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
-            self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate))
+            self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
         self._routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._patience = Patience(config.name, PATIENCE * config.deadline)
         self._introductions = Introductions(self._agent, instance, self.admission)
@@ -224,7 +227,7 @@ class AgentSide(Side):
             self._compute(now)
 
     def _hear(self, state: State, payload: bytes) -> None:
-        if is_usable(self._links, state, payload, state.t, self.admission):
+        if not state.quiet and is_usable(self._links, state, payload, state.t, self.admission):
             self._agent.hear(state)
 
     def _take_arrived(self, t: float) -> None:

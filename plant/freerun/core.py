@@ -115,7 +115,7 @@ class FreePlant(Side):
         self.ordering = Ordering(config.incarnation, self.keys, links, self._publish)
         keys = self.keys
         for name in plant.inverters:
-            self._routes[keys.state(name)] = Route(name, (State,), self._on_state)
+            self._routes[keys.state(name)] = self._routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
             self._routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
             self._routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
             self._routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
@@ -258,6 +258,7 @@ class FreePlant(Side):
         self.admission.take(state)
         self._heard.came(state.sender, now)
         self._silence.heard(state.sender)
+        self._note_state(state)
         if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
             self._heard.keep(state)
 

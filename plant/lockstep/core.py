@@ -160,6 +160,7 @@ class PlantSide(Side):
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         self._waiting.state(state, self.tick)
+        self._note_state(state)
         if is_usable(self._links, state, payload, state.t, self.admission):
             self._states[state.sender] = state
 

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from time import perf_counter
 from typing import NamedTuple
 
 import msgspec
 
+from agents.carriers.make import make_law
 from agents.config import AgentConfig
 from agents.lockstep import AgentSide
 from plant.config import PlantConfig
@@ -191,19 +193,23 @@ def run_inprocess(
         plant = build_plant(plant_config)
     side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links))
     known = {config.name: config for config in agent_configs}
-    agents = [
-        AgentSide(config, f"p{i}", links_of(config.name, config.links))
-        for i, config in enumerate(known.values())
-        if config.name in plant_config.agents
-    ]
+    with ExitStack() as stack:
 
-    def newcomer(name: str) -> AgentSide:
-        known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
-        links = links_of(name, known[name].links)
-        agents.append(AgentSide(known[name], f"p{len(known) + len(agents)}", links))
-        return agents[-1]
+        def agent_of(config: AgentConfig, instance: str) -> AgentSide:
+            law = make_law(config.control)
+            stack.callback(law.close)
+            return AgentSide(config, instance, links_of(config.name, config.links), law)
 
-    Bus(side, agents, note, on_links, newcomer).run()
+        agents = [
+            agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
+        ]
+
+        def newcomer(name: str) -> AgentSide:
+            known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
+            agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
+            return agents[-1]
+
+        Bus(side, agents, note, on_links, newcomer).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

@@ -1,6 +1,7 @@
 r"""The whole loop, law and plant, as one linear map from tick to tick, with delays in ticks and losses.
 
-The law is `agents.laws.consensus`'s, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c), b_i = 1 - exp(-kappa_i T_c):
+The law is that of `agents.laws.consensus`, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c) and
+b_i = 1 - exp(-kappa_i T_c):
 
 .. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e_i(k - m_i)
 

@@ -7,6 +7,7 @@ from typing import Literal
 from agents.config import MAX_AGE, AgentConfig, Control
 from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
+from scenarios.spec.law import law_of
 from scenarios.spec.limits import limits_of
 from scenarios.spec.model import Event, Scenario
 from scenarios.spec.moves import inverters_of, moves_of
@@ -55,6 +56,7 @@ def configs(
         without=rule.without,
         gains=rule.gains,
         handling=rule.handling,
+        law=law_of(scenario, case),
     )
     plant = PlantConfig(
         run=run,

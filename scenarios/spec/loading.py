@@ -22,6 +22,7 @@ from scenarios.spec.checks import (
     check_switches,
     check_times,
 )
+from scenarios.spec.law import check_laws, with_law_folders
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
@@ -119,6 +120,8 @@ def check_tables(
     check_step(scenario, mistakes)
     check_names(scenario, mistakes)
     check_protection(scenario, mistakes)
+    scenario = with_law_folders(scenario, path.parent)
+    check_laws(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)

@@ -6,13 +6,16 @@ prints this file's sentences.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
 from agents.config import Gains, GraphRule, Handling
 from netem.spec.netem import Netem
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
+
+LawKey = str | dict[str, Any]
+"""A control law: a registered name, `module:Class`, or a table with one of use, command, fmu, and parameters."""
 
 
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -86,6 +89,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     P_max_kW: dict[str, dict[str, float]] = {}
     """What inverters have available from an event on (kW), in this case only and in place of what the event says, by
     the event's label: { clouds = { inv2 = 225 } }."""
+    law: LawKey = ""
+    """Control law of this case only, as `law` at the top; without it, that one."""
     gains: Gains = Gains()
     """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
     handling: Handling = Handling()
@@ -120,8 +125,12 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Table `[plant]`."""
     protection: Protection = Protection()
     """Table `[protection]`: when inverters trip, and when they come back."""
+    law: LawKey = "consensus"
+    """Control law that the agents run: a name that `gridpeers doc laws` lists, "mine:Mine" for the class Mine of
+    mine.py beside this file, or a table `[law]` with one of use, command = ["./mylaw"] (any program), fmu = "law.fmu",
+    and with the law's parameters; time_limit_s is the longest time of one step."""
     gains: Gains = Gains()
-    """Table `[gains]`: of the secondary law, for every case."""
+    """Table `[gains]`: of the law "consensus", for every case."""
     handling: Handling = Handling()
     """Table `[handling]`: what agents make of bad links and of saturation, for every case."""
     processes: Processes = Processes()

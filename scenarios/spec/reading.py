@@ -182,6 +182,8 @@ def _named(kind: Any) -> str:
         return "one of " + ", ".join(shown(option) for option in typing.get_args(kind))
     if typing.get_origin(kind) is dict:
         return "a table"
+    if typing.get_origin(kind) is types.UnionType:
+        return " or ".join(map(_named, typing.get_args(kind)))
     if typing.get_origin(kind) is tuple:
         inner = typing.get_args(kind)[0]
         if inner in (int, float):

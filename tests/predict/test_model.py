@@ -21,7 +21,7 @@ START, LOAD = 0.00647, 0.0088
 
 
 def plainly(case: Fleet, ticks: Ticks, count: int, rng: np.random.Generator | None = None) -> tuple[Floats, Floats]:
-    """Errors e and set-points y under agents.laws.consensus and a quasi-steady plant, all remembered: nobody would ship it."""
+    """Errors e and set-points y under the paper's law and a quasi-steady plant, all remembered: nobody ships it."""
     n, w = case.n, case.weight
     y, e = [np.full(n, START)], [0.0]
     heard = np.full((n, n), START)

@@ -1,0 +1,169 @@
+"""A law that is any program: one JSON line a tick on its standard input, one on its standard output.
+
+docs/law-programs.md has the lines. The program runs in the folder of the scenario; what it prints on standard error
+goes to the log of its agent.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any, Literal
+
+import msgspec
+
+from agents.config import LawChoice
+from agents.laws.call import LawError
+from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
+from wire.parameters import parameters_of
+from wire.printable import printable
+
+LONGEST_LINE = 100_000
+"""Bytes of an answer beyond which it is none."""
+
+FIRST = 10.0
+"""Times the time limit that a program may take for its first answer: it may have to be loaded."""
+
+CLOSING = 1.0
+"""Time (s) that a program has to end once its input has."""
+
+EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
+
+
+class Ready(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to the line "start"."""
+
+    type: Literal["ready"] = "ready"
+    error: str = ""
+
+
+class Decision(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer to the line "step"."""
+
+    P_set: float | None = None
+    V_set: float | None = None
+    shared: dict[str, float] = {}
+    send: bool = True
+    error: str = ""
+
+
+class ProgramLaw(Law):
+    """A law carried by a program.
+
+    Parameters
+    ----------
+    choice : LawChoice
+        The command, its parameters and the folder to run it in.
+
+    Raises
+    ------
+    ValueError
+        If the program cannot be started, or a limit among the parameters is wrong.
+    """
+
+    def __init__(self, choice: LawChoice) -> None:
+        limits = {name: value for name, value in choice.parameters.items() if name in parameters_of(Law)}
+        super().__init__(**limits)
+        self._choice = choice
+        self._name = Path(choice.command[0]).name
+        self._process: subprocess.Popen[bytes] | None = None
+        self._rest = b""
+        command = list(choice.command)
+        if choice.folder and (Path(choice.folder) / command[0]).exists():  # else it is on the PATH, or nowhere
+            command[0] = str(Path(choice.folder) / command[0])
+        try:
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=choice.folder or None, bufsize=0
+            )
+        except OSError as error:
+            text = f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run"
+            raise ValueError(f"law program {text}") from None
+        self._patience = FIRST * choice.time_limit
+
+    def start(self, own: Own) -> None:
+        """Send the line "start", and wait until the program is ready."""
+        self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, Ready, own.t)
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Send the line "step", and take the decision."""
+        around = [other._asdict() | {"shared": dict(other.shared)} for other in neighbours]
+        line = {"type": "step", "own": own._asdict(), "neighbours": around, "T": T}
+        decision = self._ask(line, Decision, own.t)
+        if decision.P_set is None or decision.V_set is None:
+            missing = "P_set" if decision.P_set is None else "V_set"
+            raise LawError(f"{self._name} answered a step at t = {own.t:.6g} s without {missing}; e.g. {EXAMPLE}")
+        shared: Mapping[str, float] = decision.shared or NOTHING
+        return SetPoints(decision.P_set, decision.V_set, shared, decision.send)
+
+    def close(self) -> None:
+        """End the program: its input ends, and if it stays, it is killed."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.close()
+        try:
+            process.wait(CLOSING)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        process.stdout.close()
+
+    def _ask(self, line: dict[str, Any], answer: type[Any], t: float) -> Any:
+        """Send a line and return the answer.
+
+        Raises
+        ------
+        LawError
+            If the program is dead, does not answer in time, or answers something else.
+        """
+        what = f"{line['type']} at t = {t:.6g} s"
+        if self._process is None:
+            raise LawError(f"{self._name} has ended before the {what}")
+        try:
+            assert self._process.stdin is not None
+            self._process.stdin.write(msgspec.json.encode(line) + b"\n")
+            reply = self._line(what)
+        except BrokenPipeError:
+            raise LawError(self._ended(what)) from None
+        try:
+            decoded = msgspec.json.decode(reply, type=answer)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            shown = printable(reply.decode(errors="replace"), 100)
+            raise LawError(f"{self._name} answered the {what} with {shown!r}, which is none; e.g. {EXAMPLE}") from None
+        if decoded.error:
+            raise LawError(f"{self._name} says: {printable(decoded.error, 200)} ({what})")
+        self._patience = self._choice.time_limit
+        return decoded
+
+    def _line(self, what: str) -> bytes:
+        """Return the next line of the program."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        end, file = monotonic() + self._patience, self._process.stdout.fileno()
+        while b"\n" not in self._rest:
+            ready, _, _ = select.select([file], [], [], max(0.0, end - monotonic()))
+            if not ready:
+                raise LawError(f"{self._name} did not answer the {what} within {self._patience:g} s")
+            piece = os.read(file, 65_536)
+            if not piece:
+                raise LawError(self._ended(what))
+            self._rest += piece
+            if len(self._rest) > LONGEST_LINE:
+                raise LawError(f"{self._name} answered the {what} with more than {LONGEST_LINE} bytes on one line")
+        line, _, self._rest = self._rest.partition(b"\n")
+        return line
+
+    def _ended(self, what: str) -> str:
+        """Say how the program ended."""
+        assert self._process is not None
+        try:
+            code = self._process.wait(CLOSING)
+        except subprocess.TimeoutExpired:
+            return f"{self._name} closed its output at the {what}"
+        return f"{self._name} ended at the {what} with " + (f"exit code {code}" if code >= 0 else f"signal {-code}")

@@ -1,0 +1,63 @@
+"""A law of anybody's in Python that may hang: it is interrupted, and has failed."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+from agents.laws.call import LawError
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+
+
+class TimeLimited(Law):
+    """A law, each call of which may last only so long.
+
+    Parameters
+    ----------
+    law : Law
+        The law.
+    time_limit : float
+        Longest time (s of real time) of one call. It is enforced by SIGALRM: in the main thread of a process alone,
+        and not against a call of C code that does not return.
+    """
+
+    def __init__(self, law: Law, time_limit: float) -> None:
+        super().__init__(
+            P_set_min=law.P_set_min, P_set_max=law.P_set_max, V_set_min=law.V_set_min, V_set_max=law.V_set_max
+        )
+        self._law, self._time_limit = law, time_limit
+
+    def start(self, own: Own) -> None:
+        """Begin as the law does."""
+        with self._limited("start", own.t):
+            self._law.start(own)
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Decide as the law does."""
+        with self._limited("step", own.t):
+            return self._law.step(own, neighbours, T)
+
+    def close(self) -> None:
+        """End the law."""
+        self._law.close()
+
+    @contextmanager
+    def _limited(self, what: str, t: float) -> Iterator[None]:
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def interrupt(number: int, frame: FrameType | None) -> None:
+            longer = f"took longer than time_limit_s = {self._time_limit:g} s"
+            raise LawError(f"{what} at t = {t:.6g} s {longer}")
+
+        before = signal.signal(signal.SIGALRM, interrupt)
+        signal.setitimer(signal.ITIMER_REAL, self._time_limit)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)

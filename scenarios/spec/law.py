@@ -1,0 +1,154 @@
+"""The key `law` of a scenario and of its cases: which control law the agents run, with which parameters."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
+
+from agents.carriers.registry import LAWS
+from agents.config import Gains, LawChoice
+from agents.laws.law import Law
+from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.model import LawKey, Scenario
+from wire.parameters import Range, objections, range_objection
+from wire.registry import PluginError
+
+PAPER = LawChoice().use
+"""Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
+
+CARRIERS = ("use", "command", "fmu")
+"""Keys of the table `law`, one of which says what the law is."""
+
+OWN_KEYS = (*CARRIERS, "folder", "time_limit_s")
+"""Keys of the table `law` that are no parameters of the law."""
+
+TIME_LIMIT = Range(0.001, 60.0)
+"""What a time limit may be (s)."""
+
+
+def law_of(scenario: Scenario, case: str) -> LawChoice:
+    """Return the law of a case: its own, or the scenario's.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> law_of(load_scenario("islanding")[0], "IV").use
+    'consensus'
+    """
+    table = _table(scenario.cases[case].law or scenario.law)
+    return LawChoice(
+        use=table.get("use", PAPER),
+        command=tuple(table.get("command", ())),
+        fmu=table.get("fmu", ""),
+        folder=table.get("folder", ""),
+        time_limit=float(table.get("time_limit_s", LawChoice().time_limit)),
+        parameters={key: value for key, value in table.items() if key not in OWN_KEYS},
+    )
+
+
+def with_law_folders(scenario: Scenario, folder: Path) -> Scenario:
+    """Return the scenario with the folder of each law that stands beside its file: processes may start elsewhere."""
+    cases = {name: replace(case, law=_placed(case.law, folder)) for name, case in scenario.cases.items()}
+    return replace(scenario, law=_placed(scenario.law, folder), cases=cases)
+
+
+def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
+    """Every law is there, takes its parameters, and stands alone."""
+    _check("law", scenario.law, mistakes)
+    for name, case in scenario.cases.items():
+        path = f"case.{name}.law"
+        if case.law:
+            _check(path, case.law, mistakes)
+        if mistakes.touch(path, "law"):
+            continue
+        law = law_of(scenario, name)
+        if law.name != PAPER and case.gains not in (scenario.gains, Gains()):
+            text = f'[gains] are those of the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
+            mistakes.add(f"case.{name}.gains", text)
+
+
+def _table(law: LawKey) -> dict[str, Any]:
+    return {"use": law} if isinstance(law, str) else dict(law)
+
+
+def _placed(law: LawKey, folder: Path) -> LawKey:
+    """A law as it is written, with the folder in which its module, program or FMU is looked for."""
+    table = _table(law)
+    local = ":" in str(table.get("use", "")) or "command" in table or "fmu" in table
+    if not law or not local or not isinstance(table.get("folder", ""), str):
+        return law
+    return table | {"folder": str((folder / table.get("folder", "")).resolve())}
+
+
+def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
+    table = _table(law)
+    if mistakes.touch(path):
+        return
+    given = [key for key in CARRIERS if key in table]
+    if len(given) != 1:
+        text = f"needs one of use, command, fmu; got {' and '.join(given) or 'none'}"
+        mistakes.add(path, f'{text}; e.g. law = "mine:Mine" or law = {{ command = ["./mylaw"] }}')
+        return
+    wrong = _wrong_types(table)
+    for key, text in wrong.items():
+        mistakes.add(f"{path}.{key}", text)
+    if wrong:
+        return
+    parameters = {key: value for key, value in table.items() if key not in OWN_KEYS}
+    checks = {"use": _check_class, "command": _check_program, "fmu": _check_fmu}
+    for key, text in checks[given[0]](table, parameters):
+        mistakes.add(f"{path}.{key}" if isinstance(law, Mapping) else path, text)
+
+
+def _wrong_types(table: Mapping[str, Any]) -> dict[str, str]:
+    """What is wrong with the keys that are no parameters, by key."""
+    wrong = {
+        key: "must be a text in quotes" for key in ("use", "fmu", "folder") if not isinstance(table.get(key, ""), str)
+    }
+    command = table.get("command", ["-"])
+    if not (isinstance(command, list | tuple) and command and all(isinstance(word, str) for word in command)):
+        wrong["command"] = 'must be a list of texts, the program first, e.g. ["./mylaw", "--fast"]'
+    if text := range_objection(table.get("time_limit_s", 1.0), TIME_LIMIT, "s"):
+        wrong["time_limit_s"] = text
+    for key, value in table.items():
+        if key not in OWN_KEYS and not isinstance(value, str | int | float):
+            wrong[key] = f"a parameter is a number, a text, or true or false; got {value!r}"
+    return wrong
+
+
+def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    use = table["use"]
+    if use == PAPER:
+        text = f'the parameters of "{PAPER}" are those of [gains] and [handling]; write them there'
+        return [(key, text) for key in parameters]
+    try:
+        law = LAWS.resolve(use, table.get("folder", ""))
+    except PluginError as error:
+        return [("use", str(error))]
+    wrong = objections(law, parameters)
+    if not wrong:
+        try:
+            law(**parameters).close()
+        except Exception as error:  # its __init__ is anybody's code
+            wrong = [("use", f"{use} cannot be made: {type(error).__name__}: {error}")]
+    return wrong
+
+
+def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    program = table["command"][0]
+    place = Path(table.get("folder", "")) / program
+    if shutil.which(str(place)) or shutil.which(program):
+        return objections(Law, {key: value for key, value in parameters.items() if key in vars(Law)})
+    if place.is_file():
+        return [("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
+    return [("command", f"there is no program {program}, neither beside the scenario nor on the PATH")]
+
+
+def _check_fmu(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    from agents.carriers.fmu import fmu_problems
+
+    return fmu_problems(Path(table.get("folder", "")) / table["fmu"], parameters)
