@@ -32,6 +32,10 @@ LAWS: Registry[type[Law]] = Registry(
     _objection,
     own={
         "consensus": "agents.laws.consensus:Consensus",
+        "dapi": "agents.laws.dapi:Dapi",
+        "event-triggered": "agents.laws.event_triggered:EventTriggered",
+        "finite-time": "agents.laws.finite_time:FiniteTime",
+        "centralised": "agents.laws.centralised:Centralised",
     },
 )
 """Laws by name; those of gridpeers come first."""

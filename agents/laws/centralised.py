@@ -1,0 +1,60 @@
+r"""Centralised secondary control: one controller restores frequency and mean voltage for all. Pure.
+
+J. M. Guerrero, J. C. Vasquez, J. Matas, L. García de Vicuña, M. Castilla, "Hierarchical Control of Droop-Controlled AC
+and DC Microgrids - A General Approach Toward Standardization", IEEE Trans. Ind. Electron. 58(1), 2011, equations (8),
+(9): the microgrid's central controller measures the errors, and sends the same corrections to all inverters,
+
+.. math::
+    \delta\omega = k_p (\omega^* - \omega) + k_i \int (\omega^* - \omega) dt, \qquad
+    \delta E = k_{pE} (E^* - E) + k_{iE} \int (E^* - E) dt .
+
+The controller runs in the agent of one inverter (`centre`), which must have a link from and to everybody (graph "full",
+or a star); E is the mean of the voltages that it is told. delta omega = m_p P_set and delta E = V_set - 1 in per unit. An
+inverter that does not hear the centre keeps the corrections it heard last.
+
+**What the paper claims.** Frequency and voltage return to nominal, and droop goes on sharing real power; vars are left
+to droop, and without the centre nobody restores anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+from wire.parameters import Range, Unit
+
+
+class Centralised(Law):
+    """PI control of frequency and mean voltage at one inverter, whose corrections all others take over."""
+
+    source = "Guerrero et al., IEEE Trans. Ind. Electron. 58(1), 2011"
+
+    centre: Annotated[str, "Inverter whose agent is the central controller."] = "inv1"
+    k_p: Annotated[float, Range(0, 100), "Proportional gain of frequency."] = 0.2
+    k_i: Annotated[float, Unit("1/s"), Range(0, 1e3), "Integral gain of frequency."] = 5.0
+    k_pE: Annotated[float, Range(0, 100), "Proportional gain of voltage."] = 0.2
+    k_iE: Annotated[float, Unit("1/s"), Range(0, 1e3), "Integral gain of voltage."] = 2.0
+
+    def __init__(self, **parameters: Any) -> None:
+        super().__init__(**parameters)
+        self._omega = self._E = 0.0
+        """Integrals of the centre (pu)."""
+
+    def start(self, own: Own) -> None:
+        """Begin without a bump: the integrals are what the own set-points are."""
+        self._omega, self._E = own.m_p * own.P_set, own.V_set - 1.0
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Compute the corrections, or take over those of the centre."""
+        if own.name == self.centre:
+            voltages = [own.V, *(other.shared["V"] for other in neighbours if "V" in other.shared)]
+            error = 1.0 - sum(voltages) / len(voltages)
+            self._omega -= self.k_i * T * own.e
+            self._E += self.k_iE * T * error
+            omega, E = self._omega - self.k_p * own.e, self._E + self.k_pE * error
+            return SetPoints(omega / own.m_p, 1.0 + E, {"omega": omega, "E": E})
+        for other in neighbours:
+            if other.name == self.centre and "omega" in other.shared:
+                return SetPoints(other.shared["omega"] / own.m_p, 1.0 + other.shared["E"], {"V": own.V})
+        return SetPoints(own.P_set, own.V_set, {"V": own.V})

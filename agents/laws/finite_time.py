@@ -1,0 +1,58 @@
+r"""Finite-time consensus and restoration: differences below one count by a power less than one. Pure.
+
+L. Wang, F. Xiao, "Finite-Time Consensus Problems for Networks of Dynamic Agents", IEEE Trans. Autom. Control 55(4),
+2010, protocol (6); in microgrids: S. Zuo, A. Davoudi, Y. Song, F. L. Lewis, "Distributed Finite-Time Voltage and
+Frequency Restoration in Islanded AC Microgrids", IEEE Trans. Ind. Electron. 63(10), 2016.
+
+.. math::
+    \dot x_i = c \sum_j a_{ij} \operatorname{sig}(x_j - x_i)^{\gamma} + c\, g_i \operatorname{sig}(x^* - x_i)^{\gamma},
+    \qquad \operatorname{sig}(u)^\gamma = \operatorname{sign}(u) |u|^\gamma, \quad 0 < \gamma < 1
+
+For frequency x is m_p P_set, and a leader's reference term is its own frequency error; for voltage the consensus is on
+m_q q and the reference is nominal voltage. Near zero the gain of sig grows without bound, so an explicit step of T would
+chatter there: no term moves further than half of its own difference (the neighbour moves the other half), and a
+reference term no further than the whole of it.
+
+**What the paper claims.** Over a connected undirected graph agents agree in finite time, at the latest after
+:math:`T^* = \frac{(4 V_0)^{(1-\gamma)/2}}{c\,(1-\gamma)\, 2^{-\gamma}\lambda_2(L_B)^{(1+\gamma)/2}}` with
+:math:`V_0 = \tfrac14 \sum_{ij} a_{ij} (x_j - x_i)^2`-type energies (Theorem 1); asymptotic laws never do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import copysign
+from typing import Annotated
+
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+from wire.parameters import Range, Unit
+
+
+class FiniteTime(Law):
+    """Consensus by differences to a power below one, as of Wang and Xiao, with leaders that restore to nominal."""
+
+    source = "Wang, Xiao, IEEE Trans. Autom. Control 55(4), 2010; Zuo et al., IEEE Trans. Ind. Electron. 63(10), 2016"
+
+    gamma: Annotated[float, Range(0.05, 0.999), "Power of a difference."] = 0.5
+    c_P: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of m_p P_set."] = 0.1
+    c_V: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of V_set."] = 0.1
+    alpha: Annotated[float, Range(0, 1e3), "Weight of a leader's voltage error beside that of one neighbour."] = 1.0
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Decide the set-points of one control period."""
+        y, count = own.m_p * own.P_set, max(1, len(neighbours))
+        change = sum(
+            other.weight * self._move(other.m_p * other.P_set - y, T * self.c_P, 0.5 / count) for other in neighbours
+        )
+        V_change = sum(
+            other.weight * self._move(other.m_q * other.Q - own.z, T * self.c_V, 0.5 / count) for other in neighbours
+        )
+        if own.leader:
+            change += self._move(-own.e, T * self.c_P, 1.0)
+            V_change += self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)
+        return SetPoints((y + change) / own.m_p, own.V_set + V_change)
+
+    def _move(self, difference: float, gain: float, most: float) -> float:
+        """Return gain sig(difference)^gamma, at most a part of the difference."""
+        size = abs(difference)
+        return copysign(min(gain * size**self.gamma, most * size), difference)
