@@ -1,16 +1,16 @@
 r"""Centralised secondary control: one controller restores frequency and mean voltage for all. Pure.
 
 J. M. Guerrero, J. C. Vasquez, J. Matas, L. García de Vicuña, M. Castilla, "Hierarchical Control of Droop-Controlled AC
-and DC Microgrids - A General Approach Toward Standardization", IEEE Trans. Ind. Electron. 58(1), 2011, equations (8),
-(9): the microgrid's central controller measures the errors, and sends the same corrections to all inverters,
+and DC Microgrids - A General Approach Toward Standardization", IEEE Trans. Ind. Electron. 58(1), 2011: the microgrid's
+central controller measures the errors, and sends the same corrections to all inverters,
 
 .. math::
     \delta\omega = k_p (\omega^* - \omega) + k_i \int (\omega^* - \omega) dt, \qquad
     \delta E = k_{pE} (E^* - E) + k_{iE} \int (E^* - E) dt .
 
 The controller runs in the agent of one inverter (`centre`), which must have a link from and to everybody (graph "full",
-or a star); E is the mean of the voltages that it is told. delta omega = m_p P_set and delta E = V_set - 1 in per unit. An
-inverter that does not hear the centre keeps the corrections it heard last.
+or a star); E is the mean of the voltages that it is told. In per unit delta omega = m_p P_set and delta E = V_set - 1.
+An inverter that does not hear the centre keeps the corrections it heard last.
 
 **What the paper claims.** Frequency and voltage return to nominal, and droop goes on sharing real power; vars are left
 to droop, and without the centre nobody restores anything.

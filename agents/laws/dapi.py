@@ -45,10 +45,9 @@ class Dapi(Law):
         apart = sum(other.weight * (omega - other.m_p * other.P_set) for other in neighbours)
         unequal = sum(other.weight * (own.z - other.m_q * other.Q) for other in neighbours)
         omega -= T / self.k * own.e + _step(T * self.a / self.k, weight) * apart
-        V_set = (
-            own.V_set - T * self.beta / self.kappa * (own.V - 1.0) - _step(T * self.b / self.kappa, weight) * unequal
-        )
-        return SetPoints(omega / own.m_p, V_set)
+        e = own.V_set - 1.0
+        e -= T * self.beta / self.kappa * (own.V - 1.0) + _step(T * self.b / self.kappa, weight) * unequal
+        return SetPoints(omega / own.m_p, 1.0 + e)
 
 
 def _step(gain: float, weight: float) -> float:

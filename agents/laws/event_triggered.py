@@ -1,7 +1,7 @@
 r"""Consensus by event-based broadcasting: neighbours are told only when they would be wrong by too much. Pure.
 
 G. S. Seyboth, D. V. Dimarogonas, K. H. Johansson, "Event-based broadcasting for multi-agent average consensus",
-Automatica 49(1), 2013, equations (5), (6) and Theorem 3.2:
+Automatica 49(1), 2013:
 
 .. math::
     u_i = -\sum_j c_{ij} (\hat x_i - \hat x_j), \qquad
@@ -11,8 +11,8 @@ where a hat is the value broadcast last, the own one included. Here x is m_p P_s
 form watches m_q q. Leaders add their own frequency and voltage errors as in (13), (15) of the paper that gridpeers
 began with, as their own measurements need no broadcast. Time in the trigger counts from the last `start`.
 
-**What the paper claims.** With c_0 > 0 agents reach a ball around agreement whose radius is proportional to c_0
-(r = norm(L) sqrt(N) c_0 / lambda_2), without Zeno behaviour, and with fewer messages than periodic broadcasting.
+**What the paper claims.** Agents reach a ball around agreement whose radius is proportional to c_0, at most
+norm(L) sqrt(N) c_0 / lambda_2, without Zeno behaviour, and with fewer messages than periodic broadcasting.
 """
 
 from __future__ import annotations

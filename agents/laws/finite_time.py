@@ -1,7 +1,7 @@
 r"""Finite-time consensus and restoration: differences below one count by a power less than one. Pure.
 
 L. Wang, F. Xiao, "Finite-Time Consensus Problems for Networks of Dynamic Agents", IEEE Trans. Autom. Control 55(4),
-2010, protocol (6); in microgrids: S. Zuo, A. Davoudi, Y. Song, F. L. Lewis, "Distributed Finite-Time Voltage and
+2010; in microgrids: S. Zuo, A. Davoudi, Y. Song, F. L. Lewis, "Distributed Finite-Time Voltage and
 Frequency Restoration in Islanded AC Microgrids", IEEE Trans. Ind. Electron. 63(10), 2016.
 
 .. math::
@@ -9,13 +9,15 @@ Frequency Restoration in Islanded AC Microgrids", IEEE Trans. Ind. Electron. 63(
     \qquad \operatorname{sig}(u)^\gamma = \operatorname{sign}(u) |u|^\gamma, \quad 0 < \gamma < 1
 
 For frequency x is m_p P_set, and a leader's reference term is its own frequency error; for voltage the consensus is on
-m_q q and the reference is nominal voltage. Near zero the gain of sig grows without bound, so an explicit step of T would
+m_q q and the reference is nominal voltage. Near zero the gain of sig grows without bound, so an explicit step would
 chatter there: no term moves further than half of its own difference (the neighbour moves the other half), and a
-reference term no further than the whole of it.
+leader's term for frequency no further than the whole of it.
 
-**What the paper claims.** Over a connected undirected graph agents agree in finite time, at the latest after
-:math:`T^* = \frac{(4 V_0)^{(1-\gamma)/2}}{c\,(1-\gamma)\, 2^{-\gamma}\lambda_2(L_B)^{(1+\gamma)/2}}` with
-:math:`V_0 = \tfrac14 \sum_{ij} a_{ij} (x_j - x_i)^2`-type energies (Theorem 1); asymptotic laws never do.
+**What the paper claims.** Over a connected undirected graph agents agree in finite time; asymptotic laws never do.
+With V = 1/2 sum_i (x_i - mean)^2 and unit weights, V' = -c/2 sum_ij |x_j - x_i|^{1+gamma} is at most
+-c/2 (4 lambda_2 V)^{(1+gamma)/2}, so they agree at the latest after
+
+.. math:: T^* = \frac{4 V_0^{(1-\gamma)/2}}{c (1-\gamma) (4 \lambda_2)^{(1+\gamma)/2}} .
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ class FiniteTime(Law):
     source = "Wang, Xiao, IEEE Trans. Autom. Control 55(4), 2010; Zuo et al., IEEE Trans. Ind. Electron. 63(10), 2016"
 
     gamma: Annotated[float, Range(0.05, 0.999), "Power of a difference."] = 0.5
-    c_P: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of m_p P_set."] = 0.1
-    c_V: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of V_set."] = 0.1
+    c_P: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of m_p P_set."] = 0.4
+    c_V: Annotated[float, Unit("pu^(1-gamma)/s"), Range(0, 1e4), "Gain of V_set."] = 0.4
     alpha: Annotated[float, Range(0, 1e3), "Weight of a leader's voltage error beside that of one neighbour."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
