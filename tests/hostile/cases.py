@@ -21,7 +21,10 @@ BODIES: dict[str, dict[str, Any]] = {
         to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0, P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
         roster=("inv1", "inv2"),
     ),
-    "State": dict(P_set=9e4, V_set=277.0, Q=0.0, island="inv1", angle=[0.5, 1.0]),
+    "State": dict(
+        P_set=9e4, V_set=277.0, Q=0.0, island="inv1", angle=[0.5, 1.0], idle=False, shared={"omega": 0.1}, quiet=False,
+        skipped=0, fault="",
+    ),
     "Prepare": dict(roster=("inv1", "inv2"), instances=("a", "b")),
     "Waiting": dict(waits_for=("inv3",)),
     "Ready": {},
@@ -39,7 +42,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "Telemetry": dict(
         inverters=("inv1",), rows=((0.0, 60.0, 5e4, 0.0, 277.0, 5e4, 277.0),),
         events=(dict(t=0.0, kind="switch", subject="13-152", text="opened"),), final=False, outcome="",
-        reproducible=True, awaited=(), impaired=(),
+        reproducible=True, awaited=(), impaired=(), quiet=((0.0, 3),),
         pacing=dict(steps=9, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0),
     ),
 }  # fmt: skip
@@ -115,6 +118,11 @@ def _inside(path: str, type_: Any, holder: Any, key: Any) -> Iterator[tuple[str,
     inner = next((part for part in _parts(type_) if isinstance(part, inspect.StructType)), None)
     if isinstance(type_, inspect.VarTupleType):
         inside = _inside("0", type_.item_type, list(holder[key] or [0.0]), 0)
+    elif isinstance(type_, inspect.TupleType):
+        inside = (leaf for i, item in enumerate(type_.item_types) for leaf in _inside(str(i), item, holder[key], i))
+    elif isinstance(type_, inspect.DictType):
+        name = next(iter(holder[key]))
+        inside = _inside(name, type_.value_type, holder[key], name)
     elif inner is not None:
         inside = _leaves(inner, holder[key])
     else:
@@ -163,8 +171,11 @@ def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
                 yield [None] * ((part.max_length or 10_000) + 1), False
                 yield ("inv1", "inv1"), None
                 yield {"0": "inv1"}, False
-            case inspect.StructType():
-                yield 7, False
+            case inspect.DictType():
+                yield from (({}, True), ({"a b": 0.1}, False), ({"\x1b": 0.1}, False), ({"x": "1"}, False), (7, False))
+                yield {f"x{i}": 0.1 for i in range(part.max_length + 1)}, False
+            case inspect.StructType() | inspect.TupleType():
+                yield from ((7, False), ([], False))
 
 
 def _numbers(part: Any) -> Iterator[tuple[Any, bool | None]]:
