@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from scenarios.experiments.page import Curve, Page, Panel
-from scenarios.results.plots import PAGE
+from scenarios.results.plots import PAGE, save
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")
 MARKERS = "osD^vPX*"
@@ -46,11 +46,8 @@ def draw(page: Page, path: Path) -> Path:
             columns = max(1, min(len(labels), int(15 * width / (max(map(len, labels)) + 6))))
             figure.legend(handles, labels, loc="outside lower center", ncols=columns)
         figure.suptitle(page.title, fontsize=10)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{path.name}")
-        figure.savefig(partial, format="png", dpi=DPI)
-        partial.replace(path)
-    return path
+        (file,) = save(figure, path.parent, path.stem, dpi=DPI)
+    return file
 
 
 def _draw(axes: Axes, panel: Panel) -> None:

@@ -147,6 +147,7 @@ def metrics_json(whole: Reproduction) -> str:
         "topology": [
             {
                 "links": run.links,
+                "connected": run.connected,
                 **asdict(run.settled),
                 **{"MPSI": run.steady.MPSI, "f_error_Hz": run.steady.f_error_Hz},
             }

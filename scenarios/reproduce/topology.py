@@ -12,7 +12,7 @@ from scenarios.results.findings import Findings, GraphRun
 from scenarios.results.metrics import Steady
 from scenarios.results.settling import Settling
 from scenarios.spec import Case, Scenario, load_scenario
-from scenarios.sweep.file.graphs import Edges, connected_graph, connected_graphs
+from scenarios.sweep.file.graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
 from scenarios.sweep.one import Done, run_one
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
@@ -26,6 +26,9 @@ BELOW = (4, 5, 6, 7)
 
 PER_COUNT_BELOW = 2
 """Graphs for each of these."""
+
+NOT_CONNECTED = 1e-9
+"""Algebraic connectivity of a graph in parts: 0 but for rounding. That of nine in a path is 0.12."""
 
 END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
@@ -76,7 +79,7 @@ def study(seed: int, tell: Told, *, jobs: int) -> Findings:
             raise RuntimeError(f"topology, graph {end.number} with {len(drawn[end.number])} links: {end.why}")
         done[end.number] = end
         tell(count, len(drawn))
-    return Findings(results={}, graphs=tuple(_graph_run(len(edges), done[i]) for i, edges in enumerate(drawn)))
+    return Findings(results={}, graphs=tuple(_graph_run(len(names), edges, done[i]) for i, edges in enumerate(drawn)))
 
 
 def _on(scenario: Scenario, names: tuple[str, ...], edges: Edges) -> Scenario:
@@ -108,7 +111,7 @@ def run_all(runs: Sequence[tuple[Scenario, str]], jobs: int) -> Iterator[Done]:
     yield from on_this_machine(numbered, jobs)
 
 
-def _graph_run(links: int, done: Done) -> GraphRun:
+def _graph_run(inverters: int, edges: Edges, done: Done) -> GraphRun:
     at = {name.removeprefix("event1."): value for name, value in done.measures.items()}
 
     def number(name: str) -> float:
@@ -116,7 +119,8 @@ def _graph_run(links: int, done: Done) -> GraphRun:
         return float("nan") if value is None else value
 
     return GraphRun(
-        links=links,
+        links=len(edges),
+        connected=algebraic_connectivity(inverters, edges) > NOT_CONNECTED,
         settled=Settling(
             t_f_s=at["t_f_s"],
             t_share_s=at["t_share_s"],

@@ -121,8 +121,9 @@ class Work:
         found = topology.study(self.seed, note, jobs=self.jobs)
 
         from scenarios.results.plots.graphs import topologies  # matplotlib takes longer to import than a case to run
+        from scenarios.results.plots.saving import save
 
-        topologies(found.graphs).savefig(folder / part.pictures[0].file, format="png")
+        save(topologies(found.graphs), folder, Path(part.pictures[0].file).stem)
         return found, {}, None, folder
 
     def _banks(self, part: Part, tell: Tell) -> _Done:
@@ -133,17 +134,19 @@ class Work:
             tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.time.end_s)
 
         runs = banks.study(scenario, folder, note, self.jobs)
-        bars: dict[str, dict[tuple[str, str], float]] = {"the paper": {}}
+        paper: dict[tuple[str, str], float] = {}
+        ours: dict[str, dict[tuple[str, str], float]] = {}
         for one in runs:
             for event in banks.EVENTS:
                 cell = paper_cell("islanding", one.case, event, "MQSI")
                 assert cell is not None
-                bars["the paper"][one.case, event] = cell.paper
-                bars.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
+                paper[one.case, event] = cell.paper
+                ours.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
 
         from scenarios.results.plots.banks import var_sharing  # as above
+        from scenarios.results.plots.saving import save
 
-        var_sharing(bars, banks.CASES, banks.EVENTS).savefig(folder / part.pictures[0].file, format="png")
+        save(var_sharing(paper, ours, banks.CASES, banks.EVENTS), folder, Path(part.pictures[0].file).stem)
         told = [{"variant": one.variant, "case": one.case, "MQSI": dict(one.MQSI)} for one in runs]
         return Findings(results={}), {}, told, folder
 

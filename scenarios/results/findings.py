@@ -41,6 +41,8 @@ class GraphRun:
 
     links: int
     """Links of the graph."""
+    connected: bool
+    """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
     settled: Settling
     steady: Steady
 

@@ -21,10 +21,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results.history import Floats
-from scenarios.results.plots import PAGE, case_style
+from scenarios.results.plots import PAGE, case_style, save
 from scenarios.sweep.choice import Choice, choose, values
 from scenarios.sweep.statistics import Spread, spread_of
-from scenarios.sweep.words import label_of
+from scenarios.sweep.words import LEAST, label_of
 
 BINS = 12
 """Groups of equally many runs that a parameter drawn at random is cut into for its median."""
@@ -76,18 +76,18 @@ def _curves(choice: Choice, window: str, x: str) -> Figure:
             panel.set_title(f"never in {sum(never)} of {choice.runs} runs", loc="right", fontsize=7, pad=3)
         _name_axis(panel, choice, x)
         panel.set_ylabel(label_of(index))
-        _frame(panel)
+        _frame(panel, index)
     _legend(figure, panels[0], choice)
-    figure.suptitle(f"{window}: median and range over all other parameters", fontsize=10)
+    figure.suptitle(f"after {window}: median and range over all other parameters", fontsize=10)
     return figure
 
 
 def _curve(panel: Axes, spread: Spread, case: str, number: int, at: Sequence[Any], y: Floats) -> None:
     """Median and range of one case over a number, with a point per run where the number was drawn."""
-    colour, dashes, width = case_style(case, number)
+    colour, dashes = case_style(case, number)
     median = np.where(np.isfinite(spread.median), spread.median, np.nan)
     panel.fill_between(spread.x, spread.low, spread.high, color=colour, alpha=0.18, linewidth=0)
-    panel.plot(spread.x, median, linestyle=dashes, color=colour, lw=width, marker="o", ms=3.5, label=f"case {case}")
+    panel.plot(spread.x, median, linestyle=dashes, color=colour, lw=1.8, marker="o", ms=3.5, label=f"case {case}")
     if spread.binned:
         shown = np.isfinite(y)
         panel.plot(np.asarray(at, float)[shown], y[shown], ".", color=colour, ms=2.5, alpha=0.5)
@@ -118,7 +118,10 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
             if here := cells.get((a, b)):
                 medians[i, j] = spread_of([0] * len(here), z[here], BINS).median[0]
         masked = np.ma.masked_invalid(medians)
-        mesh = panel.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap="cividis")
+        low, high = _colours(masked, index)
+        mesh = panel.pcolormesh(
+            np.arange(len(xs) + 1), np.arange(len(ys) + 1), masked, cmap="cividis", vmin=low, vmax=high
+        )
         panel.patch.set(hatch="////", edgecolor=_NEVER)
         figure.colorbar(mesh, ax=panel, label=label_of(index))
         for axis, positions, label in ((panel.xaxis, xs, x), (panel.yaxis, ys, y)):
@@ -129,8 +132,19 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
         panel.tick_params(axis="x", rotation=45)
         panel.grid(visible=False)
     hatched = "; hatched: never, or broke, in half of the runs or more"
-    figure.suptitle(f"{window}, case {case}: medians over all other parameters{hatched}", fontsize=10)
+    figure.suptitle(f"after {window}, case {case}: medians over all other parameters{hatched}", fontsize=10)
     return figure
+
+
+def _colours(medians: Any, index: str) -> tuple[float, float]:
+    """Ends of the scale of colours: those of the values, but so far apart that rounding has one colour."""
+    least = LEAST.get(index, 0.0)
+    if not medians.count():
+        return 0.0, least or 1.0
+    low, high = float(medians.min()), float(medians.max())
+    if high - low >= least:
+        return low, high
+    return max(0.0, low - 0.5 * least), max(0.0, low - 0.5 * least) + least
 
 
 def _page(indexes: Sequence[str]) -> tuple[Figure, list[Axes]]:
@@ -153,9 +167,9 @@ def _name_axis(panel: Axes, choice: Choice, x: str) -> None:
             panel.set_xticks(sorted(set(numbers)))
 
 
-def _frame(panel: Axes) -> None:
-    """All indexes are magnitudes: their axes begin at 0."""
-    panel.set_ylim(bottom=0.0)
+def _frame(panel: Axes, index: str) -> None:
+    """Let the axis of an index begin at 0, as all are magnitudes, and be long enough that rounding is no structure."""
+    panel.set_ylim(bottom=0.0, top=max(panel.get_ylim()[1], LEAST.get(index, 0.0)))
 
 
 def _legend(figure: Figure, panel: Axes, choice: Choice) -> None:
@@ -169,9 +183,5 @@ def _short(value: Any) -> str:
 
 
 def _save(figure: Figure, folder: Path, name: str) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{''.join(c if c.isalnum() or c in '._-' else '_' for c in name)}.png"
-    partial = path.with_name(f".{path.name}")
-    figure.savefig(partial, format="png")
-    partial.replace(path)
-    return path
+    (file,) = save(figure, folder, "".join(c if c.isalnum() or c in "._-" else "_" for c in name))
+    return file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenarios.spec.loading import CATALOGUE
 from scenarios.sweep.choice import choose, values
-from scenarios.sweep.plots import draw_all
+from scenarios.sweep.plots import _curves, _heat_maps, draw_all
 from scenarios.sweep.statistics import spread_of
 from scenarios.sweep.table import FATE
+from scenarios.sweep.words import label_of
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:
@@ -63,6 +66,32 @@ def test_a_sweep_of_which_nothing_ran_is_drawn_too(tmp_path: Path) -> None:
     assert draw_all(bare, tmp_path) == ()
     assert len(draw_all(table(grid, MPSI=column, t_restore_s=column), tmp_path)) == 1
     assert len(draw_all(table({"a": [1, 2, 3, 4]}, MPSI=column, t_restore_s=column), tmp_path)) == 1
+
+
+def test_axes_say_what_is_varied_in_words_with_units_and_no_key_of_the_file() -> None:
+    """Every key of the catalogue's sweeps but a list of entries has words; time, gain and delay have their unit."""
+    tables = [tomllib.loads(path.read_text(encoding="utf-8")) for path in (CATALOGUE / "sweeps").glob("*.toml")]
+    keys = {key for sweep in tables for part in ("grid", "zip") for key in sweep.get(part, {})}
+
+    assert len(keys) > 5
+    assert not [key for key in keys - {"link"} if key in label_of(key)]
+    assert label_of("gains.k_p") == "gain of P_set, k_p (s)"
+    assert label_of("handling.T_age_s") == "T_age of [handling] (s)"
+    assert label_of("plant.gfl.T_pf") == "T_pf of [plant.gfl] (s)"
+
+
+def test_rounding_is_not_drawn_as_structure() -> None:
+    """What differs by 1e-16 lies flat at the foot of an axis, and has one colour in a map; 0.1 of MPSI is seen."""
+    noise = [1e-16 * number for number in range(4)]
+    swept = choose(table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
+    flat, seen = _curves(swept, "event1", "a").axes[:2]
+    mapped = choose(table({"a": [1, 1, 2, 2], "b": [1, 2, 1, 2]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
+    plain, told = (axes.collections[0] for axes in _heat_maps(mapped, "event1", "a", "b", "IV").axes[:2])
+
+    assert flat.get_ylim() == (0.0, 0.01)
+    assert seen.get_ylim()[1] > 0.1
+    assert plain.get_clim() == (0.0, 0.01)
+    assert told.get_clim() == (0.0, 0.1)
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | st.floats(0.0, 9.0)), min_size=1, max_size=30))

@@ -26,7 +26,7 @@ def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
 
 def connected(found: Findings) -> tuple[GraphRun, ...]:
     """Runs on connected graphs."""
-    return tuple(run for run in found.graphs if run.links >= TREE)
+    return tuple(run for run in found.graphs if run.connected)
 
 
 def _falls(found: Findings) -> tuple[bool, str]:

@@ -14,6 +14,7 @@ from scenarios.results.plots.available import available_power
 from scenarios.results.plots.cases import MPSI, MQSI, frequency, overview, single, voltage
 from scenarios.results.plots.inverters import plug_and_play, powers
 from scenarios.results.plots.islands import microgrids
+from scenarios.results.plots.saving import save
 from scenarios.results.plots.style import CASE_STYLES, OTHER_STYLES, PAGE, case_style
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "microgrids",
     "overview",
     "plug_and_play",
+    "save",
 ]
 
 
@@ -73,11 +75,5 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
     with mpl.rc_context(PAGE):
-        for name, make in figures_of(drawing).items():
-            unfinished, file = folder / f".{name}.png", folder / f"{name}.png"
-            make().savefig(unfinished, format="png")
-            unfinished.replace(file)
-            files.append(file)
-    return tuple(files)
+        return tuple(file for name, make in figures_of(drawing).items() for file in save(make(), folder, name))

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.cases import frequency
-from scenarios.results.plots.style import PAGE, case_style, columns, mark_events, note_above, time_axis
+from scenarios.results.plots.style import PAGE, case_styles, columns, mark_events, note_above, time_axis
 
 LOST = 0.3
 """Distance from nominal (Hz) at which a frequency that does not come back leaves the frame."""
@@ -24,8 +24,9 @@ def available_power(drawing: Drawing) -> Figure:
         figure = Figure(figsize=(7.4, 4.8), layout="constrained")
         grid = figure.subplots(2, 2, sharex=True)
         top, beside, below, last = grid.flat
-        for number, (case, history) in enumerate(drawing.histories.items()):
-            colour, dashes, width = case_style(case, number)
+        styles = case_styles(drawing.histories)
+        for case, history in drawing.histories.items():
+            colour, dashes, width = styles[case]
             share = history.P / drawing.plates.s
             ahead = history.P_set[:, at] / drawing.plates.s[at] - share[:, at]
             for panel, y in ((top, share[:, at]), (beside, share[:, others].mean(axis=1)), (last, ahead)):

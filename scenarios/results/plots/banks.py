@@ -9,38 +9,44 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from scenarios.results.plots.style import PAGE
+from scenarios.results.tolerances import MQSI_FACTOR
 
-_COLOURS = ("#000000", "#0072b2", "#56b4e9", "#009e73", "#e69f00")
-_HATCHES = ("", "", "//", "..", "xx")
+_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
+_MARKERS = "os^D"
 
-Bars = Mapping[str, Mapping[tuple[str, str], float]]
-"""MQSI of each variant, by case and event."""
+Values = Mapping[tuple[str, str], float]
+"""MQSI by case and event."""
 
 
-def var_sharing(bars: Bars, cases: Sequence[str], events: Sequence[str]) -> Figure:
-    """One group of bars for each case, one panel for each event; the first variant is the paper."""
+def var_sharing(paper: Values, ours: Mapping[str, Values], cases: Sequence[str], events: Sequence[str]) -> Figure:
+    """A mark for each variant of ours beside the paper's line, one panel for each event.
+
+    The axis is one of logarithms, as MQSI is 100 times smaller in case IV than in case II; marks stand on it instead of
+    bars, which would have no foot there.
+    """
     with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(7.4, 3.4), layout="constrained")
-        panels = figure.subplots(1, len(events), sharey=True)
-        x, width = np.arange(len(cases)), 0.8 / len(bars)
+        figure = Figure(figsize=(7.4, 3.6), layout="constrained")
+        (panels,) = figure.subplots(1, len(events), sharey=True, squeeze=False)
         for panel, event in zip(panels, events, strict=True):
-            for number, (variant, values) in enumerate(bars.items()):
+            for x, case in enumerate(cases):
+                number = paper[case, event]
+                ends = np.array([number / MQSI_FACTOR.value, number * MQSI_FACTOR.value])
+                panel.fill_between([x - 0.42, x + 0.42], *ends, color="#000000", alpha=0.10, lw=0)
+                panel.hlines(number, x - 0.42, x + 0.42, color="#000000", lw=1.6)
+            for number, (variant, values) in enumerate(ours.items()):
+                at = np.arange(len(cases)) + (number - 0.5 * (len(ours) - 1)) * 0.18
                 heights = [values[case, event] for case in cases]
-                at = x + (number - 0.5 * (len(bars) - 1)) * width
-                panel.bar(
-                    at,
-                    heights,
-                    width,
-                    label=variant,
-                    color=_COLOURS[number % 5],
-                    hatch=_HATCHES[number % 5],
-                    edgecolor="#ffffff",
-                    linewidth=0.4,
-                )
-            panel.set_xticks(x, [f"case {case}" for case in cases])
+                marks = {"marker": _MARKERS[number % 4], "color": _COLOURS[number % 4]}
+                panel.plot(at, heights, lw=0, ms=6, mec="#ffffff", mew=0.5, label=variant, **marks)
+            panel.set_yscale("log")
+            panel.set_xticks(range(len(cases)), [f"case {case}" for case in cases])
             panel.set_title(f"Var sharing after {event}", loc="left")
+            panel.yaxis.set_major_formatter("{x:g}")
             panel.grid(visible=False, axis="x")
         panels[0].set_ylabel("MQSI")
         handles, labels = panels[0].get_legend_handles_labels()
+        band = panels[0].collections[0]
+        line = panels[0].collections[1]
+        handles, labels = [line, band, *handles], ["the paper", f"a factor of {MQSI_FACTOR.value:g} of it", *labels]
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure

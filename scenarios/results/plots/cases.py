@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import Quantity, worst
-from scenarios.results.plots.style import PAGE, case_style, columns, from_zero, mark_events, time_axis, words
+from scenarios.results.plots.style import PAGE, case_styles, columns, from_zero, mark_events, time_axis, words
 
 
 def overview(drawing: Drawing) -> Figure:
@@ -83,8 +83,9 @@ def _of(drawing: Drawing, whole: str, each: str) -> str:
 
 def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> None:
     """One curve per case; the later ones lie on top."""
-    for number, (case, history) in enumerate(drawing.histories.items()):
-        colour, dashes, width = case_style(case, number)
+    styles = case_styles(drawing.histories)
+    for case, history in drawing.histories.items():
+        colour, dashes, width = styles[case]
         label = words(drawing, case)
         axes.plot(
             history.t, quantity(history, drawing.plates), color=colour, linestyle=dashes, linewidth=width, label=label

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import part_of
-from scenarios.results.plots.style import OTHER_STYLES, PAGE, mark_events, time_axis
+from scenarios.results.plots.style import OTHER_STYLES, PAGE, mark_events, time_axis, widths
 
 
 def microgrids(drawing: Drawing, case: str) -> Figure:
@@ -16,9 +16,10 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         grid = figure.subplots(2, 2, sharex=True)
+        width = widths(len(drawing.islands))
         for number, (name, members) in enumerate(drawing.islands.items()):
             history, plates = part_of(drawing.histories[case], drawing.plates, members)
-            colour, dashes, width = OTHER_STYLES[number % len(OTHER_STYLES)]
+            colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
             values = (
                 history.P.sum(axis=1) / 1e3,
                 history.Q.sum(axis=1) / 1e3,
@@ -27,12 +28,12 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
             )
             label = drawing.island_titles.get(name, f"island of {name}")
             for panel, y in zip(grid.flat, values, strict=True):
-                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width, label=label)
+                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
         words = (
             ("Real power", "P in total (kW)"),
             ("Reactive power", "Q in total (kvar)"),
-            ("Frequency", "mean of the GFM, f (Hz)"),
-            ("Voltage", "mean of all inverters, V (pu)"),
+            ("Frequency", "mean of its GFM, f (Hz)"),
+            ("Voltage", "mean of its inverters, V (pu)"),
         )
         for panel, (title, label) in zip(grid.flat, words, strict=True):
             panel.set_title(title, loc="left")

@@ -6,7 +6,7 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -15,39 +15,42 @@ from matplotlib.axes import Axes
 from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats, History, Plates
 
+Look = tuple[str, Any]
+"""Colour and dash pattern."""
+
 Style = tuple[str, Any, float]
-"""Colour, dash pattern and line width."""
+"""Colour, dash pattern and line width (pt)."""
 
-CASE_STYLES: dict[str, Style] = {
-    "I": ("#7a7a7a", "-", 1.8),
-    "II": ("#d55e00", "-", 2.0),
-    "III": ("#009e73", "--", 1.6),
-    "IV": ("#0072b2", "-", 2.0),
-    "full": ("#0072b2", "-", 2.2),
-    "untuned": ("#e69f00", "--", 1.6),
-    "reduced": ("#d55e00", "-", 1.6),
-    "adaptive": ("#000000", (0, (4, 1)), 1.2),
-    "link-failure": ("#009e73", (0, (1, 1)), 1.8),
-    "350kW": ("#0072b2", "-", 2.0),
-    "275kW": ("#440154", "-", 1.6),
-    "250kW": ("#31688e", "--", 1.6),
-    "225kW": ("#21918c", "-.", 1.6),
-    "200kW": ("#8fbc3f", "-", 1.6),
-    "175kW": ("#d55e00", ":", 2.0),
-    "none": ("#d55e00", "-", 2.0),
-    "clamp": ("#0072b2", "-", 2.2),
-    "conditional": ("#000000", (0, (1, 3)), 1.6),
+CASE_STYLES: dict[str, Look] = {
+    "I": ("#7a7a7a", "-"),
+    "II": ("#d55e00", "-"),
+    "III": ("#009e73", "--"),
+    "IV": ("#0072b2", "-"),
+    "full": ("#0072b2", "-"),
+    "untuned": ("#e69f00", "-"),
+    "reduced": ("#d55e00", "-"),
+    "adaptive": ("#000000", (0, (4, 2))),
+    "link-failure": ("#56d6ae", (0, (2, 2))),
+    "350kW": ("#0072b2", "-"),
+    "275kW": ("#440154", "-"),
+    "250kW": ("#31688e", "-"),
+    "225kW": ("#21918c", "-"),
+    "200kW": ("#8fbc3f", "-"),
+    "175kW": ("#d55e00", ":"),
+    "none": ("#d55e00", "-"),
+    "clamp": ("#0072b2", "-"),
+    "conditional": ("#000000", (0, (1, 3))),
 }
-"""Styles of the paper's cases. The full graph under full coordination is always blue. III is dashed and thinner: where
-it lies upon II, both are seen. Less and less available power goes from dark to light, after the palette viridis."""
+"""Styles of the paper's cases. The full graph under full coordination is always blue. Less and less available power
+goes from dark to light, after the palette viridis."""
 
-OTHER_STYLES: tuple[Style, ...] = (
-    ("#0072b2", "-", 1.8),
-    ("#d55e00", "-", 1.8),
-    ("#009e73", "--", 1.8),
-    ("#cc79a7", "-.", 1.8),
-    ("#e69f00", "-", 1.8),
-    ("#56b4e9", "--", 1.8),
+OTHER_STYLES: tuple[Look, ...] = (
+    ("#0072b2", "-"),
+    ("#d55e00", "-"),
+    ("#009e73", "--"),
+    ("#cc79a7", "-."),
+    ("#e69f00", "-"),
+    ("#56b4e9", "--"),
 )
 """Styles of other cases, and of inverters, in turn."""
 
@@ -76,7 +79,7 @@ PAGE: Any = {
 """Layout of every figure."""
 
 
-def case_style(case: str, number: int) -> Style:
+def case_style(case: str, number: int) -> Look:
     """Style of a case: fixed for the paper's four, else in turn.
 
     Examples
@@ -85,6 +88,29 @@ def case_style(case: str, number: int) -> Style:
     (True, True)
     """
     return CASE_STYLES.get(case, OTHER_STYLES[number % len(OTHER_STYLES)])
+
+
+def case_styles(cases: Iterable[str]) -> dict[str, Style]:
+    """Styles of cases that are drawn one on top of the other: where curves coincide, all of them are seen.
+
+    Examples
+    --------
+    >>> [width for _, _, width in case_styles(["I", "II", "III", "IV"]).values()]
+    [3.0, 2.5, 2.0, 1.5]
+    """
+    names = list(cases)
+    return {
+        case: (*case_style(case, number), width)
+        for number, (case, width) in enumerate(zip(names, widths(len(names)), strict=True))
+    }
+
+
+def widths(count: int) -> list[float]:
+    """Widths (pt) of curves that are drawn one on top of the other, the lowest first."""
+    if count < 2:
+        return [2.0] * count
+    step = min(0.5, 1.8 / (count - 1))
+    return [1.5 + step * above for above in reversed(range(count))]
 
 
 def from_zero(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:

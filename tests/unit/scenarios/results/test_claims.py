@@ -142,6 +142,7 @@ def over_graphs(**times: float | None) -> Findings:
         runs.append(
             GraphRun(
                 links=n,
+                connected=n >= 8,
                 settled=Settling(t_f_s=t, t_share_s=t, f_swing_Hz=0.0, V_swing_pu=0.0),
                 steady=Steady(f_error_Hz=0.0, MPSI=shared, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
             )

@@ -1,6 +1,7 @@
 """Figures: that they are made, that a case looks the same in all of them, that nothing warns."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,17 @@ import pytest
 from matplotlib.image import imread
 
 from plant.tables import read_feeder
+from scenarios.results.findings import GraphRun
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import Spell
-from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, overview
+from scenarios.results.metrics import Steady
+from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
+from scenarios.results.plots.banks import var_sharing
+from scenarios.results.plots.graphs import topologies
 from scenarios.results.plots.inverters import powers
+from scenarios.results.plots.saving import Format, save
+from scenarios.results.settling import Settling
+from scenarios.spec import catalogue, load_scenario
 
 
 def drawing(*cases: str) -> Drawing:
@@ -63,6 +71,80 @@ def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
         assert colours == {"IV: made up": CASE_STYLES["IV"][0], "II: made up": CASE_STYLES["II"][0]}
     assert len({CASE_STYLES[case][0] for case in ("I", "II", "III", "IV")}) == 4
     assert len({case_style("x", number) for number in range(6)}) == 6
+
+
+def catalogue_cases() -> list[list[str]]:
+    """Cases of every scenario of the catalogue that are drawn in one figure."""
+    return [list(load_scenario(name)[0].cases) for name in catalogue()]
+
+
+@pytest.mark.parametrize("cases", [*catalogue_cases(), ["a", "b", "c", "d", "e", "f"]], ids=" ".join)
+def test_no_curve_hides_another_that_it_lies_upon(cases: list[str]) -> None:
+    """Where all cases coincide, each is seen: every later curve is narrower than those below it."""
+    page = overview(drawing(*cases))
+
+    for axes in page.axes:
+        drawn = [line for line in axes.get_lines() if line.get_label().split(":")[0] in cases]
+        assert [line.get_label().split(":")[0] for line in drawn] == cases
+        for below, above in pairwise(drawn):
+            assert above.get_linewidth() <= below.get_linewidth() - 0.2
+            assert above.get_color() != below.get_color()
+
+
+def test_a_microgrid_is_no_mean_of_all_inverters() -> None:
+    """Its frequency and voltage are means of its own inverters, and the axes say so."""
+    islands = {"inv1": ("inv1", "inv2", "inv3"), "inv4": ("inv4", "inv5", "inv6")}
+    page = microgrids(replace(drawing("IV"), islands=islands), "IV")
+
+    assert [axes.get_ylabel() for axes in page.axes[2:]] == ["mean of its GFM, f (Hz)", "mean of its inverters, V (pu)"]
+
+
+def graph_run(links: int, t: float | None, *, connected: bool) -> GraphRun:
+    """One run over a graph."""
+    return GraphRun(
+        links=links,
+        connected=connected,
+        settled=Settling(t_f_s=t, t_share_s=t, f_swing_Hz=0.0, V_swing_pu=0.0),
+        steady=Steady(f_error_Hz=0.0, MPSI=1e-5 if connected else 0.1, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
+    )
+
+
+def test_graphs_in_parts_are_not_drawn_as_connected_ones() -> None:
+    """Also with links enough for a tree: they have a mark of their own, are named, and are not in the median."""
+    runs = [graph_run(8, 1.0, connected=True), graph_run(9, 0.8, connected=True), graph_run(9, None, connected=False)]
+    page = topologies(runs)
+    left, right = page.axes
+
+    marks = {line.get_marker(): list(line.get_xdata()) for line in right.get_lines() if line.get_marker() in "ox"}
+    assert marks == {"o": [8, 9], "x": [9]}
+    median = next(line for line in left.get_lines() if line.get_linewidth() == 2.0)
+    assert list(median.get_ydata()) == [1.0, 0.8]
+    assert "a graph in parts" in [text.get_text() for text in page.legends[0].get_texts()]
+    assert "never" in [text.get_text() for text in left.texts]
+
+
+def test_small_and_large_var_sharing_are_both_seen() -> None:
+    """MQSI goes from 0.01 to 4: on an axis of logarithms each number has its place, and the paper's has its line."""
+    values = {("I", "event1"): 4.0, ("IV", "event1"): 0.01}
+    (panel,) = var_sharing(values, {"ours": values, "moved": values}, ("I", "IV"), ("event1",)).axes
+
+    assert panel.get_yscale() == "log"
+    low, high = panel.get_ylim()
+    assert low < 0.01 < 4.0 < high
+    assert np.log(0.01 / low) / np.log(high / low) > 0.05
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+def test_a_figure_has_the_same_bytes_each_time_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: Format
+) -> None:
+    """No date, no random name: a folder of figures can be compared byte by byte."""
+    (first,) = save(overview(drawing("I", "IV")), tmp_path / "first", "overview", [kind])
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1")  # what matplotlib takes for the time of writing, if it writes one
+    (second,) = save(overview(drawing("I", "IV")), tmp_path / "second", "overview", [kind])
+
+    assert first.read_bytes() == second.read_bytes()
+    assert [path.name for path in first.parent.iterdir()] == [f"overview.{kind}"]
 
 
 def test_every_axis_says_its_quantity_and_events_are_marked() -> None:
