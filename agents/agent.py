@@ -104,7 +104,7 @@ class Agent:
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"
-        self._takes_part = config.control.secondary == "all" or (config.control.secondary == "GFM" and self._leader)
+        self._takes_part = config.control.acts(config.name, config.kind)
         handling = config.control.handling
         self._worth = Worth(handling)
         self._silent_at_most = SPEAKS * (handling.max_age or (config.max_age if config.clock == "wall" else inf))

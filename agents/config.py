@@ -71,6 +71,9 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     more than the angles between inverters of one island ever swing. > 0."""
 
 
+Secondary = Literal["none", "GFM", "all"] | tuple[str, ...]
+"""Which inverters run the secondary law: a rule, or their names."""
+
 GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
 """How nameplates become neighbours; "links" takes the listed pairs."""
 
@@ -104,7 +107,7 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     IV: "all", graph "full".
     """
 
-    secondary: Literal["none", "GFM", "all"]
+    secondary: Secondary
     """Which inverters run the secondary law; the others keep their first set-points."""
     graph: GraphRule
     """Rule of the communication graph."""
@@ -118,6 +121,20 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """What becomes of bad links and of saturation."""
     law: LawChoice = LawChoice()
     """Control law."""
+
+    def acts(self, name: str, kind: str) -> bool:
+        """Whether an inverter runs the secondary law.
+
+        Examples
+        --------
+        >>> Control(secondary="GFM", graph="full").acts("inv1", "GFM")
+        True
+        >>> Control(secondary=("inv1", "inv2"), graph="full").acts("inv3", "GFM")
+        False
+        """
+        if isinstance(self.secondary, tuple):
+            return name in self.secondary
+        return self.secondary == "all" or (self.secondary == "GFM" and kind == "GFM")
 
 
 class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

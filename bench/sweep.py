@@ -26,7 +26,8 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.record import Recorder
-from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.changes import as_in
+from scenarios.spec.configs import configs
 from scenarios.sweep.file import Plan, Run, read_sweep
 from scenarios.sweep.folder import SweepFolder
 from scenarios.sweep.one import run_one
@@ -85,7 +86,7 @@ def loop(runs: Sequence[Run], folder: Path) -> float:
     began = perf_counter()
     for number, run in enumerate(runs):
         scenario = run.scenario
-        feeder = read_feeder(scenario.plant.feeder, scenario.plant.load_set)
+        feeder = as_in(scenario, read_feeder(scenario.plant.feeder, scenario.plant.load_set))
         plant, agents = configs(scenario, feeder, run.case)
         with Recorder(folder / str(number)) as recorder:
             outcome = run_inprocess(plant, agents, recorder)
@@ -93,7 +94,7 @@ def loop(runs: Sequence[Run], folder: Path) -> float:
             recorded = recorder.finish(scenario.time.end_s, plant.record_step)
         history = History.of(recorded.inverters, recorded.rows)
         for window in metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s):
-            metrics.measure(history, Plates.of(feeder.inverters), window, F_NOM)
+            metrics.measure(history, Plates.of(feeder.inverters), window, feeder.f_nom)
     return perf_counter() - began
 
 

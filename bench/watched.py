@@ -14,11 +14,11 @@ import numpy as np
 from msgspec.structs import replace
 from ping import STAMP, StampedInbox, stamp_of
 
+from plant.equipment import F_NOM
 from scenarios.drivers.children import Child, Children
 from scenarios.live.setup import Wishes, set_up
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import load_scenario
-from scenarios.spec.configs import F_NOM
 from wire.codec import decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys

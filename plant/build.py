@@ -6,6 +6,7 @@ from plant.config import PlantConfig
 from plant.feeder import Plant
 from plant.network import Network
 from plant.tables import read_feeder
+from plant.tables.changes import changed
 
 
 def build_plant(config: PlantConfig) -> Plant:
@@ -19,5 +20,6 @@ def build_plant(config: PlantConfig) -> Plant:
         If there is no operating point.
     """
     settings = config.settings
-    network = Network(read_feeder(settings.feeder, settings.load_set), spares=settings.spares)
+    feeder = changed(read_feeder(settings.feeder, settings.load_set), settings.changes)
+    network = Network(feeder, spares=settings.spares)
     return Plant(network, settings, config.T_c, config.record_step)

@@ -50,7 +50,7 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Upper bound of the internal voltage (pu)."""
     P_set_lim: float = 3.0
     """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
-    unloaded GFM stays below 62 Hz. GridLAB-D has no such bound."""
+    unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
     V_set_min: float = 0.8
     """Lower bound of V_set (pu)."""
     V_set_max: float = 1.2
@@ -123,7 +123,7 @@ class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """Of the angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE 1547-2018,
     Table 5)."""
     f: float = 0.0
-    """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1, likewise."""
+    """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1 at 60 Hz, likewise, in proportion at another nominal frequency."""
     V: float = 0.0
     """Of the voltage (pu of nominal); 0: 0.10, 0.05 or 0.03, likewise."""
     timeout: float = 10.0
@@ -137,10 +137,12 @@ class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Abnormal operating performance category whose default trip settings hold; "off": no inverter trips."""
     trips: dict[str, tuple[float, float]] = {}
     """Settings in place of the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
-    pu or in Hz at 60 Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }."""
+    pu or in Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }. The standard's own are for 60 Hz; at another
+    nominal frequency the defaults are in proportion."""
     enter_service: float = 5.0
-    """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz) must be normal before an inverter that
-    tripped comes back. The standard's default is 300 s, longer than a run."""
+    """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz, in proportion at another nominal
+    frequency) must be normal before an inverter that tripped comes back. The standard's default is 300 s, longer than
+    a run."""
 
 
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -176,6 +178,32 @@ class Move(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     action: Literal["leave", "die", "join"]
 
 
+class InverterChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What one inverter is otherwise than in the feeder's table; None is as there."""
+
+    m_p: float | None = None
+    """P-f droop (pu frequency per pu power)."""
+    m_q: float | None = None
+    """Q-V droop (pu voltage per pu reactive power)."""
+    P_rated: float | None = None
+    """Rated power (W)."""
+
+
+class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a scenario changes in the tables of its feeder."""
+
+    f_nom: float | None = None
+    """Nominal frequency (Hz); None is the feeder's."""
+    load_factor: float = 1.0
+    """Factor on all loads, real and reactive power."""
+    m_p_factor: float = 1.0
+    """Factor on the P-f droops of all inverters that have none of their own here."""
+    m_q_factor: float = 1.0
+    """Factor on the Q-V droops, likewise."""
+    inverters: dict[str, InverterChange] = {}
+    """By name."""
+
+
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything that decides the plant's numbers."""
 
@@ -197,6 +225,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     sync_check: SyncCheck = SyncCheck()
     limits: tuple[PowerLimit, ...] = ()
     """Available power that changes on schedule."""
+    changes: FeederChanges = FeederChanges()
+    """What the feeder has otherwise than in its tables."""
     spares: tuple[str, ...] = ()
     """Spare inverters that are there, switched off at the start."""
 

@@ -11,6 +11,10 @@ PHASES: tuple[Phase, ...] = ("A", "B", "C")
 """Order of the phases in every table and vector."""
 
 
+F_NOM = 60.0
+"""Nominal frequency (Hz) of a feeder whose data do not say another."""
+
+
 class Bus(msgspec.Struct, frozen=True, kw_only=True):
     """A place where things are connected; one node per phase."""
 
@@ -195,5 +199,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     inverters: tuple[InverterRow, ...]
     source: Source | None
     """The substation, or None in a feeder that only inverters feed."""
+    f_nom: float = F_NOM
+    """Nominal frequency (Hz), at which the impedances are given."""
     spares: tuple[InverterRow, ...] = ()
     """Inverters that are switched off until an agent comes for them; no part of a run with a fixed roster."""

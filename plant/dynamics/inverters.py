@@ -13,6 +13,7 @@ from plant.config import GflParameters, GfmParameters
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.reduction import Real
+from plant.equipment import F_NOM
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,8 @@ class Inverter:
     """Q-V droop (pu per pu)."""
     parameters: GfmParameters | GflParameters
     """Of its kind."""
+    f_nom: float = F_NOM
+    """Nominal frequency (Hz), base of its per-unit frequency; one for all inverters of a circuit."""
 
 
 class Inverters:
@@ -46,6 +49,8 @@ class Inverters:
 
     Attributes
     ----------
+    f_nom : float
+        Nominal frequency (Hz).
     forming : bool[n]
         Which are GFM.
     gfm, gfm_at, gfm_state
@@ -71,6 +76,7 @@ class Inverters:
     def __init__(self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None) -> None:
         n = len(units)
         self.units = units
+        self.f_nom = units[0].f_nom if units else F_NOM
         self.forming = np.array([unit.kind == "GFM" for unit in units], dtype=bool)
         self.gfm_at, self.gfl_at = np.flatnonzero(self.forming), np.flatnonzero(~self.forming)
         self.gfm = np.array([_pack(units[i]) for i in self.gfm_at.tolist()], gfm_model.PARAMETERS)
@@ -155,14 +161,14 @@ class Inverters:
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[~online] = 0.0
-        f = np.full(S.size, gfl_model.F_NOM)
+        f = np.full(S.size, self.f_nom)
         f[self.gfm_at] += np.where(online[self.gfm_at], self.gfm_state["w"], 0.0) / (2.0 * np.pi)
-        f[self.gfl_at] = np.where(online[self.gfl_at], self.gfl_state["f"], gfl_model.F_NOM)
+        f[self.gfl_at] = np.where(online[self.gfl_at], self.gfl_state["f"], self.f_nom)
         return np.column_stack([f, S.real, S.imag, np.mean(np.abs(self.V), axis=1)])
 
 
 def _pack(unit: Inverter) -> NDArray[np.void]:
     """Give one unit's record as its kind's compiled pass wants it."""
     if isinstance(unit.parameters, GfmParameters):
-        return gfm_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q)
-    return gfl_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q)
+        return gfm_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)
+    return gfl_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)

@@ -11,7 +11,6 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
-from plant.dynamics.kernel.gfl import F_NOM
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
@@ -135,6 +134,7 @@ class Dynamics:
             begin,
             steps,
             self.h,
+            units.f_nom,
             TOLERANCE * float(units.V_b.max(initial=1.0)),
             network.net,
             units.gfm,
@@ -173,13 +173,13 @@ class Dynamics:
         """Frequency (Hz) of an island: nominal at a source, else the mean over its GFM by rating; 0 if it is dead."""
         units, reduction = self.inverters, self.network.reduction
         if reduction.has_source[island]:
-            return F_NOM
+            return units.f_nom
         at = units.gfm_at
         here = reduction.online[at] & (reduction.inverter_island[at] == island)
         if not here.any():
             return 0.0
         speed = np.average(units.gfm_state["w"][here], weights=units.S_b[at][here])
-        return F_NOM + float(speed) / (2.0 * np.pi)
+        return units.f_nom + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
         """Present f (Hz), P (W), Q (var), V (V) from the last solution, n_inv x 4, before any step was taken."""

@@ -10,8 +10,6 @@ import numpy as np
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
-from plant.dynamics.kernel import gfl as gfl_model
-from plant.dynamics.kernel.arithmetic import OMEGA_0
 from plant.dynamics.live import LiveNetwork
 from plant.dynamics.phasors import PHASES, aligned_sum
 
@@ -103,9 +101,10 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
         return []
     speed = {i: _island_speed(units, network, i) for i in moved}
     units.connected[moved] = on
+    w_nom = 2.0 * np.pi * units.f_nom
     for i in moved if on else ():
         v = _mean_voltage(units, i)
-        units.set_points[i] = speed[i] / (units.m_p[i] * OMEGA_0), v if v > 0.1 else 1.0, 0.0
+        units.set_points[i] = speed[i] / (units.m_p[i] * w_nom), v if v > 0.1 else 1.0, 0.0
     trips = connect(units, network, network.circuit)
     for i, w in speed.items() if on else ():
         if units.forming[i]:
@@ -113,7 +112,7 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
         else:  # its PLL has found the island's frequency before the contactor closes
             follower = units.gfl_at == i
             units.gfl_state["w_i"][follower] = w
-            units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = gfl_model.F_NOM + w / (2.0 * np.pi)
+            units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
     return trips
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from plant.config import Protection
 from plant.dynamics import Dynamics
-from plant.dynamics.kernel.gfl import F_NOM
 from plant.feeder.protection import ATTEMPTS, Recovery, Relays
 
 Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]
@@ -59,8 +58,8 @@ class InService:
         self._wanted = np.array(wanted)
         self._joining: set[int] = set()
         """Whose agent has come, and who waits for others to start the island with."""
-        self._relays = Relays(settings, len(names), dynamics.h, F_NOM)
-        self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, F_NOM)
+        self._relays = Relays(settings, len(names), dynamics.h, dynamics.inverters.f_nom)
+        self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, dynamics.inverters.f_nom)
 
     def has_tripped(self, i: int) -> bool:
         """Whether an inverter is off because it tripped."""
@@ -116,7 +115,7 @@ class InService:
         trips = self._relays.watch(f, V_low, V_high, reduction.online)
         if self._recovery.tripped.any():
             leader = reduction.leader[reduction.inverter_island]
-            f = np.where(leader >= 0, f[:, leader], F_NOM)
+            f = np.where(leader >= 0, f[:, leader], self._dynamics.inverters.f_nom)
         self._recovery.watch(f, V_low, V_high, ~reduction.live[reduction.inverter_island])
         if trips:
             off = [trip.inverter for trip in trips]

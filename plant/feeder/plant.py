@@ -94,6 +94,7 @@ class Plant:
                     m_p=unit.m_p,
                     m_q=unit.m_q,
                     parameters=settings.gfm if unit.kind == "GFM" else settings.gfl,
+                    f_nom=network.feeder.f_nom,
                 )
                 for unit in network.inverters
             ),

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 F_BASE = 60.0
-"""Frequency (Hz) that the standard's frequency settings are written for; others are scaled."""
+"""Nominal frequency (Hz) for which the standard gives its settings; the defaults go in proportion to another one."""
 
 _FREQUENCY = {"OF2": (62.0, 0.16), "OF1": (61.2, 300.0), "UF1": (58.5, 300.0), "UF2": (56.5, 0.16)}
 
@@ -28,6 +28,21 @@ DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
     "III": {"OV2": (1.20, 0.16), "OV1": (1.10, 13.0), "UV1": (0.88, 21.0), "UV2": (0.50, 2.0)} | _FREQUENCY,
 }
 """Default trip settings, threshold (pu, or Hz at 60 Hz) and clearing time (s): IEEE 1547-2018, Tables 12, 13 and 18."""
+
+
+def defaults(category: str, f_nom: float) -> dict[str, tuple[float, float]]:
+    """Default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
+
+    Examples
+    --------
+    >>> defaults("III", 60.0)["OF2"], defaults("III", 50.0)["UF1"]
+    ((62.0, 0.16), (48.75, 300.0))
+    """
+    scale = f_nom / F_BASE
+    return {
+        name: (value * scale if name[1] == "F" else value, time) for name, (value, time) in DEFAULTS[category].items()
+    }
+
 
 V_ENTER = (0.917, 1.05)
 """Voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4."""
@@ -96,10 +111,9 @@ class Relays:
     """
 
     def __init__(self, settings: Protection, n: int, h: float, f_nom: float) -> None:
-        chosen = {} if settings.category == "off" else DEFAULTS[settings.category] | settings.trips
+        chosen = {} if settings.category == "off" else defaults(settings.category, f_nom) | settings.trips
         self.names = tuple(chosen)
-        scale = [f_nom / F_BASE if name[1] == "F" else 1.0 for name in chosen]
-        self.thresholds = np.array([value for value, _ in chosen.values()]) * np.array(scale)
+        self.thresholds = np.array([value for value, _ in chosen.values()])
         self.times = np.array([time for _, time in chosen.values()])
         self._need = np.maximum(1, np.round(self.times / h)).astype(np.int64)
         self._of = np.array([("f", "low", "high").index(_quantity(name)) for name in chosen], np.int64)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from plant.config import SyncCheck
 from plant.dynamics import Dynamics
+from plant.feeder.protection import F_BASE
 from plant.network import Network
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
@@ -84,8 +85,10 @@ class Window:
         return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
 
 
-def window_for(rating: float, check: SyncCheck) -> Window:
+def window_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Window:
     """Window of IEEE 1547-2018 Table 5 for an aggregate rating (VA); what `check` sets goes before.
+
+    The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
     Examples
     --------
@@ -95,7 +98,7 @@ def window_for(rating: float, check: SyncCheck) -> Window:
     'at most 5 deg, 0.1 Hz and 3 %'
     """
     f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
-    return Window(angle=check.angle or angle, f=check.f or f, V=check.V or V)
+    return Window(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)
 
 
 class Synchronism:
@@ -145,7 +148,7 @@ class Synchronism:
             angle=degrees(float(np.max(np.abs(np.angle(a * np.conj(b)))))),
             f=abs(f_1 - f_2),
             V=float(np.max(np.abs(np.abs(a) - np.abs(b)))),
-            window=window_for(min(rated), self._check),
+            window=window_for(min(rated), self._check, network.feeder.f_nom),
         )
 
     def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:

@@ -19,6 +19,7 @@ class Plausible(NamedTuple):
     """Highest value."""
 
 
+NOMINAL_FREQUENCY = Plausible("a nominal frequency", 16.0, 400.0)
 BUS_VOLTAGE = Plausible("a nominal voltage", 0.1, 150.0)
 LENGTH = Plausible("the length of a line", 0.1, 1e5)
 SELF_R = Plausible("the resistance of a line", 1e-3, 20.0)
@@ -46,6 +47,7 @@ _OTHER_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "kVA": ((1e-3, "VA"), (1e3, "MVA")),
     "kV": ((1e-3, "V"),),
     "m": ((1e3, "km"), (1e-3, "mm")),
+    "Hz": ((1e3, "kHz"), (1e-3, "mHz")),
     "ohm/km": ((1e-3, "ohm/1000 km"), (1e3, "ohm/m")),
     "pu": ((1e-2, "%"),),
     "%": ((1e2, "pu"),),

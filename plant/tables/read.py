@@ -7,6 +7,7 @@ from pathlib import Path
 from plant.equipment import Feeder
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
+from plant.tables.manifest import read_f_nom
 from plant.tables.shunts import LOAD_COLUMNS, read_capacitors, read_inverters, read_loads, read_source
 from wire.nearest import suggestion
 
@@ -106,6 +107,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     capacitors = read_capacitors(folder, buses, mistakes)
     inverters = read_inverters(folder, buses, loads, mistakes)
     source = read_source(folder, buses, mistakes)
+    f_nom = read_f_nom(folder, mistakes)
     found = Feeder(
         name=folder.name,
         load_set=load_set,
@@ -120,6 +122,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         inverters=tuple(row for row in inverters if not row.spare),
         spares=tuple(row for row in inverters if row.spare),
         source=source,
+        f_nom=f_nom,
     )
     if not mistakes and found.buses:
         # After other mistakes this would only repeat them: a misnamed end leaves the right bus unconnected.

@@ -12,7 +12,6 @@ from scenarios.predict.model import Loop, Ticks
 from scenarios.predict.times import sharing_index
 from scenarios.results.history import Floats
 from scenarios.results.settling import Settling
-from scenarios.spec.configs import F_NOM
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),
@@ -81,7 +80,7 @@ def predicted(told: Told, case: str, length: float) -> tuple[Floats, tuple[Float
     loop = Loop(fleet=without(fleet, cut) if expires else fleet, ticks=ticks)
     nominal = load.load_pu * float(fleet.weight @ fleet.m_p)
     path = loop.run(round(length / fleet.T_c), load.start_pu * fleet.m_p, nominal, islanding=load.islanding)
-    return path.t, (F_NOM * (1.0 + path.e), sharing_index(path, fleet.weight))
+    return path.t, (told.feeder.f_nom * (1.0 + path.e), sharing_index(path, fleet.weight))
 
 
 def groups_of(told: Told, case: str) -> dict[str, str]:
@@ -95,12 +94,12 @@ def _table(told: Told, start: float, event: float, end: float) -> Table:
     rows: list[list[Cell]] = []
     for case, rule in told.scenario.cases.items():
         t, after = told.t(case), told.settling(case, end, told.scenario.time.end_s)
-        apart = round(1e3 * (told.mean(told.f(case), case, end) - F_NOM), 1) + 0.0  # no -0
+        apart = round(1e3 * (told.mean(told.f(case), case, end) - told.feeder.f_nom), 1) + 0.0  # no -0
         said: tuple[float, float] | tuple[str, str] = ("", "")
         if rule.netem.partitions:
             _, (f, MPSI) = predicted(told, case, end - event)
-            said = round(1e3 * (float(f[-1]) - F_NOM), 1), round(float(MPSI[-1]), 3)
-        largest = 1e3 * float(np.abs(told.f(case)[t > end] - F_NOM).max())
+            said = round(1e3 * (float(f[-1]) - told.feeder.f_nom), 1), round(float(MPSI[-1]), 3)
+        largest = 1e3 * float(np.abs(told.f(case)[t > end] - told.feeder.f_nom).max())
         shared = told.mean(told.MPSI(case), case, end)
         rows.append([rule.title, said[0], apart, said[1], round(shared, 3), *_back(after), round(largest, 1)])
     columns = (

@@ -21,6 +21,7 @@ from scenarios.predict.times import LoadStep
 from scenarios.predict.var_response import VarResponse, var_response
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
+from scenarios.spec.changes import as_in
 
 Row = Mapping[str, Any]
 """Columns of one run."""
@@ -82,7 +83,7 @@ class Swept:
     @cached_property
     def feeder(self) -> Feeder:
         """The feeder."""
-        return read_feeder(self.base.plant.feeder, self.base.plant.load_set)
+        return as_in(self.base, read_feeder(self.base.plant.feeder, self.base.plant.load_set))
 
     @cached_property
     def calm(self) -> Scenario:

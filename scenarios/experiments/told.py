@@ -20,7 +20,7 @@ from scenarios.results.metrics import Window
 from scenarios.results.settling import Settling, settling
 from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
-from scenarios.spec.configs import F_NOM
+from scenarios.spec.agentless import without_agent
 from scenarios.spec.moves import inverters_of
 
 
@@ -38,17 +38,21 @@ class Told:
         """Nameplates in the order of the histories' columns."""
         return Plates.of(inverters_of(self.scenario, self.feeder))
 
+    def _plates_in(self, case: str) -> Plates:
+        """The same without those that have no agent in a case, where sharing is meant."""
+        return self.plates.without(without_agent(self.scenario, case))
+
     def f(self, case: str) -> Floats:
         """Frequency (Hz), mean of the GFM."""
         return metrics.mean_frequency(self.histories[case], self.plates)
 
     def MPSI(self, case: str) -> Floats:
         """Mean power sharing index, (16)."""
-        return metrics.MPSI(self.histories[case], self.plates)
+        return metrics.MPSI(self.histories[case], self._plates_in(case))
 
     def MQSI(self, case: str) -> Floats:
         """Mean var sharing index, (17)."""
-        return metrics.MQSI(self.histories[case], self.plates)
+        return metrics.MQSI(self.histories[case], self._plates_in(case))
 
     def t(self, case: str) -> Floats:
         """Time of the rows (s)."""
@@ -56,7 +60,9 @@ class Told:
 
     def settling(self, case: str, start: float, end: float) -> Settling:
         """How a case settled from a time to another (s)."""
-        return settling(self.histories[case], self.plates, Window(label="", start=start, end=end), F_NOM)
+        return settling(
+            self.histories[case], self._plates_in(case), Window(label="", start=start, end=end), self.feeder.f_nom
+        )
 
     def mean(self, x: Floats, case: str, end: float) -> float:
         """Mean (of what x is) over the 0.2 s before a time (s), as steady values are measured."""
@@ -85,5 +91,7 @@ def without(fleet: Fleet, links: set[tuple[str, str]]) -> Fleet:
     A = np.array(fleet.A)
     for src, dst in links:
         A[fleet.names.index(dst), fleet.names.index(src)] = 0.0
-    fields = {name: getattr(fleet, name) for name in ("GFM", "acts", "s", "m_p", "m_q", "gains", "T_c", "gfm", "gfl")}
+    fields = {
+        name: getattr(fleet, name) for name in ("GFM", "acts", "s", "m_p", "m_q", "gains", "f_nom", "T_c", "gfm", "gfl")
+    }
     return Fleet(names=fleet.names, A=A, **fields)

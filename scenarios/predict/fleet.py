@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from agents.config import Control, Gains
 from agents.topology import adjacency
 from plant.config import GflParameters, GfmParameters
-from plant.equipment import Feeder
+from plant.equipment import F_NOM, Feeder, InverterRow
 from scenarios.results.history import Flags, Floats
 from scenarios.spec import Scenario
+from scenarios.spec.agentless import without_agent
 from scenarios.spec.moves import inverters_of
 
 
@@ -47,6 +48,8 @@ class Fleet:
     """Q-V droops (pu per pu); 0.05, if left out."""
     gains: Gains = field(default_factory=Gains)
     """Of the law; its limits are not part of a linear model."""
+    f_nom: float = F_NOM
+    """Nominal frequency (Hz)."""
     T_c: float = 0.02
     """Control period (s)."""
     gfm: GfmParameters = field(default_factory=GfmParameters)
@@ -104,6 +107,7 @@ class Fleet:
             names=tuple(self.names[i] for i in at.tolist()),
             A=self.A[np.ix_(at, at)],
             gains=self.gains,
+            f_nom=self.f_nom,
             T_c=self.T_c,
             gfm=self.gfm,
             gfl=self.gfl,
@@ -147,19 +151,28 @@ def fleet_of(
     control = Control(
         secondary=rule.secondary, graph=rule.graph, links=rule.links, without=rule.without, gains=rule.gains
     )
+    without = without_agent(scenario, case)
     GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
-    everybody = np.full(len(rows), rule.secondary == "all")
     fleet = Fleet(
         names=tuple(rows),
         GFM=GFM,
-        A=np.array(adjacency(control, rows)).reshape(len(rows), len(rows)),
-        acts=GFM if rule.secondary == "GFM" else everybody,
+        A=_adjacency(control, rows, without),
+        acts=np.array([control.acts(name, row.kind) and name not in without for name, row in rows.items()], bool),
         s=np.array([row.P_rated for row in rows.values()]),
         m_p=np.array([row.m_p for row in rows.values()]),
         m_q=np.array([row.m_q for row in rows.values()]),
         gains=rule.gains,
+        f_nom=feeder.f_nom,
         T_c=scenario.time.T_c_s,
         gfm=scenario.plant.gfm,
         gfl=scenario.plant.gfl,
     )
     return fleet if island is None else fleet.part(np.array([name in island for name in rows], bool))
+
+
+def _adjacency(control: Control, rows: Mapping[str, InverterRow], without: Collection[str]) -> Floats:
+    """Adjacency of all inverters; those without an agent have no link."""
+    A = np.zeros((len(rows), len(rows)))
+    at = [i for i, name in enumerate(rows) if name not in without]
+    A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))
+    return A

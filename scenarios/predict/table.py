@@ -125,7 +125,7 @@ def _event(step: IslandStep, island: Fleet, *, whole: bool) -> list[str]:
 def _sentence(times: Times) -> str:
     if times.report_s is not None:
         return (
-            f"restored in {times.report_s:.2f} s (abs(f - 60) < 0.01 Hz for good in {times.restore_s:.2f} s, "
+            f"restored in {times.report_s:.2f} s (abs(f - f_nom) < 0.01 Hz for good in {times.restore_s:.2f} s, "
             f"MPSI < 0.01 in {times.share_s:.2f} s)"
         )
     if times.restore_s is not None:

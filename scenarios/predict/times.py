@@ -20,7 +20,6 @@ from scenarios.predict.model import Link, Loop, Path, Ticks
 from scenarios.predict.response import PlantModel
 from scenarios.results.history import Flags, Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND
-from scenarios.spec.configs import F_NOM
 
 Key = TypeVar("Key")
 
@@ -155,7 +154,7 @@ def predicted_times(
     nominal = step.load_pu * float(weight @ case.m_p)
     start = np.where([name in step.joining for name in case.names], 0.0, step.start_pu * case.m_p)
     path = loop.run(count, start, nominal, islanding=step.islanding)
-    restore = _for_good(path.t, np.abs(path.e) * F_NOM < F_BAND)
+    restore = _for_good(path.t, np.abs(path.e) * case.f_nom < F_BAND)
     share = _for_good(path.t, sharing_index(path, weight) < MPSI_BAND)
     short = _beyond_limits(case, path)
     if short:

@@ -9,7 +9,7 @@ from plant.equipment import Feeder
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import Spell, islands_of, spells_of
 from scenarios.spec import Scenario
-from scenarios.spec.configs import F_NOM
+from scenarios.spec.agentless import without_agent
 from scenarios.spec.limits import limits_of
 from scenarios.spec.moves import inverters_of
 
@@ -28,6 +28,8 @@ class Drawing:
     """Label and time (s) of each event."""
     f_nom: float
     """Nominal frequency (Hz)."""
+    without_agent: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Inverters that have no agent, by case: the sharing indices leave them out."""
     moves: bool = False
     """Whether inverters leave or join, which has a figure of its own."""
     limited: Sequence[str] = ()
@@ -38,6 +40,10 @@ class Drawing:
     """A few words on each island."""
     spells: Sequence[Spell] = ()
     """When there are several islands; figures of all cases then show the worst."""
+
+    def plates_in(self, case: str) -> Plates:
+        """Nameplates as they count in a case."""
+        return self.plates.without(self.without_agent.get(case, frozenset()))
 
 
 def drawing_of(
@@ -57,7 +63,8 @@ def drawing_of(
         titles={case: rule.title for case, rule in scenario.cases.items()},
         plates=plates,
         events=events,
-        f_nom=F_NOM,
+        f_nom=feeder.f_nom,
+        without_agent={case: without_agent(scenario, case) for case in scenario.cases},
         moves=any(event.leave or event.join for event in scenario.events),
         limited=tuple(limited),
         islands=most if len(most) > 1 else {},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from plant.equipment import Feeder
+from plant.equipment import F_NOM, Feeder
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import islands_of, part_of
@@ -13,7 +13,7 @@ from scenarios.results.metrics import Steady, Window
 from scenarios.results.paper_tables import Cell
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
-from scenarios.spec.configs import F_NOM
+from scenarios.spec.agentless import without_agent
 from scenarios.spec.limits import limits_of
 
 Results = Mapping[str, Mapping[str, Steady]]
@@ -24,15 +24,15 @@ SHARED = ("MPSI", "MQSI", "t_restore_s")
 """Measures that mean nothing over several islands at once."""
 
 
-def label(measure: str) -> str:
-    """Name of a measure for people.
+def label(measure: str, f_nom: float = F_NOM) -> str:
+    """Name of a measure for people, at a nominal frequency (Hz).
 
     Examples
     --------
-    >>> label("f_error_Hz"), label("MPSI")
-    ('abs(f-60)', 'MPSI')
+    >>> label("f_error_Hz"), label("MPSI"), label("f_error_Hz", 50.0)
+    ('abs(f-60)', 'MPSI', 'abs(f-50)')
     """
-    return {"f_error_Hz": "abs(f-60)", "p": "P"}.get(measure, measure)
+    return {"f_error_Hz": f"abs(f-{f_nom:g})", "p": "P"}.get(measure, measure)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +53,8 @@ class Findings:
 
     results: Results
     """Steady values by case and event."""
+    f_nom: float = F_NOM
+    """Nominal frequency (Hz)."""
     P_set0: float = float("nan")
     """First P_set of every inverter (pu)."""
     GFL: tuple[str, ...] = ()
@@ -63,6 +65,8 @@ class Findings:
     """Steady values of each island, by case, event and the island's first inverter; only where there are several."""
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
+    without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
     graphs: tuple[GraphRun, ...] = ()
     """Runs over random graphs."""
 
@@ -96,7 +100,7 @@ class Findings:
                 parts = {f", island of {name}": steady for name, steady in apart.items()}
                 for where, steady in (parts or {"": self.results[case][event]}).items():
                     found += [
-                        f"case {case}, {event}{where}: {label(name)} {steady.reasons[name]}"
+                        f"case {case}, {event}{where}: {label(name, self.f_nom)} {steady.reasons[name]}"
                         for name in measures
                         if name in steady.reasons
                     ]
@@ -149,21 +153,25 @@ def find_in(
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     where = islands_of(scenario, feeder)
+    everybody = plates
     for case, whole in histories.items():
+        plates = everybody.without(without_agent(scenario, case))
         results[case], settled[case], islands[case] = {}, {}, {}
         within = whole.until(scenario.time.end_s)
         for window in windows[case]:
             history = within if window.end <= scenario.time.end_s else whole
-            results[case][window.label] = metrics.measure(history, plates, window, F_NOM)
-            settled[case][window.label] = settling(history, plates, window, F_NOM)
+            results[case][window.label] = metrics.measure(history, plates, window, feeder.f_nom)
+            settled[case][window.label] = settling(history, plates, window, feeder.f_nom)
             if len(where[window.label]) > 1:
                 islands[case][window.label] = {
-                    name: metrics.measure(*part_of(history, plates, members), window, F_NOM)
+                    name: metrics.measure(*part_of(history, plates, members), window, feeder.f_nom)
                     for name, members in where[window.label].items()
                 }
+    plates = everybody
     rating = dict(zip(plates.names, plates.s.tolist(), strict=True))
     return Findings(
         results=results,
+        f_nom=feeder.f_nom,
         P_set0=scenario.plant.P_set0_pu,
         GFL=tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM),
         settled=settled,
@@ -171,5 +179,10 @@ def find_in(
         available={
             case: {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
             for case in histories
+        },
+        without_agent={
+            case: tuple(name for name in plates.names if name in without)
+            for case in histories
+            if (without := without_agent(scenario, case))
         },
     )

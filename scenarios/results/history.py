@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,16 @@ class Plates:
     """P-f droop (pu per pu)."""
     m_q: Floats
     """Q-V droop (pu per pu)."""
+    shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """Which count in the sharing indices: those that have an agent. All, if left out."""
+
+    def __post_init__(self) -> None:
+        if not self.shares.size:
+            object.__setattr__(self, "shares", np.ones(len(self.names), bool))
+
+    def without(self, names: Collection[str]) -> Plates:
+        """The same with some inverters left out of the sharing indices, as they have no agent."""
+        return replace(self, shares=np.array([name not in names for name in self.names], bool)) if names else self
 
     @classmethod
     def of(cls, inverters: Sequence[InverterRow]) -> Plates:

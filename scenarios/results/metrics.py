@@ -1,4 +1,4 @@
-"""The paper's measures of a run: abs(f - 60), MPSI (16), MQSI (17), V_error, and the time to restore.
+"""The paper's measures of a run: abs(f - f_nom), MPSI (16), MQSI (17), V_error, and the time to restore.
 
 Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end; where
 they are not steady, or no numbers, a reason stands beside them.
@@ -153,12 +153,12 @@ def f_in_band(history: History, plates: Plates, f_nom: float) -> Flags:
 
 def MPSI(history: History, plates: Plates) -> Floats:
     """Mean power sharing index of each row, (16)."""
-    return sharing_index(history.P, plates.s, plates.m_p, history.present)
+    return sharing_index(history.P, plates.s, plates.m_p, history.present & plates.shares)
 
 
 def MQSI(history: History, plates: Plates) -> Floats:
     """Mean var sharing index of each row, (17)."""
-    return sharing_index(history.Q, plates.s, plates.m_q, history.present)
+    return sharing_index(history.Q, plates.s, plates.m_q, history.present & plates.shares)
 
 
 def V_error(history: History, plates: Plates) -> Floats:
@@ -207,7 +207,9 @@ def _reasons(
 ) -> dict[str, str]:
     """Why measures are no steady values, by name."""
     present, forming = history.present, plates.GFM
+    sharing_now = present & plates.shares
     dead = "de-energised: no inverter is on the network"
+    nobody = dead if plates.shares.all() else "nothing shared: no inverter with an agent is on the network"
     leaderless = "no grid-forming inverter is on the network" if forming.any() else "there is no grid-forming inverter"
     names = np.array(plates.names)
     found = {
@@ -218,9 +220,9 @@ def _reasons(
             f"no leader: {leaderless}",
             tuple(names[forming]) if forming.sum() > 1 else (),
         ),
-        "MPSI": _idle(history.P, plates, ends, present) or reason("MPSI", sharing, ends, dead),
+        "MPSI": _idle(history.P, plates, ends, sharing_now) or reason("MPSI", sharing, ends, nobody),
         "V_error": reason("V_error", voltage, ends, dead),
-        "MQSI": _idle(history.Q, plates, ends, present) or reason("MQSI", vars_, ends, dead),
+        "MQSI": _idle(history.Q, plates, ends, sharing_now) or reason("MQSI", vars_, ends, nobody),
         "p": reason("p", history.P / plates.s, ends, dead, plates.names),
     }
     return {name: text for name, text in found.items() if text}

@@ -73,6 +73,8 @@ def metrics_json(
             cases[case][label].get("reasons", {}).pop("MPSI", None)
             cases[case][label].get("reasons", {}).pop("MQSI", None)
             cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
+        if case in found.without_agent:
+            cases[case]["without_agent"] = list(found.without_agent[case])
         cases[case]["history_sha256"] = sha256[case]
         if case in links_sha256:
             cases[case]["links_sha256"] = links_sha256[case]

@@ -19,6 +19,18 @@ HEADINGS: dict[Quantity, str] = {
 }
 """Heading of a column, with the unit."""
 
+
+def heading(quantity: Quantity, f_nom: float) -> str:
+    """Heading of a column of a run whose nominal frequency (Hz) need not be the paper's.
+
+    Examples
+    --------
+    >>> heading("f_error_Hz", 50.0), heading("MPSI", 50.0)
+    ('abs(f-50) Hz', 'MPSI')
+    """
+    return f"abs(f-{f_nom:g}) Hz" if quantity == "f_error_Hz" else HEADINGS[quantity]
+
+
 UNITS: dict[Quantity, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": ""}
 """Unit as it follows a number."""
 

@@ -14,7 +14,7 @@ from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
-from scenarios.spec.model import Case, Event, PlantTable, Processes, Scenario, Time, key_of
+from scenarios.spec.model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time, key_of
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
@@ -26,6 +26,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("Top of the file", Scenario),
     ("[time]", Time),
     ("[plant]", PlantTable),
+    ("[plant.inverter.NAME]", InverterTable),
     ("[plant.gfm]", GfmParameters),
     ("[plant.gfl]", GflParameters),
     ("[plant.sync_check]", SyncCheck),

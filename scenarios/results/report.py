@@ -14,7 +14,7 @@ from scenarios.results.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.headline import headline, numbers
 from scenarios.results.metrics import Steady
-from scenarios.results.paper_tables import DIGITS, HEADINGS, UNITS, paper_cell, tables_of
+from scenarios.results.paper_tables import DIGITS, UNITS, heading, paper_cell, tables_of
 from scenarios.results.steadiness import STEADY
 from scenarios.results.tolerances import Quantity
 
@@ -76,7 +76,7 @@ def plain(report: Report) -> str:
             lines.append(f"{verdict.status:7}  {verdict.claim.text:{width}}  {verdict.found}")
             lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
         blocks.append("\n".join([*lines, *_summary(report)]))
-    blocks += [f"NOTE  {note}" for note in report.notes]
+    blocks += [f"NOTE  {note}" for note in _all_notes(report)]
     blocks.append(f"Results: {report.folder}")
     return "\n\n".join(blocks) + "\n"
 
@@ -88,8 +88,8 @@ def show(report: Report, console: Console) -> None:
         return
     for grid in grids(report):
         table = Table(title=grid.title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
-        for number, heading in enumerate(grid.header):
-            table.add_column(escape(heading), justify="left" if number == 0 else "right", vertical="bottom")
+        for number, column in enumerate(grid.header):
+            table.add_column(escape(column), justify="left" if number == 0 else "right", vertical="bottom")
         for row in grid.rows:
             table.add_row(*(f"[red]{escape(cell)}[/red]" if cell.endswith("!") else escape(cell) for cell in row))
         console.print(table)
@@ -105,9 +105,19 @@ def show(report: Report, console: Console) -> None:
             console.print(f"{'':7}  [dim]{escape(verdict.claim.known_miss)}[/dim]", highlight=False)
     if report.verdicts:
         console.print(escape("\n".join(_summary(report))), "\n", highlight=False)
-    for note in report.notes:
+    for note in _all_notes(report):
         console.print(f"[yellow]NOTE[/yellow]  {escape(note)}", highlight=False)
     console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
+
+
+def _all_notes(report: Report) -> list[str]:
+    """Notes of a report, after what its sharing indices leave out."""
+    agentless = [
+        f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
+        f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
+        for case, names in report.found.without_agent.items()
+    ]
+    return [*agentless, *report.notes]
 
 
 def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
@@ -116,7 +126,7 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
     timed = quantities[0] == "f_error_Hz"
     header = ["case"]
     for event in events:
-        header += [f"{event}\n{HEADINGS[quantity]}" for quantity in quantities]
+        header += [f"{event}\n{heading(quantity, report.found.f_nom)}" for quantity in quantities]
         header += [f"{event}\nrestored in"] if timed else []
     rows = []
     for case, steady in results.items():
@@ -197,7 +207,9 @@ def _reasons(report: Report, quantities: tuple[Quantity, ...]) -> list[str]:
                         continue
                     mean = getattr(values, name)
                     last = "" if math.isnan(mean) else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
-                    lines.append(f"case {case}, {event}{where}: {label(name)} {values.reasons[name]}{last}")
+                    lines.append(
+                        f"case {case}, {event}{where}: {label(name, report.found.f_nom)} {values.reasons[name]}{last}"
+                    )
     return lines
 
 

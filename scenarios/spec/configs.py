@@ -7,20 +7,19 @@ from typing import Literal
 from agents.config import MAX_AGE, AgentConfig, Control
 from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
+from scenarios.spec.agentless import with_agent
+from scenarios.spec.changes import changes_of
 from scenarios.spec.law import law_of
 from scenarios.spec.limits import limits_of
 from scenarios.spec.model import Event, Scenario
 from scenarios.spec.moves import inverters_of, moves_of
 from scenarios.spec.netem import deaths_of, is_calm, netem_of, setup_of
 
-F_NOM = 60.0
-"""Nominal frequency (Hz) of every feeder that gridpeers knows."""
-
 
 def configs(
     scenario: Scenario, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of the plant and of every inverter's agent for one case, those that join later last.
+    """Configurations of the plant and of every agent for one case, those that join later last.
 
     Parameters
     ----------
@@ -45,7 +44,7 @@ def configs(
     run = f"{scenario.name}-{case}"
     endpoints = (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
-    inverters = inverters_of(scenario, feeder)
+    inverters, present = inverters_of(scenario, feeder), with_agent(scenario, feeder, case)
     netem = netem_of(scenario, case)
     links = "" if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_text()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
@@ -72,9 +71,10 @@ def configs(
             events=_switch_events(scenario),
             sync_check=scenario.plant.sync_check,
             limits=limits_of(scenario, case),
+            changes=changes_of(scenario),
             spares=tuple(row.name for row in inverters if row.spare),
         ),
-        agents=tuple(row.name for row in feeder.inverters),
+        agents=tuple(row.name for row in present if not row.spare),
         moves=(*moves_of(scenario), *(() if real_nodes else deaths_of(netem))),
         T_c=time.T_c_s,
         end=time.end_s,
@@ -92,7 +92,7 @@ def configs(
             microgrid=row.microgrid,
             P_rated=row.P_rated,
             V_nom=row.V_nom,
-            f_nom=F_NOM,
+            f_nom=feeder.f_nom,
             m_p=row.m_p,
             m_q=row.m_q,
             T_c=time.T_c_s,
@@ -102,7 +102,7 @@ def configs(
             links=links,
             clock_rate=rates.get(row.name, 1.0),
         )
-        for row in inverters
+        for row in present
     )
     return plant, agents
 

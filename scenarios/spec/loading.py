@@ -10,9 +10,11 @@ from typing import Any
 
 import msgspec
 
-from plant.equipment import Feeder
+from plant.equipment import F_NOM, Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
+from scenarios.spec.agentless import check_agentless
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
+from scenarios.spec.changes import as_in, check_changes
 from scenarios.spec.checks import (
     check_cases,
     check_events,
@@ -119,15 +121,17 @@ def check_tables(
     check_times(scenario, mistakes)
     check_step(scenario, mistakes)
     check_names(scenario, mistakes)
-    check_protection(scenario, mistakes)
     scenario = with_law_folders(scenario, path.parent)
     check_laws(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
+    check_protection(scenario, feeder.f_nom if feeder else F_NOM, mistakes)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
     check_events(scenario, mistakes)
     check_netem(scenario, feeder, mistakes)
     if feeder:
+        check_changes(scenario, feeder, mistakes)
+        check_agentless(scenario, feeder, mistakes)
         check_switches(scenario, feeder, mistakes)
         check_moves(scenario, feeder, mistakes)
         check_limits(scenario, feeder, mistakes)
@@ -179,7 +183,7 @@ def _feeder_of(scenario: Scenario, mistakes: Mistakes, read_feeder: ReadFeeder) 
     if not feeder.inverters:
         mistakes.add("plant.feeder", f'feeder "{feeder.name}" has no inverters, so there is nothing to control')
         return None
-    return feeder
+    return as_in(scenario, feeder)
 
 
 def _note(mistake: str, feeder: str, mistakes: Mistakes) -> str:

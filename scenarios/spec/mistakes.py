@@ -65,6 +65,10 @@ class Mistakes:
         """Whether a mistake was noted at one of these keys, which makes a check that relates them idle."""
         return any(path in self._paths for path in paths)
 
+    def below(self, path: str) -> bool:
+        """Whether a mistake was noted anywhere in a table."""
+        return any(noted.startswith(f"{path}.") for noted in self._paths)
+
     @property
     def any(self) -> bool:
         """Whether anything was noted."""

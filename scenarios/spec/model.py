@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from agents.config import Gains, GraphRule, Handling
+from agents.config import Gains, GraphRule, Handling, Secondary
 from netem.spec.netem import Netem
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 
@@ -31,6 +31,20 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Distance of the rows in history.csv (s): a multiple of h_s that divides T_c_s."""
 
 
+class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table `[plant.inverter.NAME]`: what one inverter is otherwise than in the feeder's table.
+
+    It is taken as it stands: the factors of `[plant]` do not act on it.
+    """
+
+    m_p_pu: float | None = None
+    """P-f droop (pu frequency per pu power)."""
+    m_q_pu: float | None = None
+    """Q-V droop (pu voltage per pu reactive power)."""
+    P_rated_kW: float | None = None
+    """Rated power (kW), the base of its per-unit values."""
+
+
 class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[plant]`: the feeder, its loads, and where the inverters start."""
 
@@ -42,6 +56,17 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """First P_set of every inverter (pu of its rating)."""
     V_set0_pu: float = 1.0
     """First V_set of every inverter (pu of its nominal voltage)."""
+    f_nom_Hz: float | None = None
+    """Nominal frequency (Hz); without it the feeder's. At another one than the feeder's its equipment stays, and its
+    reactances go with the frequency (plant/data/README.md)."""
+    load_factor: float = 1.0
+    """Factor on all loads of the feeder, real and reactive power."""
+    m_p_factor: float = 1.0
+    """Factor on the P-f droops of all inverters."""
+    m_q_factor: float = 1.0
+    """Factor on the Q-V droops of all inverters."""
+    inverter: dict[str, InverterTable] = {}
+    """Tables `[plant.inverter.NAME]`: what single inverters are otherwise than in the feeder's table."""
     gfm: GfmParameters = GfmParameters()
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
     gfl: GflParameters = GflParameters()
@@ -78,14 +103,17 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     title: str = ""
     """A few words for tables and plots."""
-    secondary: Literal["none", "GFM", "all"]
-    """Which inverters run the secondary law (12)-(15); the others keep their first set-points."""
+    secondary: Secondary
+    """Which inverters run the secondary law (12)-(15): "none", "GFM", "all", or a list, e.g. ["inv1", "inv4"]. The
+    others keep their first set-points, and whoever listens to them by the graph hears these."""
     graph: GraphRule
     """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", or "links" as listed."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
     without: tuple[tuple[str, str], ...] = ()
     """Undirected links that are missing from what the graph has, e.g. [["inv4", "inv7"]]."""
+    without_agent: tuple[str, ...] = ()
+    """Inverters that have no agent in this case, beside those that have none in any."""
     P_max_kW: dict[str, dict[str, float]] = {}
     """What inverters have available from an event on (kW), in this case only and in place of what the event says, by
     the event's label: { clouds = { inv2 = 225 } }."""
@@ -119,6 +147,9 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""
+    without_agent: tuple[str, ...] = ()
+    """Inverters that have no agent, in every case, e.g. ["inv2"]: the plant runs them on primary droop at their first
+    set-points, nobody hears of them, and the sharing indices leave them out."""
     time: Time
     """Table `[time]`."""
     plant: PlantTable = PlantTable()

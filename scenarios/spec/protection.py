@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plant.feeder.protection import DEFAULTS, F_BASE
+from plant.feeder.protection import DEFAULTS, defaults
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from wire.nearest import suggestion
@@ -13,7 +13,7 @@ LONGEST = 3600.0
 """Longest clearing time (s)."""
 
 
-def check_protection(scenario: Scenario, mistakes: Mistakes) -> None:
+def check_protection(scenario: Scenario, f_nom: float, mistakes: Mistakes) -> None:
     """Settings are of functions that there are, on the right side of nominal, each second stage beyond its first."""
     given = scenario.protection.trips
     if mistakes.touch("protection", PATH):
@@ -23,7 +23,7 @@ def check_protection(scenario: Scenario, mistakes: Mistakes) -> None:
         if name not in names:
             mistakes.add(PATH, f'no trip function "{name}"; {suggestion(name, names, "functions")}')
             continue
-        nominal, unit = (F_BASE, "Hz") if name[1] == "F" else (1.0, "pu")
+        nominal, unit = (f_nom, "Hz") if name[1] == "F" else (1.0, "pu")
         low, high = (nominal, 2.0 * nominal) if name[0] == "O" else (0.0, nominal)
         if not low < threshold < high:
             mistakes.add(PATH, f"{name} must be between {low:g} and {high:g} {unit}, got {threshold:g} {unit}")
@@ -31,7 +31,7 @@ def check_protection(scenario: Scenario, mistakes: Mistakes) -> None:
             mistakes.add(PATH, f"{name}: the clearing time must be above 0 and at most {LONGEST:g} s, got {time:g} s")
     if mistakes.touch(PATH) or scenario.protection.category == "off":
         return
-    in_force = DEFAULTS[scenario.protection.category] | given
+    in_force = defaults(scenario.protection.category, f_nom) | given
     for kind in ("OV", "UV", "OF", "UF"):
         (first, _), (second, _) = in_force[f"{kind}1"], in_force[f"{kind}2"]
         if second < first if kind[0] == "O" else second > first:

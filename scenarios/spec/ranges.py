@@ -5,7 +5,7 @@ from __future__ import annotations
 from agents.config import Gains, Handling
 from netem.plausible import Range
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
-from scenarios.spec.model import UNIT_OF_KEY, Event, PlantTable, Processes, Scenario, Time
+from scenarios.spec.model import UNIT_OF_KEY, Event, InverterTable, PlantTable, Processes, Scenario, Time
 
 RANGES: dict[tuple[type, str], Range] = {
     (Scenario, "seed"): Range("a seed", "", 0, 2**63 - 1),
@@ -14,6 +14,13 @@ RANGES: dict[tuple[type, str], Range] = {
     (Time, "h_s"): Range("an integration step", "s", 1e-5, 0.02, above_zero=True),
     (Time, "record_s"): Range("the distance of recorded rows", "s", 1e-5, 2.0, above_zero=True),
     (PlantTable, "P_set0_pu"): Range("a power set-point", "pu", 0.0, 1.2),
+    (PlantTable, "f_nom_Hz"): Range("a nominal frequency", "Hz", 16.0, 400.0),
+    (PlantTable, "load_factor"): Range("a factor on the loads", "", 0.0, 10.0),
+    (PlantTable, "m_p_factor"): Range("a factor on droops", "", 0.01, 100.0),
+    (PlantTable, "m_q_factor"): Range("a factor on droops", "", 0.01, 100.0),
+    (InverterTable, "m_p_pu"): Range("a P-f droop", "pu", 0.001, 0.2),
+    (InverterTable, "m_q_pu"): Range("a Q-V droop", "pu", 0.001, 0.5),
+    (InverterTable, "P_rated_kW"): Range("a rating", "kW", 0.1, 1e6),
     (PlantTable, "V_set0_pu"): Range("a voltage set-point", "pu", 0.8, 1.2, above_zero=True),
     (Protection, "enter_service"): Range("the delay of entering service", "s", 0.01, 3600.0, above_zero=True),
     (Event, "t_s"): Range("the time of an event", "s", 0.0, 3600.0, above_zero=True),

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from agents.config import Secondary
 from netem.mistakes import shown
 from netem.plausible import number_in, objection
 from netem.spec.netem import Netem
@@ -102,6 +103,8 @@ def _value(
             return {name: _struct(inner[1], item, f"{path}.{name}", mistakes, bases) for name, item in raw.items()}
         mistakes.add(path, f"must be written as tables [{path}.NAME], got {shown(raw)}")
         return {}
+    if kind == float | None:  # TOML has no null: a key that is written is a number
+        kind = float
     try:
         value = msgspec.convert(raw, kind)
     except msgspec.ValidationError:
@@ -153,6 +156,11 @@ def _tables() -> dict[str, type]:
 
 
 def _wrong_type(kind: Any, raw: Any) -> str:
+    if kind == Secondary:
+        rules = typing.get_args(kind)[0]
+        if isinstance(raw, str):
+            return f'{_wrong_type(rules, raw)}; or name inverters in a list such as ["inv1", "inv4"]'
+        return f'must be {_named(rules)} or a list such as ["inv1", "inv4"], got {shown(raw)}'
     if typing.get_origin(kind) is typing.Literal:
         options = [option or '""' for option in typing.get_args(kind)]
         if isinstance(raw, str):
@@ -172,6 +180,8 @@ def _expected(field: msgspec.structs.FieldInfo) -> str:
 
 def _named(kind: Any) -> str:
     """Name a type for people."""
+    if kind == Secondary:
+        return f'{_named(typing.get_args(kind)[0])} or a list such as ["inv1", "inv4"]'
     if kind is float:
         return "a number"
     if kind is int:
@@ -194,6 +204,8 @@ def _named(kind: Any) -> str:
 
 def _placeholder(kind: Any) -> Any:
     """Something of a type to go on with after a mistake; nobody sees it."""
+    if kind == Secondary:
+        kind = typing.get_args(kind)[0]
     if typing.get_origin(kind) is typing.Literal:
         return typing.get_args(kind)[0]
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):

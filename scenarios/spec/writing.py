@@ -58,7 +58,7 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
         elif isinstance(value, dict) and any(isinstance(item, msgspec.Struct) for item in value.values()):
             for name, item in value.items():
                 below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", common)]
-        elif value or not isinstance(value, tuple | dict):
+        elif value is not None and (value or not isinstance(value, tuple | dict)):
             yield f"{key} = {_inline(value)}"
     yield from below
 

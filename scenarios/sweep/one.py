@@ -30,7 +30,9 @@ from scenarios.results.moves import as_they_came
 from scenarios.results.record import Tape
 from scenarios.results.settling import settling
 from scenarios.spec import Scenario
-from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.agentless import without_agent
+from scenarios.spec.changes import as_in
+from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
 from scenarios.sweep.blas import one_thread
 
@@ -77,7 +79,7 @@ def run_one(number: int, scenario: Scenario, case: str) -> Done:
 
 
 def _run(number: int, scenario: Scenario, case: str) -> Done:
-    feeder = _feeder(scenario.plant.feeder, scenario.plant.load_set)
+    feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     tape = Tape()
     links = LinkRecord()
@@ -86,11 +88,11 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
         return Done(number=number, status="broke", why=outcome.broke)
     recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
     history = History.of(recorded.inverters, recorded.rows)
-    plates = Plates.of(inverters_of(scenario, feeder))
+    plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}
     with np.errstate(all="ignore"):  # what is no number is told as such
         for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
-            steady, settled = (of(history, plates, window, F_NOM) for of in (metrics.measure, settling))
+            steady, settled = (of(history, plates, window, feeder.f_nom) for of in (metrics.measure, settling))
             numbers = asdict(steady) | asdict(settled)
             reasons = numbers.pop("reasons")
             measures |= flat(window.label, numbers | {"steady": float(not reasons)})

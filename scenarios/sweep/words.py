@@ -14,7 +14,7 @@ from scenarios.spec.model import Scenario
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
 WORDS = {
-    "f_error_Hz": "settled abs(f - 60 Hz) (Hz)",
+    "f_error_Hz": "settled abs(f - f_nom) (Hz)",
     "MPSI": "settled power sharing index, MPSI",
     "V_error": "settled mean abs(V - 1) (pu)",
     "MQSI": "settled var sharing index, MQSI",

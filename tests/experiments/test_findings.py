@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from netem.spec.fault import Fault
+from plant.equipment import F_NOM
 from scenarios.experiments.partition import predicted
 from scenarios.predict.times import predicted_times
 from scenarios.predict.var_response import var_growth
-from scenarios.spec.configs import F_NOM
 from tests.experiments.runs import ALL, measured, theory, told
 
 

@@ -159,7 +159,7 @@ def test_the_current_reference_is_clipped() -> None:
 def test_a_diverging_current_controller_is_refused(wrong: GflParameters) -> None:
     """Row 23: gains whose one-pass feedback grows on a stiff bus are refused with the ratio and the remedy."""
     with pytest.raises(ValueError, match=r"must be below 1, got 1\.\d\d"):
-        gfl.pack(wrong, S_B, V_B, 0.01, 0.05)
+        gfl.pack(wrong, S_B, V_B, 0.01, 0.05, 60.0)
 
 
 def test_the_refused_gains_do_diverge() -> None:

@@ -26,7 +26,7 @@ def settled(y: Series, end: float, within: float, h: float) -> float:
 
 def test_bases() -> None:
     """Row 1: 200 kVA at 277.1363 V has 1.15207 ohm, and the autotest's filter 0.4507 - j5.2672 S."""
-    record = gfm.pack(GFM_A, S_B, V_B, 0.01, 0.05)
+    record = gfm.pack(GFM_A, S_B, V_B, 0.01, 0.05, 60.0)
 
     assert pytest.approx(240.56, rel=1e-4) == S_B / (3.0 * V_B)
     assert pytest.approx(1.15207, rel=1e-4) == Z_B

@@ -9,13 +9,13 @@ import numpy as np
 
 from agents.agent import Agent
 from plant.build import build_plant
-from plant.equipment import Feeder
+from plant.equipment import F_NOM, Feeder
 from plant.reporting import measurement_of
 from scenarios.predict.fleet import Fleet, fleet_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import Scenario, load_scenario
-from scenarios.spec.configs import F_NOM, configs
+from scenarios.spec.configs import configs
 from wire.messages import State
 
 N = tuple(f"inv{i}" for i in range(1, 10))

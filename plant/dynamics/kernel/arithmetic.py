@@ -9,8 +9,6 @@ from plant.dynamics.kernel.compiled import compiled
 
 A120 = complex(-0.5, 0.5 * np.sqrt(3.0))
 """a = exp(j 120 deg)."""
-OMEGA_0 = 2.0 * np.pi * 60.0
-"""Speed of the common frame (rad/s): nominal frequency."""
 
 
 @compiled

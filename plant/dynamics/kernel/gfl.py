@@ -12,17 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.config import GflParameters
-from plant.dynamics.kernel.arithmetic import A120, OMEGA_0, heun, sat
+from plant.dynamics.kernel.arithmetic import A120, heun, sat
 from plant.dynamics.kernel.compiled import compiled
-
-F_NOM = 60.0
-"""Nominal frequency (Hz)."""
 
 PARAMETERS = np.dtype(
     [
         ("S_b", "f8"),  # VA, three phases
         ("V_b", "f8"),  # V, line-to-neutral
         ("I_b", "f8"),  # A
+        ("f_nom", "f8"),  # Hz
+        ("w_nom", "f8"),  # rad/s, speed of the common frame
         ("y_f", "c16"),  # S, of one phase; 0 in the current-source form
         ("y_e", "c16"),  # S, filter admittance also in the current-source form (unused there)
         ("current_source", "b1"),
@@ -75,7 +74,7 @@ STATE = np.dtype(
 """States of a GFL and its PLL frequency."""
 
 
-def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> NDArray[np.void]:
+def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.kernel.gfm.pack`.
 
     Raises
@@ -94,11 +93,12 @@ def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> 
     y = 1.0 / (z_f * V_b**2 / (S_b / 3.0))
     record = np.zeros((), PARAMETERS)
     record["S_b"], record["V_b"], record["I_b"] = S_b, V_b, S_b / (3.0 * V_b)
+    record["f_nom"], record["w_nom"] = f_nom, 2.0 * np.pi * f_nom
     record["current_source"] = par.model == "current_source"
     record["y_e"] = y
     record["y_f"] = 0.0 if par.model == "current_source" else y
     record["R_p"], record["R_q"] = m_p, m_q
-    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[10:]):  # type: ignore[index]  # as in gfm
+    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[12:]):  # type: ignore[index]  # as in gfm
         record[name] = getattr(par, name)
     return record
 
@@ -132,7 +132,7 @@ def settle(
         e = (I / g["y_e"] + V) * turn / g["V_b"]
         c = e - u_dq - 1j * g["X_f"] * g["F_current"] * i_dq
     state["w_i"], state["theta"] = 0.0, theta
-    state["f_m"] = state["f"] = F_NOM
+    state["f_m"] = state["f"] = g["f_nom"]
     state["P_f"], state["V_m"], state["Q_f"] = S.real, v, S.imag
     for phase, name in enumerate("ABC"):
         state["cd_" + name], state["cq_" + name] = c[phase].real, c[phase].imag
@@ -145,8 +145,8 @@ def power_reference(g: Any, P_set: float, f_m: float) -> float:
     Outside the dead band the *full* deviation acts: the characteristic jumps at its edges.
     """
     P_d = P_set
-    if g.frequency_watt and not (F_NOM - g.db_UF < f_m < F_NOM + g.db_OF):
-        P_d += (F_NOM - f_m) / (F_NOM * g.R_p)
+    if g.frequency_watt and not (g.f_nom - g.db_UF < f_m < g.f_nom + g.db_OF):
+        P_d += (g.f_nom - f_m) / (g.f_nom * g.R_p)
     return sat(P_d, g.P_min, g.P_max)
 
 
@@ -229,7 +229,7 @@ def advance_gfl(
     x.w_i = heun(x0.w_i, d.w_i, dw, h, second)
     w = x.w_i + g.k_pPLL * u.imag
     x.theta = heun(x0.theta, d.theta, w, h, second)
-    x.f = (OMEGA_0 + w) / (2.0 * np.pi)
+    x.f = (g.w_nom + w) / (2.0 * np.pi)
 
     # 3 to 6: frequency filter, freq-watt, voltage filter, volt-var, each lag fed by this pass' value
     df = (x.f - x.f_m) / g.T_ff

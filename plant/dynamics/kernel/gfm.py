@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.config import GfmParameters
-from plant.dynamics.kernel.arithmetic import OMEGA_0, heun, sat
+from plant.dynamics.kernel.arithmetic import heun, sat
 from plant.dynamics.kernel.compiled import compiled
 
 PARAMETERS = np.dtype(
@@ -63,7 +63,7 @@ STATE = np.dtype(
 """States of a GFM and its two outputs."""
 
 
-def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> NDArray[np.void]:
+def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them.
 
     Parameters
@@ -78,12 +78,14 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float) -> 
         P-f droop (pu frequency per pu power).
     m_q
         Q-V droop (pu voltage per pu reactive power).
+    f_nom
+        Nominal frequency (Hz), base of m_p.
     """
     Z_b = V_b**2 / (S_b / 3.0)
     record = np.zeros((), PARAMETERS)
     record["S_b"], record["V_b"] = S_b, V_b
     record["y_f"] = 1.0 / (complex(par.R_f, par.X_f) * Z_b)
-    record["m_p"], record["m_q"] = m_p * OMEGA_0, m_q
+    record["m_p"], record["m_q"] = m_p * (2.0 * np.pi * f_nom), m_q
     for name in PARAMETERS.names[5:]:  # type: ignore[index]  # a structured dtype has names
         record[name] = getattr(par, name)
     return record

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.arithmetic import A120
 from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.gfl import F_NOM, advance_gfl
+from plant.dynamics.kernel.gfl import advance_gfl
 from plant.dynamics.kernel.gfm import advance_gfm
 from plant.dynamics.kernel.solve import solve_network
 
@@ -49,6 +49,7 @@ def run_steps(
     begin: int,
     steps: int,
     h: float,
+    f_nom: float,
     tolerance: float,
     net: Any,
     gfm: Any,
@@ -81,6 +82,8 @@ def run_steps(
         Network solution to begin with, two a step.
     steps, h
         Number of steps and their length (s).
+    f_nom
+        Nominal frequency (Hz).
     tolerance
         Of the network solution (V).
     net
@@ -160,7 +163,7 @@ def run_steps(
             )
             J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
             J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
-            out[step, i, 0] = F_NOM + state.w / (2.0 * np.pi)
+            out[step, i, 0] = f_nom + state.w / (2.0 * np.pi)
 
         for k in range(gfl_at.size):
             i = gfl_at[k]
@@ -190,7 +193,7 @@ def run_steps(
         if second:
             for i in range(n):
                 if not online[i]:
-                    out[step, i, 0], out[step, i, 1], out[step, i, 2] = F_NOM, 0.0, 0.0
+                    out[step, i, 0], out[step, i, 1], out[step, i, 2] = f_nom, 0.0, 0.0
                     read_voltage(V[i], out[step, i])
                 elif not np.isfinite(out[step, i, 0]):
                     return -1 - (FAILURES * step + 2)

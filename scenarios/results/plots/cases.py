@@ -88,6 +88,11 @@ def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> None:
         colour, dashes, width = styles[case]
         label = words(drawing, case)
         axes.plot(
-            history.t, quantity(history, drawing.plates), color=colour, linestyle=dashes, linewidth=width, label=label
+            history.t,
+            quantity(history, drawing.plates_in(case)),
+            color=colour,
+            linestyle=dashes,
+            linewidth=width,
+            label=label,
         )
     time_axis(axes, drawing)

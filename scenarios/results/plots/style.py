@@ -115,7 +115,7 @@ def widths(count: int) -> list[float]:
 
 def from_zero(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:
     """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
-    values = np.concatenate([quantity(history, drawing.plates) for history in drawing.histories.values()])
+    values = np.concatenate([quantity(history, drawing.plates_in(case)) for case, history in drawing.histories.items()])
     values = values[np.isfinite(values)]
     if not values.size:
         return

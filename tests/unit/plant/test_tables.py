@@ -280,3 +280,19 @@ def test_feeder_fed_by_inverters_only_needs_no_source(folder: Path) -> None:
 
     assert feeder.source is None
     assert feeder.capacitors == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("f_nom_Hz = 50000", "feeder.toml: f_nom_Hz: 50000 Hz is not plausible for a nominal frequency (16 to 400 Hz)"),
+        ('f_nom_Hz = "50"', "feeder.toml: f_nom_Hz: must be a number, got '50'; write f_nom_Hz = 50.0"),
+        ("f_nom = 50", 'feeder.toml: f_nom: unknown key; did you mean "f_nom_Hz"?'),
+        ("f_nom_Hz 50", "feeder.toml: not valid TOML"),
+    ],
+)
+def test_a_manifest_with_a_mistake_is_told(folder: Path, text: str, told: str) -> None:
+    """File, key, value with its unit, and what would be right."""
+    (folder / "feeder.toml").write_text(text, encoding="utf-8")
+
+    assert mistakes(folder)[0].startswith(told)

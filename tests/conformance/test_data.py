@@ -1,0 +1,99 @@
+"""Scenarios whose data differ from the paper's: 50 Hz, inverters without an agent, inverters chosen by name."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.config import Control
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.findings import find
+from scenarios.results.history import History, Plates
+from scenarios.results.numbers import Ran as RanScenario
+from scenarios.results.numbers import metrics_json
+from scenarios.spec import load_scenario
+from scenarios.spec.configs import configs
+from scenarios.spec.loading import CATALOGUE
+from tests.conformance.test_drivers import in_one_process
+from tests.scenario_files import written
+from tests.toy.runs import FleetRun, first_difference
+from tests.toy.toy_configs import toy_configs
+from wire.messages import Telemetry
+
+ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")
+
+
+def history_of(path: Path, case: str) -> History:
+    """Run one case of a file in one process."""
+    rows: list[tuple[float, ...]] = []
+
+    def take(telemetry: Telemetry) -> None:
+        rows.extend(telemetry.rows)
+
+    scenario, feeder = load_scenario(path)
+    outcome = run_inprocess(*configs(scenario, feeder, case), take)
+    assert not outcome.broke
+    return History.of(Plates.of(feeder.inverters).names, rows)
+
+
+def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
+    """The same feeder as 50 Hz equipment: on the grid at 50 Hz, restored to 50 Hz, with equal power, and no trip."""
+    text = ISLANDING.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 50.0").replace("7.0", "4.2")
+    history = history_of(written(tmp_path, text), "IV")
+    _, feeder = load_scenario("islanding")
+    before, after = history.t < 1.0, (history.t > 3.8) & (history.t < 4.0)
+    share = history.P[after] / Plates.of(feeder.inverters).s
+
+    assert np.abs(history.f[before] - 50.0).max() < 1e-6
+    assert 0.05 < np.abs(history.f - 50.0).max() < 1.0
+    assert np.abs(history.f[after] - 50.0).max() < 2e-3
+    assert np.ptp(share, axis=1).max() < 5e-3
+
+
+def test_a_feeder_says_its_own_nominal_frequency(tmp_path: Path) -> None:
+    """`feeder.toml` of the feeder's folder; the scenario need not repeat it, and may override it."""
+    import shutil
+
+    from plant.tables.read import DATA
+
+    folder = tmp_path / "european"
+    shutil.copytree(DATA / "microgrid123", folder)
+    (folder / "feeder.toml").write_text("f_nom_Hz = 50.0\n", encoding="utf-8")
+    text = ISLANDING.replace('feeder = "microgrid123"', 'feeder = "european"')
+    scenario, feeder = load_scenario(written(tmp_path, text))
+    _, (agent, *_) = configs(scenario, feeder, "IV")
+    override, _ = written(tmp_path, text.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 60.0")), None
+
+    assert (feeder.f_nom, agent.f_nom) == (50.0, 50.0)
+    assert feeder.line_configs == load_scenario("islanding")[1].line_configs  # given at its own frequency
+    assert load_scenario(override)[1].f_nom == 60.0
+
+
+def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_sharing(tmp_path: Path) -> None:
+    """It stays on droop at 0.647 pu while the others share what is left, and the numbers say who is meant."""
+    text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
+    path = written(tmp_path, text)
+    scenario, feeder = load_scenario(path)
+    history, plates = history_of(path, "IV"), Plates.of(feeder.inverters)
+    found = find(scenario, feeder, plates, {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]})
+    steady = found.results["IV"]["event1"]
+    ran = RanScenario(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+
+    assert np.ptp(history.P_set[:, 1]) == 0.0
+    assert steady.p["inv2"] == pytest.approx(0.647, abs=2e-3)
+    assert min(p for name, p in steady.p.items() if name != "inv2") > 0.85
+    assert steady.MPSI < 0.005
+    assert '"without_agent": [\n        "inv2"\n      ]' in metrics_json(ran, found, {"IV": ""}, {})
+
+
+def test_both_drivers_leave_out_who_has_no_agent(tmp_path: Path) -> None:
+    """No process is started for it, nobody waits for it, and its inverter stands in every row."""
+    plant, agents = toy_configs(4, Control(secondary=("inv1", "inv3"), graph="full"))
+    from msgspec.structs import replace
+
+    plant, agents = replace(plant, agents=("inv1", "inv3", "inv4")), tuple(a for a in agents if a.name != "inv2")
+    run = FleetRun(plant, agents, tmp_path)
+    outcome = run()
+
+    assert not outcome.broke
+    assert first_difference(in_one_process(plant, agents).rows, run.rows) == ""
