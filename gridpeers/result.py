@@ -22,6 +22,7 @@ from scenarios.results.folder import FolderError, refusal, shown, write_whole
 from scenarios.results.history import History, Plates, read_history
 from scenarios.results.moves import as_they_came
 from scenarios.spec import model
+from scenarios.spec.changes import as_in
 from scenarios.spec.loading import read_toml
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of
@@ -292,7 +293,7 @@ def read(folder: str | Path) -> Result | Results:
         mistakes = Mistakes(str(path / "scenario.toml"), text)
         spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
         mistakes.raise_if_any()
-        feeder = read_feeder(spec.plant.feeder, spec.plant.load_set)
+        feeder = as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
         results = Results(RunFolder(path), spec, feeder)
     except (OSError, ValueError, KeyError) as error:
         text = "; ".join(getattr(error, "mistakes", ())) or str(error)
