@@ -22,8 +22,11 @@ check_origin()
 
 if TYPE_CHECKING:
     from agents.laws.law import Law, Neighbour, Own, SetPoints
+    from gridpeers.comparison import Comparison, compare
+    from gridpeers.prediction import Prediction, predict
     from gridpeers.result import Result, Results, read
     from gridpeers.scenario import Scenario, load
+    from gridpeers.sweeping import sweep
     from scenarios.results.folder import FolderError
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
@@ -32,10 +35,12 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
+    "Comparison": "gridpeers.comparison",
     "FolderError": "scenarios.results.folder",
     "Law": "agents.laws.law",
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
+    "Prediction": "gridpeers.prediction",
     "Range": "wire.parameters",
     "Result": "gridpeers.result",
     "Results": "gridpeers.result",
@@ -44,17 +49,22 @@ _HOME = {
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
     "catalogue": "scenarios.spec.loading",
+    "compare": "gridpeers.comparison",
     "load": "gridpeers.scenario",
+    "predict": "gridpeers.prediction",
     "read": "gridpeers.result",
+    "sweep": "gridpeers.sweeping",
 }
 """Module of each public name; it is imported when the name is first used (PEP 562)."""
 
 __all__ = [
     "BrokenRunError",
+    "Comparison",
     "FolderError",
     "Law",
     "Neighbour",
     "Own",
+    "Prediction",
     "Range",
     "Result",
     "Results",
@@ -63,8 +73,11 @@ __all__ = [
     "SetPoints",
     "Unit",
     "catalogue",
+    "compare",
     "load",
+    "predict",
     "read",
+    "sweep",
 ]
 
 if not TYPE_CHECKING:

@@ -254,7 +254,11 @@ class Result:
         ValueError
             If the run has no such figure.
         """
-        return _drawn(self._run.drawing({self.case: self}), figure)
+        return _drawn(self.drawing(), figure)
+
+    def drawing(self) -> Drawing:
+        """Return what the figures of the case share (`scenarios.results.plots`)."""
+        return self._run.drawing({self.case: self})
 
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, with all cases of the run; see `Results.save`."""
@@ -304,9 +308,14 @@ def read(folder: str | Path) -> Result | Results:
 def _drawn(drawing: Drawing, name: str) -> Figure:
     from scenarios.results.plots import draw, figures_of
 
-    if "IPython" in sys.modules:
-        import matplotlib.pyplot as _  # a notebook shows figures once this is imported  # noqa: F401
+    shown_in_notebooks()
     names = figures_of(drawing)
     if name not in names:
         raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, names, "figures")}')
     return draw(drawing, name)
+
+
+def shown_in_notebooks() -> None:
+    """Have a notebook show figures as pictures, which it does once pyplot is imported."""
+    if "IPython" in sys.modules:
+        import matplotlib.pyplot  # noqa: F401

@@ -230,6 +230,16 @@ class Scenario:
         """All keys as typed values, defaults included (`scenarios.spec.model`)."""
         return self._spec
 
+    @property
+    def tables(self) -> Tree:
+        """Tables as they were written, without defaults; a copy."""
+        return copy.deepcopy(self._tree)
+
+    @property
+    def path(self) -> Path:
+        """File that it is from; relative paths in it start there."""
+        return self._path
+
     def to_toml(self) -> str:
         """Return the text of a scenario file with every key spelled out."""
         from scenarios.spec.writing import to_toml

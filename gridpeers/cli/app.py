@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from gridpeers.cli.commands.compare import compare
 from gridpeers.cli.commands.experiment import experiment
 from gridpeers.cli.commands.live import register
 from gridpeers.cli.commands.predict import predict
@@ -70,6 +71,6 @@ def gridpeers(
 
 app.command()(run)
 app.command("list")(list_)
-for command in (check, doc, reproduce, sweep, predict, experiment):
+for command in (compare, check, doc, reproduce, sweep, predict, experiment):
     app.command()(command)
 register(app)

@@ -69,23 +69,28 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
 
 def run_one(number: int, scenario: Scenario, case: str) -> Done:
     """Run one case in this thread and measure it."""
+    return run_with_history(number, scenario, case)[0]
+
+
+def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[Done, History | None]:
+    """Run one case in this thread and measure it; its history is None if it broke."""
     try:
         with one_thread():
             return _run(number, scenario, case)
     except Exception as error:
         text = str(error)
         known = type(error).__name__ in ("PlantError", "RecordError")
-        return Done(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}")
+        return Done(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}"), None
 
 
-def _run(number: int, scenario: Scenario, case: str) -> Done:
+def _run(number: int, scenario: Scenario, case: str) -> tuple[Done, History | None]:
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     tape = Tape()
     links = LinkRecord()
     outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant), on_links=links)
     if outcome.broke:
-        return Done(number=number, status="broke", why=outcome.broke)
+        return Done(number=number, status="broke", why=outcome.broke), None
     recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
     history = History.of(recorded.inverters, recorded.rows)
     plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
@@ -96,7 +101,7 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
             numbers = asdict(steady) | asdict(settled)
             reasons = numbers.pop("reasons")
             measures |= flat(window.label, numbers | {"steady": float(not reasons)})
-    return Done(
+    done = Done(
         number=number,
         status="ran",
         sha256=recorded.sha256,
@@ -105,6 +110,7 @@ def _run(number: int, scenario: Scenario, case: str) -> Done:
         link_warnings=_warnings(plant.links, links),
         measures=measures | _accounts(links),
     )
+    return done, history
 
 
 def _accounts(links: LinkRecord) -> dict[str, float | None]:

@@ -16,14 +16,12 @@ import pyarrow.parquet as pq
 
 from scenarios.run import versions
 from scenarios.spec.writing import to_toml
+from scenarios.sweep.columns import FATE, columns_of
 from scenarios.sweep.file import Plan
 from scenarios.sweep.one import Done
 from scenarios.sweep.words import unit_of
 
 FILE = "results.parquet"
-
-FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256")
-"""Columns between parameters and indexes."""
 
 
 def table_of(plan: Plan, done: Mapping[int, Done]) -> pa.Table:
@@ -34,24 +32,7 @@ def table_of(plan: Plan, done: Mapping[int, Done]) -> pa.Table:
     `links_sent`, `links_delivered`, `links_dropped`. The metadata holds the sweep file, the base scenario with all
     defaults, and the versions; each column's has its unit.
     """
-    numbers = sorted(done)
-    rows, ends = [plan.runs[i] for i in numbers], [done[i] for i in numbers]
-    columns: dict[str, pa.Array] = {
-        "sample": pa.array([row.sample for row in rows], pa.int64()),
-        "case": pa.array([row.case for row in rows], pa.string()),
-        "seed": pa.array([row.scenario.seed for row in rows], pa.int64()),
-    }
-    for name in plan.parameters:
-        if name not in columns:
-            columns[name] = _column([row.shown[name] for row in rows])
-    columns["status"] = pa.array([end.status for end in ends], pa.string())
-    columns["why"] = pa.array([end.why or None for end in ends], pa.string())
-    columns["trips"] = pa.array([end.trips or None for end in ends], pa.string())
-    columns["link_warnings"] = pa.array([end.link_warnings or None for end in ends], pa.string())
-    columns["history_sha256"] = pa.array([end.sha256 or None for end in ends], pa.string())
-    columns["links_sha256"] = pa.array([end.links_sha256 or None for end in ends], pa.string())
-    for name in dict.fromkeys(name for end in ends for name in end.measures):
-        columns[name] = pa.array([end.measures.get(name) for end in ends], pa.float64())
+    columns = {name: _array(name, values, plan) for name, values in columns_of(plan, done).items()}
     fields = [pa.field(name, column.type, metadata=_metadata(name)) for name, column in columns.items()]
     about = {
         "gridpeers.sweep": plan.text,
@@ -69,6 +50,15 @@ def write_table(table: pa.Table, folder: Path) -> Path:
     pq.write_table(table, partial)
     partial.replace(path)
     return path
+
+
+def _array(name: str, values: Sequence[Any], plan: Plan) -> pa.Array:
+    """Return a column with the type that it has in every sweep."""
+    if name in ("sample", "seed"):
+        return pa.array(values, pa.int64())
+    if name == "case" or name in FATE:
+        return pa.array(values, pa.string())
+    return _column(values) if name in plan.parameters else pa.array(values, pa.float64())
 
 
 def _column(values: Sequence[Any]) -> pa.Array:

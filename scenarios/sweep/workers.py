@@ -10,15 +10,21 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
 
+from scenarios.spec import Scenario
 from scenarios.sweep.file import Run
 from scenarios.sweep.one import Done, run_one
+
+T = TypeVar("T")
+
+Task = Callable[[int, Scenario, str], T]
+"""Does one run: its number, its scenario, its case."""
 
 _WARNINGS = "PYTHONWARNINGS"
 
@@ -35,18 +41,24 @@ def cores() -> int:
     return int(cpu_count())
 
 
-def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[Done, None, None]:
+@overload
+def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[Done, None, None]: ...
+@overload
+def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int, task: Task[T]) -> Generator[T, None, None]: ...
+def on_this_machine(
+    runs: Sequence[tuple[int, Run]], jobs: int, task: Task[Any] = run_one
+) -> Generator[Any, None, None]:
     """Do the runs in `jobs` processes; each comes back as soon as it is done, in whatever order.
 
     Close the iterator to end the workers early.
     """
     if jobs == 1:
         for number, run in runs:
-            yield run_one(number, run.scenario, run.case)
+            yield task(number, run.scenario, run.case)
         return
     with parallel_config(backend="loky", n_jobs=jobs, initializer=_prepare, initargs=(os.getpid(),)):
         try:
-            yield from _parallel(runs)
+            yield from _parallel(runs, task)
         finally:
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
@@ -72,13 +84,13 @@ def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[Done, No
         ) from None
     with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
         try:
-            yield from _parallel(runs)
+            yield from _parallel(runs, run_one)
         except TimeoutError:
             raise WorkersError(f"--dask {address}: the scheduler has no worker; start some by `dask worker`") from None
 
 
-def _parallel(runs: Sequence[tuple[int, Run]]) -> Generator[Done, None, None]:
-    tasks = (delayed(run_one)(number, run.scenario, run.case) for number, run in runs)
+def _parallel(runs: Sequence[tuple[int, Run]], task: Task[T]) -> Generator[T, None, None]:
+    tasks = (delayed(task)(number, run.scenario, run.case) for number, run in runs)
     with _without_interrupts():
         # one run a batch: what is done is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)

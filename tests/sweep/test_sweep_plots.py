@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from scenarios.spec.loading import CATALOGUE
 from scenarios.sweep.choice import choose, values
+from scenarios.sweep.columns import FATE
 from scenarios.sweep.plots import _curves, _heat_maps, draw_all
 from scenarios.sweep.statistics import spread_of
-from scenarios.sweep.table import FATE
 from scenarios.sweep.words import label_of
 
 

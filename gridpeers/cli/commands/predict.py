@@ -34,21 +34,13 @@ def predict(
     spec = chosen(spec, case, None)
     require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
 
-    from scenarios.predict.fleet import fleet_of
-    from scenarios.predict.loads import LoadError, load_steps
-    from scenarios.predict.sensitivity import sensitivity
-    from scenarios.predict.table import case_text
+    from gridpeers.prediction import predictions
+    from scenarios.run import BrokenRunError
 
     if not feeder.inverters:
         fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
     try:
-        steps = load_steps(spec, feeder)
-        plant = sensitivity(spec, feeder) if vars_ else None
-    except LoadError as error:
-        fail([f"{scenario}: {error}"], BROKEN)
-    for number, (name, rule) in enumerate(spec.cases.items()):
-        if number:
-            typer.echo()
-        islands = [(step, fleet_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps]
-        title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
-        typer.echo(case_text(title, fleet_of(spec, feeder, name), islands, plant))
+        found = predictions(spec, feeder, voltage=vars_)
+    except BrokenRunError as error:
+        fail([str(error)], BROKEN)
+    typer.echo("\n\n".join(map(str, found.values())))

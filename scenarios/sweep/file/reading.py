@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
 
 from plant.equipment import Feeder
 from scenarios.duration import duration
@@ -18,7 +21,7 @@ from scenarios.sweep.file import axes as of
 from scenarios.sweep.file.axes import Axis, check_graph, check_zip, of_graphs, of_values, values_of
 from scenarios.sweep.file.draws import Law, check_random, laws_of, of_laws
 from scenarios.sweep.file.model import Sweep
-from scenarios.sweep.file.paths import PathError, flatten, steps
+from scenarios.sweep.file.paths import PathError, Tree, flatten, steps
 from scenarios.sweep.file.plan import SECONDS_PER_SECOND, Plan, fingerprint
 from scenarios.sweep.file.samples import Samples
 from wire.nearest import suggestion
@@ -49,6 +52,39 @@ def read_sweep(name: str | Path) -> Plan:
     sweep = read_struct(Sweep, data, mistakes)
     laws = _check(sweep, mistakes)
     base, scenario, feeder = _base(sweep, path, mistakes)
+    named = msgspec.structs.replace(sweep, name=sweep.name or path.stem)
+    return _plan(named, text, laws, Base(read_toml(base)[1], base, scenario, feeder), mistakes)
+
+
+class Base(NamedTuple):
+    """The scenario that is varied."""
+
+    tree: Tree
+    """Its tables."""
+    path: Path
+    """Its file: relative paths start there."""
+    scenario: Scenario
+    """Checked."""
+    feeder: Feeder
+    """Its feeder."""
+
+
+def plan_of(sweep: Sweep, base: Base) -> Plan:
+    """Check a sweep that is made in Python.
+
+    Raises
+    ------
+    ScenarioError
+        With every mistake of the sweep and of its samples.
+    """
+    mistakes = Mistakes("sweep")
+    laws = _check(sweep, mistakes)
+    return _plan(sweep, "", laws, base, mistakes)
+
+
+def _plan(sweep: Sweep, text: str, laws: dict[str, Law], base: Base, mistakes: Mistakes) -> Plan:
+    """Check every sample of a sweep, and make its runs."""
+    scenario, feeder = base.scenario, base.feeder
     cases = _cases(sweep, scenario, mistakes)
     names = [row.name for row in inverters_of(scenario, feeder)]
     check_graph(sweep.graph, names, mistakes)
@@ -57,13 +93,13 @@ def read_sweep(name: str | Path) -> Plan:
     count = of.size(axes)
     size = count * len(cases)
     checked = count if size <= sweep.max_runs else 1
-    samples = Samples(read_toml(base)[1], base, dict(flatten(sweep.set, lambda value: False)), cases)
+    samples = Samples(base.tree, base.path, dict(flatten(sweep.set, lambda value: False)), cases)
     runs = samples.runs(islice(of.samples(axes), checked))
     samples.tell(origin, mistakes, checked)
     _check_size(sweep, size, runs[0].scenario if runs else scenario, mistakes)
     mistakes.raise_if_any()
     return Plan(
-        name=sweep.name or path.stem,
+        name=sweep.name,
         title=sweep.title,
         text=text,
         base=scenario,

@@ -1,0 +1,141 @@
+"""Two runs side by side: what differs in their scenarios, in their metrics, and in a figure."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from gridpeers.result import Result, Results, read, shown_in_notebooks
+from scenarios.spec.mistakes import ScenarioError
+from scenarios.spec.writing import to_toml
+from scenarios.sweep.file.paths import flatten
+from wire.nearest import suggestion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Run = Result | Results | str | Path
+"""A result, results of several cases, or the folder of either."""
+
+
+def compare(a: Run, b: Run, *, names: tuple[str, str] = ("a", "b")) -> Comparison:
+    """Compare two runs.
+
+    Parameters
+    ----------
+    a, b : Result, Results, str or Path
+        Two results, or the folders of runs. Of runs with several cases, those are compared that both have; two single
+        cases are compared whatever they are called.
+    names : tuple[str, str]
+        Two different words for them, in tables and figures.
+
+    Raises
+    ------
+    ScenarioError
+        If they have no case in common.
+    FolderError
+        If a folder cannot be read.
+
+    Examples
+    --------
+    >>> compare(load("islanding").run("III"), load("islanding").run("IV"), names=("III", "IV"))  # doctest: +SKIP
+    """
+    if len(set(names)) != 2:
+        raise ScenarioError([f"names: two different words are needed, got {names[0]!r} and {names[1]!r}"])
+    first, second = (read(run) if isinstance(run, str | Path) else run for run in (a, b))
+    return Comparison(_pairs(first, second), names)
+
+
+def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, Result]]:
+    """Return the cases that are compared; "" is the name of a pair of single cases."""
+    first, second = ({run.case: run} if isinstance(run, Result) else dict(run) for run in (a, b))
+    if len(first) == len(second) == 1:
+        return {"": (*first.values(), *second.values())}  # type: ignore[dict-item]
+    both = [case for case in first if case in second]
+    if not both:
+        raise ScenarioError(
+            f'no case "{case}" in the second run; {suggestion(case, second, "cases")}' for case in first
+        )
+    return {case: (first[case], second[case]) for case in both}
+
+
+class Comparison:
+    """Two runs side by side; made by `gridpeers.compare`."""
+
+    def __init__(self, pairs: dict[str, tuple[Result, Result]], names: tuple[str, str]) -> None:
+        self._pairs = pairs
+        self.names = names
+        """Words for the two."""
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Metrics of both and their difference (second minus first), a row per (window, metric), or (case, ...)."""
+        frames = {case: _table(*pair, self.names) for case, pair in self._pairs.items()}
+        if list(frames) == [""]:
+            return frames[""]
+        table = pd.concat(frames, names=["case"])
+        table.attrs["units"] = next(iter(frames.values())).attrs["units"]
+        return table
+
+    @cached_property
+    def changes(self) -> pd.DataFrame:
+        """Keys of the scenarios that differ, with both values; "" where a scenario has no such key."""
+        first, second = (_keys(pair) for pair in zip(*self._pairs.values(), strict=True))
+        keys = [key for key in dict.fromkeys((*first, *second)) if first.get(key) != second.get(key)]
+        rows = {key: [_shown(keys_of, key) for keys_of in (first, second)] for key in keys}
+        return pd.DataFrame.from_dict(rows, orient="index", columns=list(self.names)).rename_axis("key")
+
+    @property
+    def same(self) -> bool:
+        """Whether the histories are equal, byte by byte."""
+        return all(first.sha256 == second.sha256 for first, second in self._pairs.values())
+
+    def plot(self) -> Figure:
+        """Draw f, MPSI, V and MQSI of both, case by case."""
+        from scenarios.results.plots.comparison import comparison
+
+        shown_in_notebooks()
+        return comparison(
+            [
+                (case, {name: run.drawing() for name, run in zip(self.names, pair, strict=True)})
+                for case, pair in self._pairs.items()
+            ]
+        )
+
+    def __str__(self) -> str:
+        """Return what the command `gridpeers compare` prints."""
+        changes = self.changes.to_string() if len(self.changes) else "The scenarios are the same."
+        table = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
+        verdict = "The histories are the same, byte by byte." if self.same else "The histories differ."
+        return "\n\n".join((changes, table, verdict))
+
+    def __repr__(self) -> str:
+        return f"<Comparison of {' and '.join(self.names)}: {len(self._pairs)} case(s)>"
+
+
+def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
+    """Return the metrics of one pair of cases; windows that one of them lacks are nan there."""
+    columns = [run.metrics.drop(columns="reasons").stack(future_stack=True) for run in (a, b)]
+    frame = pd.concat(columns, axis=1, keys=names, sort=False)
+    frame.index.names = ["window", "metric"]
+    frame["difference"] = frame[names[1]] - frame[names[0]]
+    frame.attrs["units"] = dict(a.metrics.attrs["units"])
+    return frame
+
+
+def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:
+    """Return every key of a scenario with its value, of the cases that are compared; a single case has no name."""
+    spec = runs[0].spec
+    tables = tomllib.loads(to_toml(spec, {}))
+    tables.pop("as_run", None)
+    cases = tables.pop("case")
+    tables["case"] = cases[runs[0].case] if len(runs) == 1 else {run.case: cases[run.case] for run in runs}
+    return dict(flatten(tables, lambda value: False))
+
+
+def _shown(keys: dict[str, Any], key: str) -> str:
+    return str(keys[key]) if key in keys else ""

@@ -1,0 +1,148 @@
+"""What theory says of a case before it is run (docs/theory.md), as tables and as the command's text."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import cached_property
+
+import pandas as pd
+
+from gridpeers.running import with_cases
+from gridpeers.scenario import Scenario
+from plant.equipment import Feeder
+from scenarios.predict.closed_form import Kind, delay_limit_closed, modes
+from scenarios.predict.fleet import Fleet, fleet_of
+from scenarios.predict.limits import delay_limit
+from scenarios.predict.loads import IslandStep, LoadError, load_steps
+from scenarios.predict.sensitivity import Sensitivity, sensitivity
+from scenarios.predict.table import case_text
+from scenarios.predict.times import predicted_times
+from scenarios.run import BrokenRunError
+from scenarios.spec import model
+
+_LIMITS: dict[str, Kind] = {
+    "agent to agent": "neighbours",
+    "agent to agent, own value as late": "disagreement",
+    "plant to agent or back": "local loop",
+}
+"""Delays whose limit is known, and their names in `scenarios.predict`."""
+
+
+def predict(scenario: Scenario, case: str, *, voltage: bool = True) -> Prediction:
+    """Predict how a case will go, without running it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The experiment.
+    case : str
+        Its case.
+    voltage : bool
+        Whether the modes of voltage and vars are wanted in the text, which takes a second or two.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such case.
+    BrokenRunError
+        If the plant has no solution on droop alone.
+    """
+    return predictions(with_cases(scenario.spec, [case]), scenario.feeder, voltage=voltage)[case]
+
+
+def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
+    """Predict all cases of a scenario; the plant is asked once for its loads."""
+    try:
+        steps = load_steps(spec, feeder)
+        plant = sensitivity(spec, feeder) if voltage else None
+    except LoadError as error:
+        raise BrokenRunError(f"{spec.name}: {error}") from error
+    found = {}
+    for name, rule in spec.cases.items():
+        islands = [(step, fleet_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps]
+        title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
+        found[name] = Prediction(title, fleet_of(spec, feeder, name), islands, plant)
+    return found
+
+
+class Prediction:
+    """What theory says of one case; made by `gridpeers.predict`.
+
+    Parameters
+    ----------
+    title : str
+        Scenario and case.
+    fleet : Fleet
+        The inverters at the start, and who listens to whom.
+    islands : list of (IslandStep, Fleet)
+        Islands after each event.
+    plant : Sensitivity or None
+        How voltage and vars answer; None leaves them out.
+    """
+
+    def __init__(
+        self, title: str, fleet: Fleet, islands: list[tuple[IslandStep, Fleet]], plant: Sensitivity | None
+    ) -> None:
+        self.title = title
+        """Scenario and case."""
+        self._fleet, self._islands, self._plant = fleet, islands, plant
+
+    @cached_property
+    def modes(self) -> pd.Series:
+        """Rates of the slow modes (1/s) and what they follow from: `links`, `lambda_2`, `kappa`, `sharing_rate`, ...
+
+        Empty where nobody runs a secondary law.
+        """
+        found = asdict(modes(self._fleet)) if self._acts else {}
+        return pd.Series(found, name=self.title, dtype=float)
+
+    @cached_property
+    def delay_limits(self) -> pd.DataFrame:
+        """Longest delays (s) for which the case is stable: of the continuous equations, and of our law in its steps.
+
+        Infinite: any delay; nan: unstable without one.
+        """
+        kinds = _LIMITS if self._acts else {}
+        rows = {
+            words: {"continuous": delay_limit_closed(self._fleet, kind), "discrete": delay_limit(self._fleet, kind)}
+            for words, kind in kinds.items()
+        }
+        frame = pd.DataFrame.from_dict(rows, orient="index", columns=["continuous", "discrete"], dtype=float)
+        frame.attrs["units"] = {"continuous": "s", "discrete": "s"}
+        return frame.rename_axis("delay")
+
+    @cached_property
+    def times(self) -> pd.DataFrame:
+        """Times (s) after each event until frequency and sharing are restored, a row per (window, island).
+
+        Columns: `restore_s` (abs(f - f_nom) < 0.01 Hz for good), `share_s` (MPSI < 0.01 for good), `t_restore_s`
+        (both), nan where that never comes; `stable`; `note`.
+        """
+        rows = []
+        for step, island in self._islands:
+            row: dict[str, object] = {"window": step.label, "island": ", ".join(step.members)}
+            if step.load is None or not island.GFM.any() or not self._acts:
+                why = "there is no secondary law" if island.GFM.any() else "no grid-forming inverter: it is dead"
+                row |= {"stable": False, "note": why if step.load else "islands join, which is not predicted"}
+            else:
+                found = predicted_times(island, load=step.load)
+                row |= {"restore_s": found.restore_s, "share_s": found.share_s, "t_restore_s": found.report_s}
+                row |= {"stable": found.stable, "note": found.note}
+            rows.append(row)
+        columns = ["window", "island", "restore_s", "share_s", "t_restore_s", "stable", "note"]
+        frame = pd.DataFrame(rows, columns=columns).set_index(["window", "island"])
+        numbers = ["restore_s", "share_s", "t_restore_s"]
+        frame[numbers] = frame[numbers].astype(float)
+        frame.attrs["units"] = dict.fromkeys(numbers, "s")
+        return frame
+
+    @property
+    def _acts(self) -> bool:
+        return bool(self._fleet.acts.any())
+
+    def __str__(self) -> str:
+        """Return what the command `gridpeers predict` prints."""
+        return case_text(self.title, self._fleet, self._islands, self._plant)
+
+    def __repr__(self) -> str:
+        return f"<Prediction {self.title}>"

@@ -1,0 +1,165 @@
+"""One scenario run many times over values of its keys, into one pandas table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from importlib.util import find_spec
+from typing import Any
+
+import pandas as pd
+
+from gridpeers import frames
+from gridpeers.scenario import Scenario
+from gridpeers.values import plain
+from scenarios.results.history import History
+from scenarios.spec import Scenario as Spec
+from scenarios.spec.mistakes import Mistakes, ScenarioError
+from scenarios.sweep.columns import FATE, columns_of
+from scenarios.sweep.file.model import Sweep
+from scenarios.sweep.file.plan import Plan, Run
+from scenarios.sweep.file.reading import Base, plan_of
+from scenarios.sweep.one import Done, run_one, run_with_history
+from scenarios.sweep.words import unit_of
+from wire.nearest import suggestion
+from wire.registry import NOTEBOOK
+
+Values = Mapping[str, Iterable[Any]]
+"""Values by the dotted path of a key."""
+
+
+def sweep(
+    scenario: Scenario,
+    grid: Values | None = None,
+    *,
+    zip: Values | None = None,
+    cases: Iterable[str] = (),
+    seeds: int = 1,
+    metrics: Iterable[str] | None = None,
+    histories: bool = False,
+    jobs: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> pd.DataFrame:
+    """Run a scenario over values of its keys, and return a row per run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is varied.
+    grid : Mapping[str, Iterable], optional
+        Values by the dotted path of a key, as in `Scenario.replace`; every combination is run.
+    zip : Mapping[str, Iterable], optional
+        Keys whose values go together, first with first.
+    cases : iterable of str, optional
+        Cases that are run; all when left out.
+    seeds : int
+        How many seeds every point is run with: the scenario's, and those that follow it.
+    metrics : iterable of str, optional
+        Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out.
+    histories : bool
+        Whether each row has its history, in a column of that name, as `Result.history`.
+    jobs : int, optional
+        Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
+    progress : Callable[[int, int], None], optional
+        Told how many runs are done, and how many there are.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns: case, seed, the varied keys, `status` ("ran" or "broke") and `why`, the metrics as "WINDOW.METRIC" (nan
+        where there is no value), and without `metrics` also `history_sha256` and the like. Units are in its `attrs`.
+
+    Raises
+    ------
+    ScenarioError
+        With everything that is wrong with the values, before anything is run.
+
+    Examples
+    --------
+    >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
+    """
+    plan = _plan(scenario, grid or {}, zip or {}, tuple(cases), seeds)
+    runs = list(enumerate(plan.runs))
+    done: dict[int, Done] = {}
+    kept: dict[int, pd.DataFrame] = {}
+    for end, history in _results(runs, _jobs(scenario, jobs, len(runs)), histories=histories):
+        done[end.number] = end
+        if history is not None:
+            kept[end.number] = frames.history_frame(history)
+        if progress is not None:
+            progress(len(done), len(runs))
+    columns = columns_of(plan, done)
+    del columns["sample"]
+    frame = pd.DataFrame({name: _column(name, values, plan) for name, values in columns.items()})
+    if metrics is not None:
+        frame = frame[_chosen(list(frame), list(metrics), plan)]
+    frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
+    if histories:
+        frame["history"] = [kept.get(number) for number in sorted(done)]
+    return frame
+
+
+def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
+    """Check what is to be run."""
+    mistakes = Mistakes("sweep")
+    crossed: dict[str, Any] = {}
+    paired: dict[str, Any] = {}
+    for table, values, lists in (("grid", grid, crossed), ("zip", zipped, paired)):
+        for path, items in values.items():
+            try:
+                lists[path] = [plain(item) for item in items]
+            except (TypeError, ValueError) as error:
+                text = str(error) if isinstance(error, ValueError) else f"needs a list of values, got {items!r}"
+                mistakes.add(f"{table}.{path}", text)
+    mistakes.raise_if_any()
+    request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
+    return plan_of(request, Base(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
+
+
+def _jobs(scenario: Scenario, jobs: int | None, runs: int) -> int:
+    """Return how many processes share the runs; what a notebook defines is known to its own process alone."""
+    if jobs is not None and jobs < 1:
+        raise ScenarioError([f"jobs: must be 1 or more, got {jobs}"])
+    if f'"{NOTEBOOK}:' in scenario.to_toml() or (jobs is None and find_spec("joblib") is None):
+        return 1
+    if jobs is None:
+        from scenarios.sweep.workers import cores
+
+        jobs = cores()
+    return min(jobs, runs)
+
+
+def _results(runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool) -> Iterator[tuple[Done, History | None]]:
+    """Do all runs; each comes as soon as it is done, with its history if that is asked for."""
+    task: Callable[[int, Spec, str], tuple[Done, History | None]] = run_with_history if histories else _without_history
+    if jobs == 1:
+        yield from (task(number, run.scenario, run.case) for number, run in runs)
+        return
+    if find_spec("joblib") is None:
+        raise ScenarioError(["jobs: more than one process needs joblib: pip install 'gridpeers[sweep]'"])
+    from scenarios.sweep.workers import on_this_machine
+
+    with closing(on_this_machine(runs, jobs, task)) as results:
+        yield from results
+
+
+def _without_history(number: int, scenario: Spec, case: str) -> tuple[Done, None]:
+    """Do one run whose history nobody wants, which spares its way between two processes."""
+    return run_one(number, scenario, case), None
+
+
+def _column(name: str, values: list[Any], plan: Plan) -> list[Any]:
+    """Return a column in which a metric without a value is nan; everything else is as it was given."""
+    if name in plan.parameters or name in ("case", "seed", *FATE):
+        return values
+    return [math.nan if value is None else value for value in values]
+
+
+def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:
+    """Return the columns of some metrics behind those that say which run it is."""
+    head = [name for name in columns if name in ("case", "seed", "status", "why", *plan.parameters)]
+    known = dict.fromkeys(name.partition(".")[2] or name for name in columns if name not in (*head, *FATE))
+    if unknown := [name for name in metrics if name not in known]:
+        raise ScenarioError(f'metrics: no metric "{name}"; {suggestion(name, known, "metrics")}' for name in unknown)
+    return head + [name for name in columns if (name.partition(".")[2] or name) in metrics and name not in head]

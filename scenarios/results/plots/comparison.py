@@ -1,0 +1,61 @@
+"""Two runs beside each other: the four measures of all cases, each run with its own inverters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scenarios.results import metrics
+from scenarios.results.drawing import Drawing
+from scenarios.results.islands import Quantity, worst
+from scenarios.results.plots.style import OTHER_STYLES, PAGE, columns, mark_events, time_axis
+
+WIDTH, HEIGHT = 7.4, 2.3
+"""Size of a figure, and of each row of panels in it (inches)."""
+
+_PANELS: tuple[tuple[str, str, Quantity, float | None], ...] = (
+    ("Frequency", "f (Hz)", metrics.mean_frequency, None),
+    ("Mean power sharing index, MPSI", "MPSI", metrics.MPSI, 0.0),
+    ("Voltage", "mean V (pu)", metrics.mean_voltage, 1.0),
+    ("Mean var sharing index, MQSI", "MQSI", metrics.MQSI, 0.0),
+)
+"""Title, axis, quantity and its nominal value; None: the nominal frequency."""
+
+
+def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
+    """Draw two rows of panels for each pair of cases.
+
+    Parameters
+    ----------
+    pairs : sequence of (str, Mapping[str, Drawing])
+        Words on each pair, and for each of the two its name and a drawing with one history.
+    """
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(WIDTH, 0.4 + 2 * HEIGHT * len(pairs)), layout="constrained")
+        grid = figure.subplots(2 * len(pairs), 2, squeeze=False)
+        for number, (words, drawings) in enumerate(pairs):
+            panels = grid[2 * number : 2 * number + 2].flat
+            for panel, (title, label, quantity, nominal) in zip(panels, _PANELS, strict=True):
+                _draw(panel, drawings, quantity, nominal)
+                panel.set_title(f"{words}: {title}" if words else title, loc="left")
+                panel.set_ylabel(label)
+                panel.ticklabel_format(axis="y", useOffset=False)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, WIDTH))
+    return figure
+
+
+def _draw(axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, nominal: float | None) -> None:
+    """Draw a quantity of both runs; the second lies on top, dashed, so that equal ones are both seen."""
+    styles = zip(OTHER_STYLES[:2], ("-", (0, (4, 2))), strict=True)
+    for (name, drawing), ((colour, _, width), dashes) in zip(drawings.items(), styles, strict=True):
+        ((_, history),) = drawing.histories.items()
+        measured = worst(quantity, drawing.f_nom if nominal is None else nominal, drawing.spells)
+        y = measured(history, drawing.plates)
+        axes.plot(history.t, y, color=colour, linestyle=dashes, linewidth=width, label=name)
+    longer = max(drawings.values(), key=lambda drawing: max(history.t[-1] for history in drawing.histories.values()))
+    time_axis(axes, longer)
+    mark_events(axes, longer, labelled=False)

@@ -1,0 +1,131 @@
+"""Sweeps, predictions and comparisons in Python."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import gridpeers as gp
+from scenarios.sweep.file import read_sweep
+from scenarios.sweep.one import run_one
+from tests.command_line import invoke
+
+
+@pytest.fixture(scope="module")
+def scenario() -> gp.Scenario:
+    """Half a second on either side of islanding, two cases."""
+    changes = {"time.end_s": 1.0, "event": [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]}
+    return gp.load("islanding").replace({**changes, "case.II": None, "case.III": None})
+
+
+def test_a_sweep_is_a_row_per_run_with_the_metrics_asked_for(scenario: gp.Scenario) -> None:
+    """Every combination of the grid, each case, and a history by each row."""
+    table = gp.sweep(
+        scenario, {"gains.k_p": [0.001, 0.002]}, cases=["IV"], metrics=["MPSI", "V_error"], histories=True, jobs=1
+    )
+
+    assert table.columns.tolist() == [
+        *("case", "seed", "gains.k_p", "status", "why"),
+        *("islanding.MPSI", "islanding.V_error", "history"),
+    ]
+    assert table["gains.k_p"].tolist() == [0.001, 0.002]
+    assert table.attrs["units"]["islanding.V_error"] == "pu"
+    alone = scenario.replace({"gains.k_p": 0.002}).run("IV")
+    assert table["history"][1].equals(alone.history)
+
+
+def test_a_sweep_over_processes_has_the_rows_of_one_process(scenario: gp.Scenario) -> None:
+    """How many share the runs decides nothing, nor does the order in which they end."""
+    request = {"grid": {"gains.k_p": [0.001, 0.002]}, "cases": ["I"]}
+
+    assert gp.sweep(scenario, **request, jobs=2).equals(gp.sweep(scenario, **request, jobs=1))  # type: ignore[arg-type]
+
+
+def test_a_sweep_in_python_is_that_of_the_same_file(scenario: gp.Scenario, tmp_path: Path) -> None:
+    """Both come from one plan: the same runs with the same bytes."""
+    (tmp_path / "base.toml").write_text(scenario.to_toml())
+    (tmp_path / "s.toml").write_text('scenario = "base.toml"\ncases = ["I"]\n[zip]\n"gains.k_p" = [0.001]\n')
+    (run,) = read_sweep(tmp_path / "s.toml").runs
+
+    table = gp.sweep(scenario, zip={"gains.k_p": [0.001]}, cases=["I"], jobs=1)
+
+    assert table["history_sha256"].tolist() == [run_one(0, run.scenario, run.case).sha256]
+
+
+def test_all_mistakes_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario) -> None:
+    """Keys, values and metrics are told with what would be right."""
+    with pytest.raises(gp.ScenarioError) as caught:
+        gp.sweep(scenario, {"gains.kp": [1.0], "time.T_c_s": ["x", 0.02]})
+    assert "sweep: grid.gains.kp: unknown key" in str(caught.value)
+    assert 'grid.time.T_c_s: must be a number, got "x"' in str(caught.value)
+    with pytest.raises(gp.ScenarioError, match=r"sweep: grid\.gains\.k_p: needs a list of values, got 3"):
+        gp.sweep(scenario, {"gains.k_p": 3})  # type: ignore[dict-item]
+    with pytest.raises(gp.ScenarioError, match="nothing is varied"):
+        gp.sweep(scenario)
+    with pytest.raises(gp.ScenarioError, match='no metric "MPSY"; did you mean "MPSI"'):
+        gp.sweep(scenario, {"gains.k_p": [0.001]}, cases=["I"], metrics=["MPSY"], jobs=1)
+
+
+def test_a_prediction_has_tables_and_the_words_of_the_command() -> None:
+    """The frequency mode is kappa n_L/N, and what the command prints is its text."""
+    found = gp.predict(gp.load("islanding"), "IV", voltage=False)
+
+    assert found.modes["frequency_rate"] == pytest.approx(found.modes["kappa"] * 3 / 9)
+    assert math.isinf(found.delay_limits["discrete"]["agent to agent"])
+    assert found.times["t_restore_s"].tolist() == pytest.approx([0.64, 0.74], abs=0.02)
+    assert invoke("predict", "islanding", "--case", "IV", "--no-vars") == (0, f"{found}\n")
+
+
+def test_a_case_without_a_law_is_predicted_as_such() -> None:
+    """Droop alone has no modes and restores nothing."""
+    found = gp.predict(gp.load("islanding"), "I", voltage=False)
+
+    assert found.modes.empty
+    assert found.times["t_restore_s"].isna().all()
+    assert set(found.times["note"]) == {"there is no secondary law"}
+
+
+def test_a_comparison_tells_what_differs(scenario: gp.Scenario, tmp_path: Path) -> None:
+    """Changed keys, metrics of both with their difference, and a figure with a curve for each."""
+    runs = scenario.run()
+    other = scenario.replace({"gains.k_p": 0.001}).run("IV")
+
+    found = gp.compare(runs["IV"], other, names=("before", "after"))
+
+    assert found.changes.loc["gains.k_p"].tolist() == ["0.00035", "0.001"]
+    row = found.table.loc["islanding", "f_error_Hz"]
+    assert row["difference"] == row["after"] - row["before"] != 0.0
+    assert not found.same
+    assert [len(axes.lines) - 1 for axes in found.plot().axes] == [2, 2, 2, 2]
+    assert gp.compare(runs, runs).same
+
+
+def test_the_command_compare_prints_the_table_and_draws_both(
+    scenario: gp.Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two folders in, a table and a figure out."""
+    monkeypatch.chdir(tmp_path)
+    scenario.run("I").save("one")
+    scenario.run("IV").save("two")
+
+    code, text = invoke("compare", "one", "two")
+
+    assert code == 0
+    assert "f_error_Hz" in text
+    assert "case.secondary" in text
+    assert (tmp_path / "runs" / "comparison.png").is_file()
+    code, text = invoke("compare", "one", "nowhere")
+    assert code == 2
+    assert text == ""
+
+
+def test_runs_without_a_common_case_are_not_compared(scenario: gp.Scenario) -> None:
+    """What cannot be compared is told."""
+    runs = scenario.run()
+
+    with pytest.raises(gp.ScenarioError, match='no case "I" in the second run'):
+        gp.compare(runs, gp.load("islanding").replace({"time.end_s": 4.5}).run(["II", "III"]))
+    with pytest.raises(gp.ScenarioError, match="two different words"):
+        gp.compare(runs, runs, names=("a", "a"))
