@@ -18,7 +18,8 @@ from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.table import case_text
 from scenarios.predict.times import predicted_times
 from scenarios.run import BrokenRunError
-from scenarios.spec import model
+from scenarios.spec import ScenarioError, model
+from scenarios.spec.law import PAPER, law_of
 
 _LIMITS: dict[str, Kind] = {
     "agent to agent": "neighbours",
@@ -43,7 +44,7 @@ def predict(scenario: Scenario, case: str, *, voltage: bool = True) -> Predictio
     Raises
     ------
     ScenarioError
-        If there is no such case.
+        If there is no such case, or it runs another law than "consensus", of which theory tells nothing.
     BrokenRunError
         If the plant has no solution on droop alone.
     """
@@ -52,6 +53,12 @@ def predict(scenario: Scenario, case: str, *, voltage: bool = True) -> Predictio
 
 def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
     """Predict all cases of a scenario; the plant is asked once for its loads."""
+    others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
+    if others:
+        raise ScenarioError(
+            f'case {case}: runs the law {name}, and the predictions are of the law "{PAPER}" alone; run it instead'
+            for case, name in others.items()
+        )
     try:
         steps = load_steps(spec, feeder)
         plant = sensitivity(spec, feeder) if voltage else None

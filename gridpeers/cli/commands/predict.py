@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, chosen, fail, load, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, chosen, fail, load, refuse, require
 
 
 def predict(
@@ -36,11 +36,14 @@ def predict(
 
     from gridpeers.prediction import predictions
     from scenarios.run import BrokenRunError
+    from scenarios.spec import ScenarioError
 
     if not feeder.inverters:
         fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
     try:
         found = predictions(spec, feeder, voltage=vars_)
+    except ScenarioError as error:
+        refuse(error)
     except BrokenRunError as error:
         fail([str(error)], BROKEN)
     typer.echo("\n\n".join(map(str, found.values())))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import Quantity, worst
-from scenarios.results.plots.style import OTHER_STYLES, PAGE, columns, mark_events, time_axis
+from scenarios.results.plots.style import PAGE, Style, columns, mark_events, time_axis
 
 WIDTH, HEIGHT = 7.4, 2.3
 """Size of a figure, and of each row of panels in it (inches)."""
@@ -23,6 +23,9 @@ _PANELS: tuple[tuple[str, str, Quantity, float | None], ...] = (
     ("Mean var sharing index, MQSI", "MQSI", metrics.MQSI, 0.0),
 )
 """Title, axis, quantity and its nominal value; None: the nominal frequency."""
+
+_STYLES: tuple[Style, Style] = (("#0072b2", "-", 2.2), ("#d55e00", (0, (4, 2)), 1.6))
+"""Of the two: the second lies on top, dashed and thinner, so that equal ones are both seen."""
 
 
 def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
@@ -49,12 +52,11 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
 
 
 def _draw(axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, nominal: float | None) -> None:
-    """Draw a quantity of both runs; the second lies on top, dashed, so that equal ones are both seen."""
-    styles = zip(OTHER_STYLES[:2], ("-", (0, (4, 2))), strict=True)
-    for (name, drawing), ((colour, _, width), dashes) in zip(drawings.items(), styles, strict=True):
-        ((_, history),) = drawing.histories.items()
+    """Draw a quantity of both runs."""
+    for (name, drawing), (colour, dashes, width) in zip(drawings.items(), _STYLES, strict=True):
+        ((case, history),) = drawing.histories.items()
         measured = worst(quantity, drawing.f_nom if nominal is None else nominal, drawing.spells)
-        y = measured(history, drawing.plates)
+        y = measured(history, drawing.plates_in(case))
         axes.plot(history.t, y, color=colour, linestyle=dashes, linewidth=width, label=name)
     longer = max(drawings.values(), key=lambda drawing: max(history.t[-1] for history in drawing.histories.values()))
     time_axis(axes, longer)

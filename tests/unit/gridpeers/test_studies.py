@@ -87,6 +87,12 @@ def test_a_case_without_a_law_is_predicted_as_such() -> None:
     assert set(found.times["note"]) == {"there is no secondary law"}
 
 
+def test_another_law_is_not_predicted_by_the_theory_of_the_papers() -> None:
+    """Nothing is told of a law that the equations are not about."""
+    with pytest.raises(gp.ScenarioError, match="case IV: runs the law dapi"):
+        gp.predict(gp.load("islanding").replace({"case.IV.law": "dapi"}), "IV", voltage=False)
+
+
 def test_a_comparison_tells_what_differs(scenario: gp.Scenario, tmp_path: Path) -> None:
     """Changed keys, metrics of both with their difference, and a figure with a curve for each."""
     runs = scenario.run()
@@ -94,7 +100,7 @@ def test_a_comparison_tells_what_differs(scenario: gp.Scenario, tmp_path: Path) 
 
     found = gp.compare(runs["IV"], other, names=("before", "after"))
 
-    assert found.changes.loc["gains.k_p"].tolist() == ["0.00035", "0.001"]
+    assert found.changes.loc["gains.k_p"].tolist() == ["0.0007", "0.001"]
     row = found.table.loc["islanding", "f_error_Hz"]
     assert row["difference"] == row["after"] - row["before"] != 0.0
     assert not found.same
@@ -118,7 +124,7 @@ def test_the_command_compare_prints_the_table_and_draws_both(
     assert (tmp_path / "runs" / "comparison.png").is_file()
     code, text = invoke("compare", "one", "nowhere")
     assert code == 2
-    assert text == ""
+    assert text == "gridpeers: nowhere: this is no folder of a run, which has a file status.txt\n"
 
 
 def test_runs_without_a_common_case_are_not_compared(scenario: gp.Scenario) -> None:
