@@ -149,6 +149,7 @@ class ProgramLaw(Law):
         while b"\n" not in self._rest:
             ready, _, _ = select.select([file], [], [], max(0.0, end - monotonic()))
             if not ready:
+                self._process.kill()  # it is of no use any more, and may not hear that its input has ended
                 raise LawError(f"{self._name} did not answer the {what} within {self._patience:g} s")
             piece = os.read(file, 65_536)
             if not piece:

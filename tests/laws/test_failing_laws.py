@@ -1,0 +1,117 @@
+"""A law that fails is named, its agent stands still, and the run goes on; one that cannot work is refused before."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gridpeers as gp
+from tests.laws.runs import SHORT, written
+from tests.laws.test_carriers import PROGRAM
+
+BAD = "tests.laws.bad_laws"
+
+
+@pytest.mark.parametrize(("how", "said"), [
+    ("raises", r"step at t = 1.2 s raised ZeroDivisionError: division by zero"),
+    ("nan", r"step at t = 1.2 s returned P_set = nan; it must be a finite number \(pu\)"),
+    ("nothing", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
+    ("text", r"step at t = 1.2 s returned V_set = \[1.0\]; it must be a number"),
+    ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.05 s"),
+    ("shares too much", r"step at t = 1.2 s shares .*; share at most 16 numbers by name"),
+    ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
+])  # fmt: skip
+def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
+    """Whatever a step does: one line of every agent in events.csv, primary droop from then on, a history to the end."""
+    result = written({"use": f"{BAD}:Failing", "how": how, "time_limit_s": 0.05})
+    told = result.events[result.events["kind"] == "law"]
+
+    assert list(told["subject"]) == [f"inv{i}" for i in range(1, 10)]
+    assert all(re.search(f"law {BAD}:Failing: {said}; its agent stands still", text) for text in told["text"]), told
+    assert result.history.index[-1] == 2.0
+    assert 59.0 < result.history["inv1"]["f"].iloc[-1] < 60.0
+
+
+@pytest.mark.parametrize(("failure", "said"), [
+    ("rubbish", r"answered the step at t = [\d.]+ s with 'hello', which is none; e.g. \{\"P_set\": 0.5"),
+    ("partial", r"answered a step at t = [\d.]+ s without V_set"),
+    ("nan", r"answered the step at t = [\d.]+ s with '\{\"P_set\": NaN"),
+    ("error", r"says: no idea \(step at t = [\d.]+ s\)"),
+    ("dies", r"ended at the step at t = [\d.]+ s with exit code 7"),
+    ("hangs", r"did not answer the step at t = [\d.]+ s within 0.5 s"),
+])  # fmt: skip
+def test_a_program_that_fails_is_named_and_leaves_no_process(failure: str, said: str) -> None:
+    """Rubbish, a wrong answer, an error of its own, death or silence."""
+    law = {"command": [*PROGRAM["command"], failure], "time_limit_s": 0.5}
+    result = written(law)
+    told = list(result.events[result.events["kind"] == "law"]["text"])
+
+    assert len(told) == 9
+    assert all(re.search(said, text) for text in told), told
+    assert result.history.index[-1] == 2.0
+    assert not [
+        path for path in Path("/proc").glob("[0-9]*/cmdline") if f"consensus_program.py\0{failure}" in _text(path)
+    ]
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(errors="replace")
+    except OSError:  # it has just ended
+        return ""
+
+
+@pytest.mark.parametrize(("law", "said"), [
+    ("dapy", r'case.IV.law: there is no law "dapy"; did you mean "dapi"\? The laws are consensus, dapi, .*module:Name'),
+    ("mine:Mine", r'case.IV.law.*: there is no module "mine" in .* on the Python path'),
+    (f"{BAD}:Fail", rf'case.IV.law.*: {BAD}:Fail: module {BAD} has no "Fail"; did you mean "Failing"\?'),
+    (f"{BAD}:no_class", r"no_class is no law: derive a class from gridpeers.Law"),
+    (f"{BAD}:NoStep", r"NoStep is no law: it has no method step\(self, own, neighbours, T\)"),
+    (f"{BAD}:WrongStep", r"WrongStep is no law: write its method step\(self, own, neighbours, T\): too many"),
+    (f"{BAD}:Unmakeable", r"Unmakeable cannot be made: RuntimeError: no licence"),
+    ({"use": f"{BAD}:Failing", "gain": 500}, r"case.IV.law.gain: must be from 0 to 100 1/s, got 500"),
+    ({"use": f"{BAD}:Failing", "gian": 5}, r'case.IV.law.gian: unknown parameter; did you mean "gain"\?'),
+    ({"use": "dapi", "k": "fast"}, r'case.IV.law.k: must be a number, got "fast"'),
+    ({"use": "dapi", "time_limit_s": 0}, r"case.IV.law.time_limit_s: must be from 0.001 to 60 s, got 0"),
+    ({"use": "consensus", "k_p": 1.0}, r"case.IV.law.k_p: the parameters of .consensus. are those of \[gains\]"),
+    ({"gain": 1.0}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
+    ({"use": "dapi", "fmu": "x.fmu"}, r"case.IV.law: needs one of use, command, fmu; got use and fmu"),
+    ({"command": ["./nothing"]}, r"case.IV.law.command: there is no program ./nothing, neither beside"),
+    ({"command": "./nothing"}, r"case.IV.law.command: must be a list of texts, the program first"),
+    ({"fmu": "x.fmu"}, r"case.IV.law.fmu: there is no file x.fmu; write its path, seen from the scenario"),
+    ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
+    (3, r"case.IV.law: must be a text in quotes or a table, got 3"),
+])  # fmt: skip
+def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said: str) -> None:
+    """Each mistake with its key, and what would be right."""
+    with pytest.raises(gp.ScenarioError) as refused:
+        gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
+
+    assert len(refused.value.mistakes) == 1
+    assert re.search(said, refused.value.mistakes[0]), refused.value.mistakes
+
+
+def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
+    """They would do nothing, and nobody would know."""
+    with pytest.raises(gp.ScenarioError, match=r'\[gains\] are those of the law "consensus", and this case has dapi'):
+        gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
+
+
+def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:
+    """`mine:Mine` is the class Mine of mine.py in the folder of the scenario file, wherever the run is started."""
+    (tmp_path / "my_law.py").write_text(
+        "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n"
+        "        return gp.SetPoints(own.P_set, own.V_set)\n"
+    )
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        gp.load("islanding").replace({**SHORT}).to_toml().replace('law = "consensus"', 'law = "my_law:Hold"')
+    )
+    scenario = gp.load(file)
+
+    assert scenario.run("IV").sha256 == scenario.run("IV", driver="processes").sha256
+    assert sys.path[-1] == str(tmp_path)
