@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import platform
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -28,6 +28,8 @@ from scenarios.results.findings import find
 from scenarios.results.folder import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
+from scenarios.results.messages import messages_saved
+from scenarios.results.metrics import windows
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.numbers import Clock, Ran, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
@@ -43,6 +45,9 @@ Driver = Literal["processes", "inprocess"]
 
 Progress = Callable[[str, float, float], None]
 """Told the case, the time it has reached (s) and its end (s)."""
+
+_SHOWN = 3
+"""Laws that failed which a report names."""
 
 _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
 
@@ -150,7 +155,14 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         for case, one in compared.items()
         if one.disturbed
     ]
-    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike))
+    saved = {
+        case: messages_saved(
+            record.quiet, windows(came[case], scenario.time.end_s), len(record.inverters), scenario.time.T_c_s
+        )
+        for case, record in recorded.items()
+    }
+    notes += [f"case {case}: {note}" for case, record in recorded.items() for note in _of_laws(record, saved[case])]
+    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
     if request.figures:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     report = Report(
@@ -165,6 +177,16 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     write_whole(folder / "report.txt", plain(report))
     set_status(folder, "complete")
     return report
+
+
+def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:
+    """What the laws of a case did beside their set-points: failed, or told their neighbours less."""
+    failed = [event for event in record.events if event.kind == "law"]
+    yield from (f"{event.text} (from t = {event.t:g} s on)" for event in failed[:_SHOWN])
+    if len(failed) > _SHOWN:
+        yield f"{len(failed) - _SHOWN} more laws failed (events.csv)"
+    if saved:
+        yield "states not told to neighbours: " + ", ".join(f"{100.0 * s:.0f} % in {name}" for name, s in saved.items())
 
 
 def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Compared]:

@@ -47,6 +47,7 @@ def metrics_json(
     links_sha256: Mapping[str, str] = MappingProxyType({}),
     by_hand: Mapping[str, Any] = MappingProxyType({}),
     unlike: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+    saved: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
 ) -> str:
     """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) or not steady is null.
 
@@ -64,10 +65,14 @@ def metrics_json(
         What a reader must know of a run that people had their hands in.
     unlike : Mapping[str, Mapping[str, Any]], optional
         By case: where a run in wall-clock time was not what its scenario says.
+    saved : Mapping[str, Mapping[str, float]], optional
+        By case and event: share of states that neighbours were not told of, where there are any.
     """
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in found.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
+        for label, share in saved.get(case, {}).items():
+            cases[case][label]["messages_saved"] = share
         for label, islands in found.islands.get(case, {}).items():
             cases[case][label] |= dict.fromkeys(SHARED)
             cases[case][label].get("reasons", {}).pop("MPSI", None)

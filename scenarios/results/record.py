@@ -74,6 +74,8 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """Times (s) of the last row before and of the first row after each interval of which no rows came."""
     events: tuple[PlantEvent, ...]
     """What happened, in the order of time."""
+    quiet: tuple[tuple[float, int], ...] = ()
+    """Run time (s), and how many states of that tick the neighbours were not told of."""
     sha256: str
     """Of the bytes of history.csv."""
     reproducible: bool
@@ -122,6 +124,8 @@ class Tape:
         self.missing: list[tuple[float, float]] = []
         """See `Recorded.missing`."""
         self.events: list[PlantEvent] = []
+        self.quiet: list[tuple[float, int]] = []
+        """See `Recorded.quiet`."""
         self.reproducible = True
         """False once something unscripted, as a dead agent, has entered the run."""
 
@@ -137,6 +141,7 @@ class Tape:
             self._keep(row)
             self._write(",".join(map(repr, row)) + "\n")
         self.events.extend(telemetry.events)
+        self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible
 
     def finish(self, end: float, record_step: float) -> Recorded:
@@ -169,6 +174,7 @@ class Tape:
             ended=self.ended,
             missing=tuple(self.missing),
             events=tuple(self.events),
+            quiet=tuple(self.quiet),
             sha256=self._hash.hexdigest(),
             reproducible=self.reproducible,
         )

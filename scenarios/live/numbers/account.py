@@ -15,6 +15,7 @@ from scenarios.results.findings import find_in
 from scenarios.results.folder import shown, write_whole
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import part_of
+from scenarios.results.messages import messages_saved
 from scenarios.results.metrics import Window
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.numbers import Ran, metrics_json
@@ -74,6 +75,9 @@ class Account:
         )
         pacing = {} if self._pacing is None else {case: self._pacing}
         links = {case: sha256} if (sha256 := self._book.links_sha256) else {}
+        saved = messages_saved(
+            recorded.quiet, compared.opened.measured, len(recorded.inverters), ran.scenario.time.T_c_s
+        )
         by_hand = {
             "ended_s": compared.ended,
             "windows": _windows(compared),
@@ -86,7 +90,8 @@ class Account:
             by_hand["missing"] = [{"after_s": a, "before_s": b} for a, b in recorded.missing]
             by_hand["unrecorded"] = [window.label for window in compared.unrecorded]
         write_whole(
-            ran.folder / "metrics.json", metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand)
+            ran.folder / "metrics.json",
+            metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand, saved={case: saved}),
         )
         write_whole(ran.folder / "report.txt", plain(report))
 
