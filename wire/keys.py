@@ -221,6 +221,10 @@ def describe() -> tuple[KeySpec, ...]:
             "at every tick, once its measurement and the neighbours' states of the tick before are in",
         ),
         row(
+            keys.set_points(agent), "publication", "State", "agent", "plant",
+            "wall-clock: instead of state, at a tick at which the law does not tell the neighbours",
+        ),
+        row(
             keys.telemetry, "publication", "Telemetry, LinkReport, LinkOrder", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
         ),
