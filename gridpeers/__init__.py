@@ -14,6 +14,7 @@ Nothing heavy is imported before it is used: the command line and every agent's 
 from __future__ import annotations
 
 from importlib import import_module
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from gridpeers.origin import check_origin
@@ -21,6 +22,7 @@ from gridpeers.origin import check_origin
 check_origin()
 
 if TYPE_CHECKING:
+    from agents.carriers.registry import LAWS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
     from gridpeers.comparison import Comparison, compare
     from gridpeers.prediction import Prediction, predict
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from scenarios.spec.loading import catalogue
     from scenarios.spec.mistakes import ScenarioError
     from wire.parameters import Range, Unit
+
+    law = LAWS.register
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
@@ -50,12 +54,13 @@ _HOME = {
     "Unit": "wire.parameters",
     "catalogue": "scenarios.spec.loading",
     "compare": "gridpeers.comparison",
+    "law": "agents.carriers.registry:LAWS.register",
     "load": "gridpeers.scenario",
     "predict": "gridpeers.prediction",
     "read": "gridpeers.result",
     "sweep": "gridpeers.sweeping",
 }
-"""Module of each public name; it is imported when the name is first used (PEP 562)."""
+"""Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
 
 __all__ = [
     "BrokenRunError",
@@ -74,6 +79,7 @@ __all__ = [
     "Unit",
     "catalogue",
     "compare",
+    "law",
     "load",
     "predict",
     "read",
@@ -92,7 +98,8 @@ if not TYPE_CHECKING:
             from wire.nearest import suggestion
 
             raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
-        found = globals()[name] = getattr(import_module(_HOME[name]), name)
+        module, _, attributes = _HOME[name].partition(":")
+        found = globals()[name] = attrgetter(attributes or name)(import_module(module))
         return found
 
 

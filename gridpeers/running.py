@@ -14,6 +14,7 @@ from scenarios.results.numbers import Clock
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError, model
+from scenarios.spec.law import check_portable
 from wire.nearest import suggestion
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ def run(
     """Run some cases of a scenario, or all, into a folder of their own; see `gridpeers.Scenario.run`."""
     spec = with_cases(scenario.spec, cases)
     check_how(driver, clock, speed, strict=strict)
+    if driver == "processes" and (wrong := check_portable(spec)):
+        raise ScenarioError(wrong)
     folder = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
     request = Request(
         scenario=spec,

@@ -15,6 +15,7 @@ from gridpeers.scenario import Scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.spec import Scenario as Spec
+from scenarios.spec.law import check_portable
 from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.sweep.columns import FATE, columns_of
 from scenarios.sweep.file.model import Sweep
@@ -23,7 +24,6 @@ from scenarios.sweep.file.reading import Base, plan_of
 from scenarios.sweep.one import Done, run_one, run_with_history
 from scenarios.sweep.words import unit_of
 from wire.nearest import suggestion
-from wire.registry import NOTEBOOK
 
 Values = Mapping[str, Iterable[Any]]
 """Values by the dotted path of a key."""
@@ -83,7 +83,7 @@ def sweep(
     runs = list(enumerate(plan.runs))
     done: dict[int, Done] = {}
     kept: dict[int, pd.DataFrame] = {}
-    for end, history in _results(runs, _jobs(scenario, jobs, len(runs)), histories=histories):
+    for end, history in _results(runs, _jobs(plan, jobs), histories=histories):
         done[end.number] = end
         if history is not None:
             kept[end.number] = frames.history_frame(history)
@@ -117,17 +117,19 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
     return plan_of(request, Base(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 
 
-def _jobs(scenario: Scenario, jobs: int | None, runs: int) -> int:
+def _jobs(plan: Plan, jobs: int | None) -> int:
     """Return how many processes share the runs; what a notebook defines is known to its own process alone."""
     if jobs is not None and jobs < 1:
         raise ScenarioError([f"jobs: must be 1 or more, got {jobs}"])
-    if f'"{NOTEBOOK}:' in scenario.to_toml() or (jobs is None and find_spec("joblib") is None):
+    if jobs is None and find_spec("joblib") is None:
+        return 1
+    if any(check_portable(run.scenario) for run in plan.runs):
         return 1
     if jobs is None:
         from scenarios.sweep.workers import cores
 
         jobs = cores()
-    return min(jobs, runs)
+    return min(jobs, len(plan.runs))
 
 
 def _results(runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool) -> Iterator[tuple[Done, History | None]]:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import cache
 from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from wire.nearest import suggestion
@@ -118,6 +119,10 @@ class Registry(Generic[T]):
         text = f'there is no {self.kind} "{reference}"; {suggestion(reference, self.names, self.plural)}'
         raise PluginError(f"{text}; your own is written module:Name")
 
+    def reference(self, name: str) -> str:
+        """Return `module:Name` of what a decorator has added in this process; every other text as it is."""
+        return ":".join(_home(self._added[name])) if name in self._added else name
+
     def portable(self, reference: str) -> str:
         """Return the text by which another process finds the same object: `module:Name` for what a decorator added.
 
@@ -126,17 +131,14 @@ class Registry(Generic[T]):
         PluginError
             If it is defined in a notebook or script, where no other process can import it.
         """
-        module, _, name = reference.partition(":")
-        if reference in self._added:
-            module, name = _home(self._added[reference])
-        elif not name:
-            return reference
-        if module == NOTEBOOK:
+        text = self.reference(reference)
+        module, _, name = text.partition(":")
+        if name and module == NOTEBOOK:
             raise PluginError(
                 f"the {self.kind} {name} is defined in a notebook or in the script that runs, where other processes "
                 f'cannot import it; move it to a module, or run with driver="inprocess"'
             )
-        return f"{module}:{name}"
+        return text
 
     def _imported(self, reference: str, folder: str) -> T:
         module_name, _, name = reference.partition(":")
@@ -176,6 +178,30 @@ class Registry(Generic[T]):
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
+
+
+def folder_of(reference: str, folder: str) -> str:
+    """Return where another process finds the module of a reference: `folder` if it is there, else its own folder.
+
+    Examples
+    --------
+    >>> folder_of("wire.registry:Registry", "here") == str(Path(__file__).resolve().parents[1])
+    True
+    >>> folder_of("nowhere:Mine", "here")
+    'here'
+    """
+    top = reference.partition(":")[0].partition(".")[0]
+    beside = Path(folder)
+    if (beside / f"{top}.py").is_file() or (beside / top).is_dir() or top == NOTEBOOK:
+        return folder
+    try:
+        spec = find_spec(top)
+    except ValueError:  # a module without a specification, as of an embedded interpreter
+        return folder
+    if spec is None or spec.origin is None or spec.origin == "frozen":
+        return folder
+    place = Path(spec.origin).resolve().parent
+    return str(place.parent if spec.submodule_search_locations else place)
 
 
 def _home(it: Any) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from agents.laws.law import Law
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
 from wire.parameters import Range, objections, range_objection
-from wire.registry import PluginError
+from wire.registry import PluginError, folder_of
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
@@ -71,6 +71,17 @@ def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
             mistakes.add(f"case.{name}.gains", text)
 
 
+def check_portable(scenario: Scenario) -> list[str]:
+    """Return a sentence for each case whose law no other process could import."""
+    found = []
+    for case in scenario.cases:
+        try:
+            LAWS.portable(law_of(scenario, case).use)
+        except PluginError as error:
+            found.append(f"case {case}: {error}")
+    return found
+
+
 def _table(law: LawKey) -> dict[str, Any]:
     return {"use": law} if isinstance(law, str) else dict(law)
 
@@ -78,10 +89,12 @@ def _table(law: LawKey) -> dict[str, Any]:
 def _placed(law: LawKey, folder: Path) -> LawKey:
     """A law as it is written, with the folder in which its module, program or FMU is looked for."""
     table = _table(law)
-    local = ":" in str(table.get("use", "")) or "command" in table or "fmu" in table
+    use = LAWS.reference(str(table.get("use", "")))  # a decorator's name is known to this process alone
+    local = ":" in use or "command" in table or "fmu" in table
     if not law or not local or not isinstance(table.get("folder", ""), str):
         return law
-    return table | {"folder": str((folder / table.get("folder", "")).resolve())}
+    place = str((folder / table.get("folder", "")).resolve())
+    return table | ({"use": use, "folder": folder_of(use, place)} if ":" in use else {"folder": place})
 
 
 def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
