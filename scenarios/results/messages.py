@@ -25,7 +25,7 @@ def messages_saved(
 
     Examples
     --------
-    >>> messages_saved([(1.0, 3), (1.02, 1)], [Window("event1", 1.0, 1.04)], agents=4, T_c=0.02)
+    >>> messages_saved([(1.0, 3), (1.02, 1)], [Window(label="event1", start=1.0, end=1.04)], agents=4, T_c=0.02)
     {'event1': 0.5}
     """
     quiet = list(quiet)

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.freerun import FreeAgent
+from agents.laws.law import Law
 from tests.toy.toy_configs import agent_config
 from wire.actions import Fetch, Listen, Publish, Say
 from wire.codec import decode, encode
@@ -21,14 +22,16 @@ T_C = 0.02
 class Lab:
     """inv1 on a fake clock, with everything around it played by the test."""
 
-    def __init__(self, **changes: Any) -> None:
+    def __init__(self, law: Law | None = None, **changes: Any) -> None:
         config = replace(agent_config("inv1"), clock="wall", **changes)
         self.now = 100.0
-        self.side = FreeAgent(config, "me")
+        self.side = FreeAgent(config, "me", law=law)
         self.listened: list[str] = []
         self.fetched: list[str] = []
         self.said: list[str] = []
         self.published: list[Message] = []
+        self.keys: list[str] = []
+        """Of what was published."""
         self.side.start(self.now)
         self.do()
 
@@ -37,6 +40,7 @@ class Lab:
         for action in self.side.take_actions():
             if isinstance(action, Publish):
                 self.published.append(decode(action.payload))
+                self.keys.append(action.key)
             elif isinstance(action, Fetch):
                 self.fetched.append(action.key)
             elif isinstance(action, Listen):

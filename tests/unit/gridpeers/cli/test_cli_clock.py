@@ -8,8 +8,8 @@ from gridpeers.cli.app import main
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["--clock", "wall", "--driver", "inprocess"], "--clock wall: needs a process per agent; leave out "
-     "--driver inprocess"),
+    (["--clock", "wall", "--driver", "inprocess"], "--clock wall: needs a process per agent; use "
+     "--driver processes"),
     (["--clock", "wall", "--speed", "80"], "--speed: must be from 0.1 to 50 (1 is real time), got 80"),
     (["--clock", "wall", "--speed", "nan"], "--speed: must be from 0.1 to 50 (1 is real time), got nan"),
     (["--speed", "2"], "--speed: simulated time has no pace to keep; use it with --clock wall"),
