@@ -22,7 +22,8 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.emulation.setup import Setup
 from scenarios.live.numbers.departures import Compared, compare
-from scenarios.results.claims import CLAIMS, judge
+from scenarios.results.benchmarks import NO_BENCHMARK, benchmark_of
+from scenarios.results.claims import judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
 from scenarios.results.folder import no_room, refusal, set_broken, set_status, shown, write_whole
@@ -165,12 +166,13 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
     if request.figures:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
+    benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
     report = Report(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         found=found,
-        verdicts=judge(found, CLAIMS[scenario.paper]) if scenario.paper and not disturbed else (),
-        experiment="" if disturbed else scenario.paper,
+        verdicts=judge(found, benchmark.claims),
+        benchmark=benchmark,
         notes=[*notes, *_notes(recorded, request.clock)],
         folder=shown(folder) + "/",
     )

@@ -12,13 +12,12 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.commands.compare import compare
-from gridpeers.cli.commands.experiment import experiment
 from gridpeers.cli.commands.live import register
 from gridpeers.cli.commands.predict import predict
-from gridpeers.cli.commands.reproduce import reproduce
 from gridpeers.cli.commands.run import run
 from gridpeers.cli.commands.show import check, doc, list_
 from gridpeers.cli.commands.sweep import sweep
+from gridpeers.cli.contributed import contributed
 from gridpeers.cli.mistyped import Commands
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
 from wire.driver.output import speaking
@@ -71,6 +70,8 @@ def gridpeers(
 
 app.command()(run)
 app.command("list")(list_)
-for command in (compare, check, doc, reproduce, sweep, predict, experiment):
+for command in (compare, check, doc, sweep, predict):
     app.command()(command)
+for name, command in contributed():
+    app.command(name)(command)
 register(app)

@@ -10,7 +10,7 @@ from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
-from scenarios.results.paper_tables import Cell
+from scenarios.results.published import Published
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
@@ -74,20 +74,20 @@ class Findings:
         """Whether an event left several islands: each shares for itself, and what the whole shares means nothing."""
         return bool(self.islands.get(case, {}).get(event))
 
-    def value(self, cell: Cell) -> float:
+    def value(self, cell: Published) -> float:
         """Our number at the place of one of the paper's."""
         return float(getattr(self._steady(cell), cell.quantity))
 
-    def reason(self, cell: Cell) -> str:
+    def reason(self, cell: Published) -> str:
         """Why our number there is no steady value; "" where it is one."""
         return self._steady(cell).reasons.get(cell.quantity, "")
 
-    def _steady(self, cell: Cell) -> Steady:
+    def _steady(self, cell: Published) -> Steady:
         if cell.island:
             return self.islands[cell.case][cell.event][cell.island]
         return self.results[cell.case][cell.event]
 
-    def within(self, cell: Cell) -> bool | None:
+    def within(self, cell: Published) -> bool | None:
         """Whether our number there is near enough to the paper's, and steady; None where it is not judged."""
         return cell.within(float("nan") if self.reason(cell) else self.value(cell))
 
@@ -106,7 +106,7 @@ class Findings:
                     ]
         return found
 
-    def has(self, cell: Cell) -> bool:
+    def has(self, cell: Published) -> bool:
         """Whether there is such a number."""
         events = self.results.get(cell.case, {})
         return cell.event in events and (

@@ -10,13 +10,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from scenarios.results.benchmarks import NO_BENCHMARK, Benchmark
 from scenarios.results.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
-from scenarios.results.headline import headline, numbers
 from scenarios.results.metrics import Steady
-from scenarios.results.paper_tables import DIGITS, UNITS, heading, paper_cell, tables_of
+from scenarios.results.quantities import DIGITS, UNITS, Quantity, heading
 from scenarios.results.steadiness import STEADY
-from scenarios.results.tolerances import Quantity
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 
@@ -32,9 +31,9 @@ class Report:
     found: Findings
     """What was measured."""
     verdicts: Sequence[Verdict]
-    """Claims judged; empty for a scenario of no experiment of the paper."""
-    experiment: str = ""
-    """Experiment of the paper whose numbers stand beside ours; "" for none."""
+    """Claims judged; empty for a scenario without a benchmark."""
+    benchmark: Benchmark = NO_BENCHMARK
+    """What is published of the experiment; its numbers stand beside ours."""
     notes: Sequence[str]
     """What a reader must know besides, e.g. that an agent died."""
     folder: str
@@ -135,12 +134,9 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
         for name in dict.fromkeys(name for parts in islands.values() for name in parts):
             parts = {event: islands[event][name] for event in islands if name in islands[event]}
             rows.append(_row(report, f"  island of {name}", case, parts, events, quantities, name))
-    numbers = [
-        table.number
-        for table in tables_of(report.experiment)
-        if any(cell.quantity in quantities and report.found.has(cell) for cell in table.cells)
-    ]
-    against = f", ours | paper's Table {' and '.join(numbers)}" if numbers else ""
+    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and report.found.has(one)]
+    sources = dict.fromkeys(one.source for one in beside)
+    against = f", ours | paper's {' and '.join(sources)}" if sources else ""
     apart = any(report.found.apart(case, event) for case, steady in results.items() for event in steady)
     return Grid(
         title=f"{title} after each event{against}",
@@ -184,8 +180,7 @@ def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Ste
 
     What is not steady is no number: its reason's first words stand there, and all of it below the table.
     """
-    experiment = report.experiment
-    paper = paper_cell(experiment, case, event, quantity, island) if experiment else None
+    paper = report.benchmark.number(case, event, quantity, island)
     ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
     text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
     if paper is None:
@@ -229,7 +224,7 @@ def _plain_grid(grid: Grid) -> str:
 
 def _summary(report: Report) -> list[str]:
     """How many claims hold, and how near the paper's tables are."""
-    return [_count(report.verdicts), *headline(numbers(report.found, tables_of(report.experiment)))]
+    return [_count(report.verdicts), *report.benchmark.summary(report.found)]
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:

@@ -6,7 +6,7 @@ prints this file's sentences.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -143,8 +143,9 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Name of the run folder; without it, that of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
-    paper: Literal["", "islanding", "intermittency", "communication", "switching", "plug-n-play", "wind-up"] = ""
-    """Experiment of the paper whose tables and claims the run is judged by; "" judges nothing."""
+    paper: str = ""
+    """Benchmark whose published numbers and claims the run is judged by: "islanding", "intermittency", "communication",
+    "switching", "plug-n-play", "wind-up", those of the paper, or your own as "module:Name"; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""
     without_agent: tuple[str, ...] = ()

@@ -10,6 +10,7 @@ import msgspec
 
 from scenarios.live.book import Book
 from scenarios.live.numbers.departures import Compared, compare
+from scenarios.results.benchmarks import NO_BENCHMARK, benchmark_of
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find_in
 from scenarios.results.folder import shown, write_whole
@@ -69,7 +70,7 @@ class Account:
             titles={case: ran.scenario.cases[case].title},
             found=found,
             verdicts=(),
-            experiment="" if compared.disturbed else ran.scenario.paper,
+            benchmark=NO_BENCHMARK if compared.disturbed else benchmark_of(ran.scenario.paper),
             notes=[f"case {case}: {note}" for note in self._notes(compared)],
             folder=shown(ran.folder) + "/",
         )

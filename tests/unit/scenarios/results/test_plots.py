@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from papers.singhal2022.figures.topologies import topologies
+from papers.singhal2022.figures.var_sharing import var_sharing
 from plant.tables import read_feeder
 from scenarios.results.findings import GraphRun
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import Spell
 from scenarios.results.metrics import Steady
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
-from scenarios.results.plots.banks import var_sharing
-from scenarios.results.plots.graphs import topologies
 from scenarios.results.plots.inverters import powers
 from scenarios.results.plots.saving import Format, save
 from scenarios.results.settling import Settling

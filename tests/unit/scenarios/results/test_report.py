@@ -7,11 +7,14 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from scenarios.results.claims import CLAIMS, judge
+from papers.singhal2022.benchmarks import ISLANDING
+from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.tables import tables_of
+from scenarios.results.benchmarks import NO_BENCHMARK
+from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.numbers import Ran, metrics_json
-from scenarios.results.paper_tables import tables_of
 from scenarios.results.report import Report, plain, show
 from scenarios.spec import load_scenario
 
@@ -39,7 +42,7 @@ def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
         titles={"I": "no control"},
         found=found,
         verdicts=judge(found, CLAIMS["islanding"]) if judged else (),
-        experiment="islanding" if judged else "",
+        benchmark=ISLANDING if judged else NO_BENCHMARK,
         notes=["case I: inv3 [died] at t = 2 s"],
         folder="runs/islanding/x/",
     )

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.results.claims import CLAIMS, judge
+from papers.singhal2022.benchmarks import ISLANDING
+from papers.singhal2022.claims import CLAIMS
+from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Plates
 from scenarios.results.metrics import Steady, Window, measure
@@ -173,7 +175,7 @@ def test_the_report_prints_the_reason_and_not_the_number() -> None:
     """No cell shows a number that is not steady; the reason stands below the table, with the last mean."""
     found, _ = ramping()
     report = Report(
-        scenario="islanding", titles={}, found=found, verdicts=(), experiment="islanding", notes=[], folder="x/"
+        scenario="islanding", titles={}, found=found, verdicts=(), benchmark=ISLANDING, notes=[], folder="x/"
     )
 
     text = plain(report)

@@ -1,0 +1,25 @@
+"""What a run of each experiment is shown beside and judged by: the key `paper` of a scenario names one of them."""
+
+from __future__ import annotations
+
+from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.headline import headline, numbers
+from papers.singhal2022.tables import tables_of
+from scenarios.results.benchmarks import Benchmark
+
+
+def _benchmark(experiment: str) -> Benchmark:
+    tables = tables_of(experiment)
+    return Benchmark(
+        numbers=tuple(cell for table in tables for cell in table.cells),
+        claims=CLAIMS[experiment],
+        summary=lambda found: headline(numbers(found, tables)),
+    )
+
+
+ISLANDING = _benchmark("islanding")
+INTERMITTENCY = _benchmark("intermittency")
+COMMUNICATION = _benchmark("communication")
+SWITCHING = _benchmark("switching")
+PLUG_N_PLAY = _benchmark("plug-n-play")
+WIND_UP = _benchmark("wind-up")

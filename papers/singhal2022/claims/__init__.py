@@ -1,0 +1,23 @@
+"""What the paper claims of its experiments, one file per experiment."""
+
+from papers.singhal2022.claims.communication import COMMUNICATION
+from papers.singhal2022.claims.intermittency import INTERMITTENCY
+from papers.singhal2022.claims.islanding import ISLANDING
+from papers.singhal2022.claims.plug_n_play import PLUG_N_PLAY
+from papers.singhal2022.claims.switching import SWITCHING
+from papers.singhal2022.claims.topology import TOPOLOGY
+from papers.singhal2022.claims.wind_up import WIND_UP
+from scenarios.results.claims import Claim
+
+CLAIMS: dict[str, tuple[Claim, ...]] = {
+    "islanding": ISLANDING,
+    "intermittency": INTERMITTENCY,
+    "communication": COMMUNICATION,
+    "topology": TOPOLOGY,
+    "plug-n-play": PLUG_N_PLAY,
+    "switching": SWITCHING,
+    "wind-up": WIND_UP,
+}
+"""Claims by experiment, named as in the scenario's key `paper`; the topologies are a sweep and have no scenario."""
+
+__all__ = ["CLAIMS"]

@@ -1,0 +1,98 @@
+"""What the paper claims of the communication topology: random connected graphs of 8 to 36 links (section 4, figure)."""
+
+from __future__ import annotations
+
+from statistics import median
+
+from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
+from scenarios.results.claims.claim import Claim
+from scenarios.results.findings import Findings, GraphRun
+from scenarios.results.metrics import MPSI_BAND
+
+TREE = 8
+"""Links of a tree of nine inverters: with fewer, no graph is connected."""
+
+SOURCE = "section 4, figure of topologies"
+
+
+def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
+    """Median time (s) to MPSI < 0.01 by number of links; infinite where most never share."""
+    by_links: dict[int, list[float]] = {}
+    for run in runs:
+        t = run.settled.t_share_s
+        by_links.setdefault(run.links, []).append(float("inf") if t is None else t)
+    return {links: median(by_links[links]) for links in sorted(by_links)}
+
+
+def connected(found: Findings) -> tuple[GraphRun, ...]:
+    """Runs on connected graphs."""
+    return tuple(run for run in found.graphs if run.connected)
+
+
+def _falls(found: Findings) -> tuple[bool, str]:
+    times = medians(connected(found))
+    first, last = min(times), max(times)
+    holds = times[last] < times[int(FEW_LINKS.value)] < times[first]
+    shown = (first, int(FEW_LINKS.value), last)
+    return holds, ", ".join(f"{links} links {times[links]:.2f} s" for links in shown)
+
+
+def _steepest_at_few(found: Findings) -> tuple[bool, str]:
+    times = medians(connected(found))
+    bend, last = int(FEW_LINKS.value), max(times)
+    few = (times[TREE] - times[bend]) / (bend - TREE)
+    many = (times[bend] - times[last]) / (last - bend)
+    return (
+        few > STEEPER.value * many,
+        f"{1e3 * few:.0f} ms a link from {TREE} to {bend}, {1e3 * many:.1f} ms from there to {last}",
+    )
+
+
+def _same_end(found: Findings) -> tuple[bool, str]:
+    runs = connected(found)
+    f_error, MPSI = max(run.steady.f_error_Hz for run in runs), max(run.steady.MPSI for run in runs)
+    text = f"{len(runs)} graphs: abs(f-60) at most {f_error:.4f} Hz, MPSI at most {MPSI:.4f}"
+    return max(f_error, MPSI) < SAME_END.value, text
+
+
+def _none_below(found: Findings) -> tuple[bool, str]:
+    runs = [run for run in found.graphs if run.links < TREE]
+    least = min((run.steady.MPSI for run in runs), default=0.0)
+    return bool(runs) and least >= MPSI_BAND, f"{len(runs)} graphs: MPSI at least {least:.3f}"
+
+
+TOPOLOGY: tuple[Claim, ...] = (
+    Claim(
+        name="more_links_are_faster",
+        text="time to MPSI < 0.01 falls with the number of links",
+        source=SOURCE,
+        figure="topology",
+        judge=_falls,
+        measures=(),
+    ),
+    Claim(
+        name="steepest_at_few_links",
+        text="it rises slowly from 36 down to about 12 links, and sharply toward 8",
+        source=SOURCE,
+        figure="topology",
+        judge=_steepest_at_few,
+        measures=(),
+    ),
+    Claim(
+        name="same_steady_state",
+        text="all connected graphs reach the same steady state",
+        source=SOURCE,
+        figure="topology",
+        judge=_same_end,
+        measures=(),
+    ),
+    Claim(
+        name="none_below_8",
+        text="below 8 links there is no consensus",
+        source=SOURCE,
+        figure="topology",
+        judge=_none_below,
+        measures=(),
+    ),
+)
+"""Claims of the topologies."""

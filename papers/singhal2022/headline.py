@@ -1,0 +1,90 @@
+"""How near the paper's tables are, in a few lines that leave nothing out: judged, not judged, beside its own size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from papers.singhal2022.tables import Cell, PaperTable
+from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
+from scenarios.results.findings import Findings
+
+
+class Number(NamedTuple):
+    """A number of the paper with ours."""
+
+    cell: Cell
+    ours: float
+    """Not a number where ours is not steady."""
+
+
+def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[Number]:
+    """All numbers of tables that were run, ours beside the paper's."""
+    return [
+        Number(cell, float("nan") if found.reason(cell) else found.value(cell))
+        for table in tables
+        for cell in table.cells
+        if found.has(cell)
+    ]
+
+
+def headline(all_numbers: Sequence[Number]) -> list[str]:
+    """Lines on what is within its tolerance, what is not judged by one, and V_error beside its own size."""
+    return [*_judged(all_numbers), *_by_factor(all_numbers), *_relative(all_numbers)]
+
+
+def within(all_numbers: Iterable[Number], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
+    """How many numbers pass a judgement, and how many it is about."""
+    passed = [judge(cell, ours) for cell, ours in all_numbers]
+    return sum(map(bool, passed)), sum(verdict is not None for verdict in passed)
+
+
+def _judged(all_numbers: Sequence[Number]) -> list[str]:
+    near, judged = within(all_numbers, Cell.within)
+    if not judged:
+        return []
+    named = _tables(all_numbers)
+    return [f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it."]
+
+
+def _by_factor(all_numbers: Sequence[Number]) -> list[str]:
+    """The numbers that the first line leaves out."""
+    left = [number for number in all_numbers if number.cell.tolerance.value is None]
+    if not left:
+        return []
+    near, _ = within(left, Cell.within_factor)
+    times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
+    told = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
+    far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
+    return [
+        f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {told}"
+        f"{near} of {len(left)} within a factor of {MQSI_FACTOR.value:g}; farthest off: {far}."
+    ]
+
+
+def _relative(all_numbers: Sequence[Number]) -> list[str]:
+    about = [number for number in all_numbers if number.cell.relative is not None]
+    if not about:
+        return []
+    near, judged = within(about, Cell.within_relative)
+    far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
+    return [
+        f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE.value:g} % of the paper's number "
+        f"(0.000: below 0.0005 pu); farthest off: {far}."
+    ]
+
+
+def _farthest(some: Sequence[Number], off: Callable[[Cell, float], float]) -> str:
+    """The number that is farthest off, ours for the paper's; one that is no number is farther than all."""
+    cell, ours = max(some, key=lambda one: math.inf if math.isnan(one.ours) else off(*one))
+    shown = "not steady" if math.isnan(ours) else f"{ours:.{cell.digits + 1}f}"
+    return f"{shown} for {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
+
+
+def _tables(some: Iterable[Number]) -> str:
+    """Tables by their numbers, e.g. "Tables I and II"."""
+    named = list(dict.fromkeys(number.cell.table for number in some))
+    if len(named) == 1:
+        return f"Table {named[0]}"
+    return f"Tables {', '.join(named[:-1])} and {named[-1]}"

@@ -1,0 +1,85 @@
+"""Why our MQSI is not the paper's: the same islanding with one capacitor bank at other buses, and nothing else changed.
+
+The paper prints neither where its capacitors stand nor where its inverters do. Our feeder has 600 kvar in two banks of
+300 kvar, at the standard feeder's bus 83 and at bus 151; here they are moved or taken away.
+"""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from papers.singhal2022.reproduce.topology import run_all
+from plant.tables.read import DATA
+from scenarios.spec import Scenario
+
+CASES = ("I", "II", "III", "IV")
+EVENTS = ("event1", "event2")
+
+BANKS: dict[str, dict[str, int]] = {
+    "300 kvar at 83, 300 at 151 (ours)": {"83": 100, "151": 100},
+    "600 kvar at 83 (as in the standard feeder)": {"83": 200},
+    "twice ours: 600 kvar at both": {"83": 200, "151": 200},
+    "none of the 600 kvar": {},
+}
+"""Variants: kvar a phase, by bus."""
+
+
+@dataclass(frozen=True)
+class BankRun:
+    """MQSI of one case over one variant."""
+
+    variant: str
+    case: str
+    MQSI: Mapping[str, float]
+    """By event."""
+
+
+def study(base: Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int) -> tuple[BankRun, ...]:
+    """Run all cases over all variants.
+
+    Parameters
+    ----------
+    base : Scenario
+        The islanding.
+    folder : Path
+        Takes the variants' feeders.
+    tell : Callable[[int, int], None]
+        Told how many runs are done, and of how many.
+    jobs : int
+        Runs at a time.
+    """
+    runs = []
+    for number, (variant, banks) in enumerate(BANKS.items()):
+        feeder = _feeder(DATA / base.plant.feeder, folder / f"feeder{number}", banks)
+        scenario = replace(base, plant=replace(base.plant, feeder=str(feeder)), paper="")
+        runs += [(variant, scenario, case) for case in CASES]
+    found = {}
+    tell(0, len(runs))
+    for end in run_all([(scenario, case) for _, scenario, case in runs], jobs):
+        if end.status == "broke":
+            raise RuntimeError(f"capacitor banks, {runs[end.number][0]}, case {runs[end.number][2]}: {end.why}")
+        found[end.number] = {event: end.measures[f"{event}.MQSI"] or 0.0 for event in EVENTS}
+        tell(len(found), len(runs))
+    return tuple(BankRun(variant, case, found[i]) for i, (variant, _, case) in enumerate(runs))
+
+
+def _feeder(standard: Path, folder: Path, banks: Mapping[str, int]) -> Path:
+    """A copy of a feeder's tables in which the banks of buses 83 and 151 are these."""
+    shutil.copytree(standard, folder)
+    path = folder / "capacitors.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    rows = [row for row in rows if row["bus"] not in ("83", "151")]
+    for bus, kvar in banks.items():
+        rows.append({**rows[0], "bus": bus, "origin": "changed", **{f"Q_{phase}_kvar": kvar for phase in "abc"}})
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder

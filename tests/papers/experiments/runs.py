@@ -1,0 +1,61 @@
+"""Short runs of the experiments' scenarios in this process, with other links than the files have."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import msgspec
+
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from papers.singhal2022.experiments.swept import Swept
+from papers.singhal2022.experiments.told import Told
+from plant.equipment import Feeder
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.history import History
+from scenarios.results.record import Tape
+from scenarios.spec import Scenario, load_scenario
+from scenarios.spec.configs import configs
+from scenarios.sweep.one import plant_at_start, run_one
+
+ALL = "* <-> *"
+
+
+def measured(scenario: str, case: str, end_s: float, *links: Fault, **of: Any) -> dict[str, float | None]:
+    """Indexes of event 1 in one case, by their names; `gains` and `handling` of the case can be changed."""
+    spec, _ = load_scenario(scenario)
+    rule = spec.cases[case]
+    changed = {name: msgspec.structs.replace(getattr(rule, name), **values) for name, values in of.items()}
+    spec = msgspec.structs.replace(
+        spec,
+        time=msgspec.structs.replace(spec.time, end_s=end_s),
+        events=spec.events[:1],
+        netem=Netem(links=links),
+        cases={case: msgspec.structs.replace(rule, **changed)},
+    )
+    done = run_one(0, spec, case)
+    assert done.status == "ran", done.why
+    return {name.removeprefix("event1."): value for name, value in done.measures.items()}
+
+
+def told(scenario: str, end_s: float, *cases: str) -> Told:
+    """Some cases of a scenario with their histories."""
+    spec, feeder = load_scenario(scenario)
+    spec = msgspec.structs.replace(spec, time=msgspec.structs.replace(spec.time, end_s=end_s))
+    return Told(scenario=spec, feeder=feeder, histories={case: _history(spec, feeder, case) for case in cases})
+
+
+@cache
+def theory(scenario: str) -> Swept:
+    """What theory needs to know of a scenario, without any runs."""
+    return Swept(rows=(), base=load_scenario(scenario)[0], window="event1")
+
+
+def _history(spec: Scenario, feeder: Feeder, case: str) -> History:
+    plant, agents = configs(spec, feeder, case)
+    tape = Tape()
+    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant))
+    assert not outcome.broke, outcome.broke
+    recorded = tape.finish(spec.time.end_s, spec.time.record_s)
+    return History.of(recorded.inverters, recorded.rows)

@@ -1,0 +1,130 @@
+"""The report of the whole paper: made from what was found, whole by itself, and honest about what misses."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.headline import within
+from papers.singhal2022.reproduce.found import Reproduction, Result, metrics_json
+from papers.singhal2022.reproduce.grid import lines
+from papers.singhal2022.reproduce.markdown import markdown
+from papers.singhal2022.reproduce.page import html
+from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
+from papers.singhal2022.reproduce.settings import settings
+from papers.singhal2022.reproduce.topology import graphs
+from papers.singhal2022.tables import TABLES, Cell, tables_of
+from scenarios.results.claims import judge
+from scenarios.results.findings import Findings
+from scenarios.results.metrics import Steady
+from scenarios.spec import load_scenario
+from scenarios.sweep.file.graphs import algebraic_connectivity
+
+ISLANDING: Part = PARTS[0]
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c489"
+    "0000000d49444154789c6360000002000001e221bc330000000049454e44ae426082"
+)
+"""The smallest picture."""
+
+
+def result(folder: Path, f_error: float = 0.136) -> Result:
+    """Islanding as the paper has it, but for one frequency error."""
+    numbers: dict[str, dict[str, dict[str, float]]] = {}
+    for table in tables_of("islanding"):
+        for cell in table.cells:
+            numbers.setdefault(cell.case, {}).setdefault(cell.event, {})[cell.quantity] = cell.paper
+    numbers["I"]["event1"]["f_error_Hz"] = f_error
+    results = {
+        case: {
+            event: Steady(**values, t_restore_s=0.7 if case == "IV" else None, p={"inv2": 0.647})
+            for event, values in events.items()
+        }
+        for case, events in numbers.items()
+    }
+    found = Findings(results=results, P_set0=0.647, GFL=("inv2",))
+    image = folder / "image.png"
+    image.write_bytes(PIXEL)
+    return Result(
+        part=ISLANDING,
+        found=found,
+        verdicts=judge(found, CLAIMS["islanding"]),
+        tables=tables_of("islanding"),
+        figures=dict.fromkeys(ISLANDING.pictures, image),
+        sha256={"IV": "1b14ee14"},
+        metrics={"seed": 1},
+        wall_s=1.0,
+        cpu_s=2.0,
+    )
+
+
+def whole(*results: Result) -> Reproduction:
+    """A report of some parts."""
+    return Reproduction(results=results, driver="inprocess", seed=1, started="2026-01-01 12:00", only="")
+
+
+def test_the_page_needs_nothing_but_itself(tmp_path: Path) -> None:
+    """Every image is inside, nothing is fetched: no script, no link to a style, no address."""
+    page = html(whole(result(tmp_path)), settings({"islanding": load_scenario("islanding")[0]}))
+
+    assert page.count("data:image/png;base64,") == len(ISLANDING.pictures)
+    assert not re.findall(r"https?://|<script|<link|src=\"(?!data:)|url\(", page)
+
+
+@pytest.mark.parametrize("of", [html, markdown])
+def test_every_number_verdict_and_reason_is_told(tmp_path: Path, of: object) -> None:
+    """The paper's number, ours with a digit more, the difference, each claim with its status and each known miss."""
+    one = result(tmp_path)
+    text = of(whole(one), [("k_p", "0.0007 s", "speed")])  # type: ignore[operator]
+
+    assert all(token in text for token in ("0.14", "0.136", "-0.004", "0.0007 s"))
+    for verdict in one.verdicts:
+        assert verdict.status in text
+    assert "within 0.02; " in text
+    assert "told by a factor of 2 only" in text
+    assert "24 of the 24 numbers" in text
+    assert "The other 8, all MQSI" in text
+    assert "V_error beside its own size: 8 of 8" in text
+
+
+def test_a_number_that_is_off_fails_the_whole(tmp_path: Path) -> None:
+    """It is marked in its cell, fails the claim on its column, and the command ends with 1."""
+    off = whole(result(tmp_path, f_error=0.2))
+    entry = lines(TABLES[0], off.results[0])[0].entries[0]
+
+    assert entry == ("0.14", "0.200", "+0.060", (("", False),))
+    assert off.failed
+    assert within(off.numbers, Cell.within) == (23, 24)
+    assert not whole(result(tmp_path)).failed
+
+
+def test_what_is_no_number_is_null(tmp_path: Path) -> None:
+    """metrics.json is JSON for every reader, also where an index has no value."""
+    one = result(tmp_path)
+    IV = {**one.found.results["IV"]}
+    IV["event1"] = replace(IV["event1"], MQSI=float("nan"))
+    found = replace(one.found, results={**one.found.results, "IV": IV})
+    told = json.loads(metrics_json(whole(replace(one, found=found))))
+    cell = next(c for c in told["tables"] if (c["case"], c["event"], c["quantity"]) == ("IV", "event1", "MQSI"))
+
+    assert cell["ours"] is None
+    assert len(told["tables"]) == 32
+
+
+def test_every_claim_is_shown_and_every_figure_exists() -> None:
+    """A claim that names a figure names one of its own part's; every experiment with claims is a part."""
+    for part in PARTS:
+        keys = {picture.key for picture in part.pictures}
+        assert {claim.figure for claim in CLAIMS.get(part.experiment, ())} <= keys | {""}
+    assert {part.experiment for part in PARTS if part.experiment} == set(CLAIMS)
+    assert {table.experiment for table in TABLES} == {part.experiment for part in chosen("tables")}
+    assert all(chosen(choice) for choice in CHOICES)
+
+
+def test_graphs_below_8_links_are_not_connected_and_all_others_are() -> None:
+    """A graph of nine with fewer than eight links cannot be connected. Figure of topologies."""
+    for edges in graphs(9, seed=1):
+        assert (algebraic_connectivity(9, edges) > 1e-6) == (len(edges) >= 8)

@@ -1,0 +1,93 @@
+"""The paper's experiments, each case run once for all tests of this folder."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from papers.singhal2022.claims import CLAIMS
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.claims import judge
+from scenarios.results.findings import Findings, Results, find
+from scenarios.results.history import History, Plates
+from scenarios.spec import load_scenario
+from scenarios.spec.configs import configs
+from wire.messages import Telemetry
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Results of all cases of one scenario."""
+
+    plates: Plates
+    histories: dict[str, History]
+    found: Findings
+
+    @property
+    def steady(self) -> Results:
+        """Steady values by case and event."""
+        return self.found.results
+
+    def statuses(self, experiment: str) -> dict[str, str]:
+        """Verdict on each claim of an experiment, by its name."""
+        return {verdict.claim.name: verdict.status for verdict in judge(self.found, CLAIMS[experiment])}
+
+
+def expected(experiment: str) -> dict[str, str]:
+    """What the documentation says of each claim: it holds, or is a known miss."""
+    return {claim.name: "MISS" if claim.known_miss else "PASS" for claim in CLAIMS[experiment]}
+
+
+@pytest.fixture(scope="session")
+def islanding() -> Experiment:
+    """The paper's islanding experiment, by the driver without processes."""
+    return experiment("islanding")
+
+
+@pytest.fixture(scope="session")
+def plug_n_play() -> Experiment:
+    """The paper's plug-n-play experiment, by the driver without processes."""
+    return experiment("plug-n-play")
+
+
+@pytest.fixture(scope="session")
+def intermittency() -> Experiment:
+    """The paper's intermittency experiment, by the driver without processes."""
+    return experiment("intermittency")
+
+
+@pytest.fixture(scope="session")
+def communication() -> Experiment:
+    """The paper's reduced communication and link failure, by the driver without processes."""
+    return experiment("reduced-communication")
+
+
+@pytest.fixture(scope="session")
+def switching() -> Experiment:
+    """The paper's microgrid switching, by the driver without processes."""
+    return experiment("microgrid-switching")
+
+
+@pytest.fixture(scope="session")
+def wind_up() -> Experiment:
+    """Our experiment on the paper's Remark 2, by the driver without processes."""
+    return experiment("wind-up")
+
+
+def experiment(name: str) -> Experiment:
+    """Run all cases of a scenario."""
+    scenario, feeder = load_scenario(name)
+    plates = Plates.of(feeder.inverters)
+    events = [(event.label, event.t_s) for event in scenario.events]
+    histories = {}
+    for case in scenario.cases:
+        rows: list[tuple[float, ...]] = []
+
+        def take(telemetry: Telemetry, rows: list[tuple[float, ...]] = rows) -> None:
+            rows.extend(telemetry.rows)
+
+        outcome = run_inprocess(*configs(scenario, feeder, case), take)
+        assert not outcome.broke
+        assert outcome.reproducible
+        histories[case] = History.of(plates.names, rows)
+    found = find(scenario, feeder, plates, histories, dict.fromkeys(histories, events))
+    return Experiment(plates, histories, found)

@@ -1,0 +1,179 @@
+"""Verdicts on the paper's claims, tried on the paper's own numbers and on numbers that are wrong."""
+
+from dataclasses import replace
+
+import pytest
+
+from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.tables import tables_of
+from papers.singhal2022.tolerances import TABLE
+from scenarios.results.claims import Verdict, judge
+from scenarios.results.findings import Findings, GraphRun
+from scenarios.results.metrics import Steady
+from scenarios.results.settling import Settling
+
+ISLANDING = CLAIMS["islanding"]
+Table = dict[str, dict[str, Steady]]
+
+
+def judged(results: Table) -> tuple[Verdict, ...]:
+    """Verdicts on the islanding experiment."""
+    return judge(Findings(results=results, P_set0=0.65, GFL=("inv2",)), ISLANDING)
+
+
+def paper() -> Table:
+    """Results that are exactly the paper's tables."""
+    restored = {("IV", "event1"): 0.8, ("IV", "event2"): 0.9}
+    numbers: dict[str, dict[str, dict[str, float]]] = {}
+    for table in tables_of("islanding"):
+        for cell in table.cells:
+            numbers.setdefault(cell.case, {}).setdefault(cell.event, {})[cell.quantity] = cell.paper
+    return {
+        case: {
+            event: Steady(**values, t_restore_s=restored.get((case, event)), p={"inv2": 0.65})
+            for event, values in events.items()
+        }
+        for case, events in numbers.items()
+    }
+
+
+def changed(case: str, event: str, **values: object) -> Table:
+    """The paper's tables with one cell changed."""
+    table = paper()
+    table[case][event] = replace(table[case][event], **values)  # type: ignore[arg-type]
+    return table
+
+
+def verdict(name: str, results: Table) -> Verdict:
+    """The verdict on one claim."""
+    return next(verdict for verdict in judged(results) if verdict.claim.name == name)
+
+
+def test_the_papers_own_numbers_pass_every_claim() -> None:
+    """Tables I and II of the paper bear out what its text says."""
+    assert {verdict.claim.name: verdict.status for verdict in judged(paper())} == {
+        claim.name: "PASS" for claim in ISLANDING
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "results"),
+    [
+        ("table_I_f_error_Hz", changed("I", "event1", f_error_Hz=0.151)),
+        ("table_I_MPSI", changed("II", "event2", MPSI=0.215)),
+        ("table_II_V_error", changed("III", "event2", V_error=0.0051)),
+        ("only_IV_restores", changed("IV", "event1", f_error_Hz=0.011)),
+        ("only_IV_restores", changed("III", "event1", f_error_Hz=0.009)),
+        ("IV_within_1_s", changed("IV", "event2", t_restore_s=1.01)),
+        ("IV_within_1_s", changed("IV", "event1", t_restore_s=None)),
+        ("GFL_idle", changed("III", "event2", p={"inv2": 0.67})),
+        ("MQSI_order", changed("II", "event1", MQSI=1.76)),
+        ("MQSI_order", changed("IV", "event2", MQSI=1.2)),
+        ("IV_shares_vars", changed("IV", "event2", MQSI=0.101)),
+        ("IV_5_times_below_II_and_III", changed("III", "event2", MQSI=0.24)),
+        ("IV_MQSI_5_times_better_than_I", changed("I", "event1", MQSI=0.19)),
+        ("table_I_MPSI", changed("II", "event2", MPSI=float("nan"))),
+    ],
+)
+def test_a_number_that_is_off_fails_the_claim(name: str, results: Table) -> None:
+    """Each claim can fail, and says what was found."""
+    failed = verdict(name, results)
+
+    assert failed.status == "FAIL"
+    assert failed.found
+
+
+def test_a_known_miss_is_told_with_its_reason() -> None:
+    """A claim that cannot hold here is shown as such, neither as passed nor as failed."""
+    missed = verdict("IV_V_error_5_times_better_than_I", changed("IV", "event2", V_error=0.003))
+
+    assert missed.status == "MISS"
+    assert missed.claim.known_miss
+
+
+@pytest.mark.parametrize("V_error", [0.0, 0.00126])
+def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
+    """What a tolerance of 0.003 pu passes, a zero for 0.001 or a quarter more than it at 0.002, is told as a miss."""
+    results = changed("III", "event2", V_error=V_error)
+
+    assert verdict("table_II_V_error", results).status == "PASS"
+    assert verdict("table_II_V_error_relative", results).status == "MISS"
+    assert "7 of 8, at most off by" in verdict("table_II_V_error_relative", results).found
+
+
+def test_a_claim_about_a_case_that_was_left_out_is_not_judged() -> None:
+    """With case IV alone, what compares cases is not run, and what is about IV is judged."""
+    verdicts = {verdict.claim.name: verdict for verdict in judged({"IV": paper()["IV"]})}
+
+    assert verdicts["IV_within_1_s"].status == "PASS"
+    assert verdicts["only_IV_restores"].status == "NOT RUN"
+    assert verdicts["only_IV_restores"].found == "needs case I, II, III"
+
+
+def test_a_claim_about_an_event_that_is_not_there_is_not_judged() -> None:
+    """A copy of the experiment with other events is not compared with the paper's."""
+    results = {case: {"event1": events["event1"], "storm": events["event2"]} for case, events in paper().items()}
+
+    assert {verdict.status for verdict in judged(results)} == {"NOT RUN"}
+    assert verdict("IV_within_1_s", results).found == "needs event2"
+
+
+def test_nothing_left_to_better_is_better_by_any_factor() -> None:
+    """An MQSI of exactly 0 in case IV passes what asks for a factor."""
+    results = changed("IV", "event1", MQSI=0.0)
+
+    assert verdict("IV_5_times_below_II_and_III", results).status == "PASS"
+    assert verdict("IV_MQSI_5_times_better_than_I", results).status == "PASS"
+
+
+def test_every_tolerance_has_its_reason() -> None:
+    """No number is compared, or left uncompared, without a word on why; every claim has a name and a place."""
+    assert all(tolerance.reason for tolerance in TABLE.values())
+    for claims in CLAIMS.values():
+        assert len({claim.name for claim in claims}) == len(claims)
+        assert all(claim.source for claim in claims)
+
+
+def over_graphs(**times: float | None) -> Findings:
+    """Results over graphs whose links are l8, l12 ..., with these times to share (s)."""
+    runs = []
+    for links, t in times.items():
+        n = int(links.removeprefix("l"))
+        shared = 0.0 if n >= 8 else 0.2
+        runs.append(
+            GraphRun(
+                links=n,
+                connected=n >= 8,
+                settled=Settling(t_f_s=t, t_share_s=t, f_swing_Hz=0.0, V_swing_pu=0.0),
+                steady=Steady(f_error_Hz=0.0, MPSI=shared, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
+            )
+        )
+    return Findings(results={}, graphs=tuple(runs))
+
+
+@pytest.mark.parametrize(
+    ("name", "found", "status"),
+    [
+        ("more_links_are_faster", over_graphs(l8=1.5, l12=0.6, l36=0.5), "PASS"),
+        ("more_links_are_faster", over_graphs(l8=0.5, l12=0.6, l36=0.5), "FAIL"),
+        ("more_links_are_faster", over_graphs(l8=None, l12=0.6, l36=0.5), "PASS"),
+        ("steepest_at_few_links", over_graphs(l8=1.5, l12=0.6, l36=0.5), "PASS"),
+        ("steepest_at_few_links", over_graphs(l8=1.5, l12=1.4, l36=0.5), "FAIL"),
+        ("none_below_8", over_graphs(l7=None, l8=1.5, l12=0.6, l36=0.5), "PASS"),
+        ("none_below_8", over_graphs(l8=1.5, l12=0.6, l36=0.5), "FAIL"),
+    ],
+)
+def test_claims_of_topologies_hold_and_fail(name: str, found: Findings, status: str) -> None:
+    """A time that never came counts as later than all others; where nothing was run below 8, nothing is claimed."""
+    assert {v.claim.name: v.status for v in judge(found, CLAIMS["topology"])}[name] == status
+
+
+def test_an_experiment_without_the_papers_islands_fails_its_table() -> None:
+    """A scenario of the user's own that says it is the paper's, and has no islands, is judged without a traceback."""
+    steady = Steady(f_error_Hz=0.0, MPSI=0.0, V_error=0.0, MQSI=0.0, t_restore_s=None, p={"inv1": 0.5})
+    found = Findings(results={"IV": {"event1": steady, "event2": steady}}, islands={"IV": {}})
+
+    verdicts = judge(found, CLAIMS["switching"])
+
+    assert {verdict.status for verdict in verdicts} == {"FAIL"}
+    assert verdicts[0].found == "there is no such number: case IV, event2, island of inv1"
