@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.commands.compare import compare
+from gridpeers.cli.commands.init import init
 from gridpeers.cli.commands.live import register
 from gridpeers.cli.commands.predict import predict
 from gridpeers.cli.commands.run import run
@@ -70,7 +71,7 @@ def gridpeers(
 
 app.command()(run)
 app.command("list")(list_)
-for command in (compare, check, doc, sweep, predict):
+for command in (check, doc, sweep, predict, compare, init):
     app.command()(command)
 for name, command in contributed():
     app.command(name)(command)

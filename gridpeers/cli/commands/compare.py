@@ -19,7 +19,7 @@ def compare(
         Path, typer.Option(metavar="FILE", help="Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
     ] = Path("runs/comparison.png"),
 ) -> None:
-    """Compare two runs: their scenarios, their metrics, and both in one figure.
+    """Compare two runs: scenarios, metrics, and one figure of both.
 
     Exit code: 0 they were compared, 2 bad usage, or no folder of a run.
 

@@ -1,0 +1,43 @@
+"""`gridpeers init`: a project that runs as it is."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gridpeers as gp
+from tests.command_line import invoke
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+def test_a_new_project_runs_and_its_test_passes(elsewhere: Path) -> None:
+    """Scenario, law and test come out of the box, and the test fails when the law does nothing."""
+    code, text = invoke("init", "study")
+    assert code == 0
+    assert "study/mine.py" in text
+
+    def tested() -> int:
+        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+        path = {"PYTHONPATH": str(Path(gp.__file__).parents[1])}
+        return subprocess.run(words, cwd="study", env=os.environ | path, capture_output=True, check=False).returncode
+
+    assert tested() == 0
+    law = elsewhere / "study" / "mine.py"
+    law.write_text(law.read_text().replace("if own.leader", "if False"))
+    assert tested() == 1
+
+
+def test_a_folder_with_something_in_it_is_left_alone(elsewhere: Path) -> None:
+    """Nothing of the user's is written over."""
+    (elsewhere / "notes.txt").write_text("mine")
+
+    code, text = invoke("init", ".")
+
+    assert code == 2
+    assert text == "gridpeers: .: the folder is not empty; give a new or an empty folder\n"
+    assert [path.name for path in elsewhere.iterdir()] == ["notes.txt"]
