@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import Benchmark
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.headline import headline, numbers
 from papers.singhal2022.tables import tables_of
-from scenarios.results.benchmarks import Benchmark
 
 
 def _benchmark(experiment: str) -> Benchmark:

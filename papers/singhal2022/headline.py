@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
+from gridpeers.benchmarks import Findings
 from papers.singhal2022.tables import Cell, PaperTable
 from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
-from scenarios.results.findings import Findings
 
 
 class Number(NamedTuple):

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gridpeers.benchmarks import DIGITS, Published, Quantity
 from papers.singhal2022.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, Number, Tolerance
-from scenarios.results.published import Published
-from scenarios.results.quantities import DIGITS, Quantity
 
 
 @dataclass(frozen=True, kw_only=True)

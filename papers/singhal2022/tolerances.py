@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from scenarios.results.quantities import Quantity
+from gridpeers.benchmarks import Quantity
 
 Number = Literal["I", "II", "III", "IV", "V"]
 """Number of a table of the paper."""

@@ -1,5 +1,6 @@
 """What the paper claims of its experiments, one file per experiment."""
 
+from gridpeers.benchmarks import Claim
 from papers.singhal2022.claims.communication import COMMUNICATION
 from papers.singhal2022.claims.intermittency import INTERMITTENCY
 from papers.singhal2022.claims.islanding import ISLANDING
@@ -7,7 +8,6 @@ from papers.singhal2022.claims.plug_n_play import PLUG_N_PLAY
 from papers.singhal2022.claims.switching import SWITCHING
 from papers.singhal2022.claims.topology import TOPOLOGY
 from papers.singhal2022.claims.wind_up import WIND_UP
-from scenarios.results.claims import Claim
 
 CLAIMS: dict[str, tuple[Claim, ...]] = {
     "islanding": ISLANDING,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from gridpeers.benchmarks import UNITS, Claim, Findings, Quantity, label
 from papers.singhal2022.tables import Cell, tables_of
 from papers.singhal2022.tolerances import V_RELATIVE, Number
-from scenarios.results.claims import Claim
-from scenarios.results.findings import Findings, label
-from scenarios.results.quantities import UNITS, Quantity
 
 
 def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim:

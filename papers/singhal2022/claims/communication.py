@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import Claim, Findings, Judge
 from papers.singhal2022.claims.columns import near_relatively, near_the_table
 from papers.singhal2022.claims.wording import seconds
 from papers.singhal2022.tolerances import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
-from scenarios.results.claims.claim import Claim, Judge
-from scenarios.results.findings import Findings
 
 EVENT, RETURN = "event1", "return"
 """Labels of the events in the scenario; the paper has the first alone."""

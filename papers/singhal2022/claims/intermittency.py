@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import Claim, Findings
 from papers.singhal2022.claims.columns import near_relatively, near_the_table
 from papers.singhal2022.tolerances import AT_LIMIT, EQUAL, F_NONE, HEADROOM_GONE, MQSI_UNMOVED
-from scenarios.results.claims.claim import Claim
-from scenarios.results.findings import Findings
 
 CLOUDS = "clouds"
 """Label of the event in the scenario."""

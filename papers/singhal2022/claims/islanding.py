@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import Claim, Findings, Judge, Quantity
 from papers.singhal2022.claims.columns import near_relatively, near_the_table
 from papers.singhal2022.claims.wording import by_event, ratio, seconds
 from papers.singhal2022.tolerances import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
-from scenarios.results.claims.claim import Claim, Judge
-from scenarios.results.findings import Findings
-from scenarios.results.quantities import Quantity
 
 CASES = ("I", "II", "III", "IV")
 EVENTS = ("event1", "event2")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import F_BAND, MPSI_BAND, Claim, Findings, Judge
 from papers.singhal2022.claims.wording import seconds
 from papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
-from scenarios.results.claims.claim import Claim, Judge
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import F_BAND, MPSI_BAND
 
 LEAVE, RETURN = "leave", "return"
 """Labels of the events in the scenario."""

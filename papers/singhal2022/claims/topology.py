@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from statistics import median
 
+from gridpeers.benchmarks import MPSI_BAND, Claim, Findings, GraphRun
 from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
-from scenarios.results.claims.claim import Claim
-from scenarios.results.findings import Findings, GraphRun
-from scenarios.results.metrics import MPSI_BAND
 
 TREE = 8
 """Links of a tree of nine inverters: with fewer, no graph is connected."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from gridpeers.benchmarks import Claim, Findings
 from papers.singhal2022.claims.wording import seconds
 from papers.singhal2022.tolerances import WITHIN
-from scenarios.results.claims.claim import Claim
-from scenarios.results.findings import Findings
 
 CASES = ("none", "clamp", "conditional")
 SUN, CLOUDS = "sun", "clouds"

@@ -39,8 +39,8 @@ def experiment(
     require(needed)
     import shlex
 
+    from gridpeers.folders import RUNS, refusal, shown
     from papers.singhal2022.experiments.registry import EXPERIMENTS, FromSweep
-    from scenarios.results.folder import RUNS, refusal, shown
     from wire.nearest import suggestion
 
     if name == "list":
@@ -90,8 +90,8 @@ def _told(source: FromScenario, folder: Path) -> Result:
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import progress
+    from gridpeers.folders import FolderError, new_folder, shown
     from papers.singhal2022.experiments.told import Told
-    from scenarios.results.folder import FolderError, new_folder, shown
     from scenarios.results.history import read_history
     from scenarios.run import BrokenRunError, Request
     from scenarios.run import run as run_scenario

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from scenarios.results.history import Floats
+from gridpeers.measures import Floats
 
 Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid"]
 """Measured: line and filled markers. Hollow: hollow markers, another way to measure. Predicted: a dashed line. Points:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from gridpeers.measures import Floats, Settling
+from gridpeers.theory import Loop, Ticks, sharing_index
 from papers.singhal2022.experiments.page import Curve, Look, Page, Panel
 from papers.singhal2022.experiments.result import Result
 from papers.singhal2022.experiments.table import Cell, Table
 from papers.singhal2022.experiments.told import Told, cut_between, without
-from scenarios.predict.model import Loop, Ticks
-from scenarios.predict.times import sharing_index
-from scenarios.results.history import Floats
-from scenarios.results.settling import Settling
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from gridpeers.measures import Flags, Floats
+from gridpeers.theory import delay_limit, var_delay_limit, var_growth
 from papers.singhal2022.experiments.delay import ALONE, DELAY, K_Q, WHOLE
 from papers.singhal2022.experiments.page import Curve, Line, Page, Panel
 from papers.singhal2022.experiments.result import Result
 from papers.singhal2022.experiments.swept import Swept
 from papers.singhal2022.experiments.table import Table
-from scenarios.predict.limits import delay_limit
-from scenarios.predict.var_response import var_growth
-from scenarios.predict.vars import var_delay_limit
-from scenarios.results.history import Flags, Floats
 
 ON = "link[0].on"
 

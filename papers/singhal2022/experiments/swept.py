@@ -11,15 +11,20 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from gridpeers.measures import Floats
+from gridpeers.theory import (
+    Feeder,
+    Fleet,
+    LoadStep,
+    Sensitivity,
+    VarResponse,
+    fleet_of,
+    load_steps,
+    sensitivity,
+    var_response,
+)
 from netem.spec.netem import Netem
-from plant.equipment import Feeder
 from plant.tables import read_feeder
-from scenarios.predict.fleet import Fleet, fleet_of
-from scenarios.predict.loads import load_steps
-from scenarios.predict.sensitivity import Sensitivity, sensitivity
-from scenarios.predict.times import LoadStep
-from scenarios.predict.var_response import VarResponse, var_response
-from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 from scenarios.spec.changes import as_in
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.results.folder import write_whole
+from gridpeers.folders import write_whole
 
 Cell = str | float | None
 """A text, a number, or None for a time that never came."""

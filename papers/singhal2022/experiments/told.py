@@ -9,16 +9,10 @@ from functools import cached_property
 import msgspec
 import numpy as np
 
+from gridpeers.measures import STEADY, Floats, History, Plates, Settling, Window, settling
+from gridpeers.theory import Feeder, Fleet, LoadStep, fleet_of, load_steps
 from netem.spec.netem import Netem
-from plant.equipment import Feeder
-from scenarios.predict.fleet import Fleet, fleet_of
-from scenarios.predict.loads import load_steps
-from scenarios.predict.times import LoadStep
 from scenarios.results import metrics
-from scenarios.results.history import Floats, History, Plates
-from scenarios.results.metrics import Window
-from scenarios.results.settling import Settling, settling
-from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
 from scenarios.spec.moves import inverters_of

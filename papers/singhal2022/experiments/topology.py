@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from agents.config import Control
-from agents.topology import adjacency
+from gridpeers.graphs import Control, adjacency
+from gridpeers.measures import Floats
+from gridpeers.theory import Fleet, predicted_times
 from papers.singhal2022.experiments.delay import INDEXES, of_times
 from papers.singhal2022.experiments.page import Curve, Look, Page, Panel
 from papers.singhal2022.experiments.result import Result
 from papers.singhal2022.experiments.swept import Row, Swept
 from papers.singhal2022.experiments.table import Table
-from scenarios.predict.fleet import Fleet
-from scenarios.predict.times import predicted_times
-from scenarios.results.history import Floats
 
 DELAY, LINKS = "link[0].delay", "graph.links"
 

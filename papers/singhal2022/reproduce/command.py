@@ -65,10 +65,10 @@ def _reproduce(
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
+    from gridpeers.folders import FolderError, new_folder, refusal, set_broken, shown
     from papers.singhal2022.reproduce.found import Reproduction
     from papers.singhal2022.reproduce.work import Work
     from papers.singhal2022.reproduce.writing import write
-    from scenarios.results.folder import FolderError, new_folder, refusal, set_broken, shown
     from scenarios.run import BrokenRunError
     from wire.driver.output import OutputLostError
 

@@ -10,12 +10,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from gridpeers.benchmarks import Findings, Verdict
+from gridpeers.folders import versions
 from papers.singhal2022.headline import Number, numbers
 from papers.singhal2022.reproduce.parts import Part, Picture
 from papers.singhal2022.tables import Cell, PaperTable
-from scenarios.results.claims import Verdict
-from scenarios.results.findings import Findings
-from scenarios.run import versions
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from gridpeers.benchmarks import HEADINGS, Quantity
 from papers.singhal2022.reproduce.found import Result
 from papers.singhal2022.tables import Cell, PaperTable
 from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
-from scenarios.results.quantities import HEADINGS, Quantity
 
 
 class Entry(NamedTuple):

@@ -7,13 +7,12 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
+from gridpeers.benchmarks import HEADINGS, Verdict
+from gridpeers.folders import versions
 from papers.singhal2022.headline import headline
 from papers.singhal2022.reproduce.found import Reproduction, Result, machine
 from papers.singhal2022.reproduce.grid import Entry, lines, tolerances
 from papers.singhal2022.tables import PaperTable
-from scenarios.results.claims import Verdict
-from scenarios.results.quantities import HEADINGS
-from scenarios.run import versions
 
 _STYLE = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
 

@@ -8,11 +8,10 @@ from importlib.util import find_spec
 
 from msgspec.structs import replace
 
-from scenarios.results.findings import Findings, GraphRun
-from scenarios.results.metrics import Steady
-from scenarios.results.settling import Settling
+from gridpeers.benchmarks import Findings, GraphRun, Steady
+from gridpeers.graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
+from gridpeers.measures import Settling
 from scenarios.spec import Case, Scenario, load_scenario
-from scenarios.sweep.file.graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
 from scenarios.sweep.one import Done, run_one
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)

@@ -12,16 +12,15 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gridpeers.benchmarks import Findings, judge
+from gridpeers.folders import new_folder
+from gridpeers.theory import Feeder
 from papers.singhal2022.benchmarks import ISLANDING
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.reproduce import banks, topology
 from papers.singhal2022.reproduce.found import Result
 from papers.singhal2022.reproduce.parts import Part
 from papers.singhal2022.tables import tables_of
-from plant.equipment import Feeder
-from scenarios.results.claims import judge
-from scenarios.results.findings import Findings
-from scenarios.results.folder import new_folder
 from scenarios.run import Driver, Request, run
 from scenarios.spec import Scenario, load_scenario
 
@@ -122,10 +121,10 @@ class Work:
 
         found = topology.study(self.seed, note, jobs=self.jobs)
 
+        from gridpeers.figures import save
         from papers.singhal2022.figures.topologies import (
             topologies,  # matplotlib takes longer to import than a case to run
         )
-        from scenarios.results.plots.saving import save
 
         save(topologies(found.graphs), folder, Path(part.pictures[0].file).stem)
         return found, {}, None, folder
@@ -147,8 +146,8 @@ class Work:
                 paper[one.case, event] = cell.paper
                 ours.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
 
+        from gridpeers.figures import save
         from papers.singhal2022.figures.var_sharing import var_sharing  # as above
-        from scenarios.results.plots.saving import save
 
         save(var_sharing(paper, ours, banks.CASES, banks.EVENTS), folder, Path(part.pictures[0].file).stem)
         told = [{"variant": one.variant, "case": one.case, "MQSI": dict(one.MQSI)} for one in runs]

@@ -6,12 +6,12 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+from gridpeers.folders import set_status, write_whole
 from papers.singhal2022.reproduce.found import Reproduction, metrics_json
 from papers.singhal2022.reproduce.markdown import markdown
 from papers.singhal2022.reproduce.page import html
 from papers.singhal2022.reproduce.settings import settings
 from papers.singhal2022.reproduce.work import Work
-from scenarios.results.folder import set_status, write_whole
 
 
 def write(whole: Reproduction, work: Work, folder: Path) -> None:

@@ -1,0 +1,36 @@
+"""What a publication says of an experiment, and how a run is judged by it.
+
+A scenario names a benchmark in its key `paper`, by a registered name or as "module:Name" (docs/results.md).
+"""
+
+from __future__ import annotations
+
+from scenarios.results.benchmarks import BENCHMARKS, Benchmark, benchmark_of
+from scenarios.results.claims.claim import Claim, Judge, Verdict, judge
+from scenarios.results.findings import Findings, GraphRun, label
+from scenarios.results.metrics import F_BAND, MPSI_BAND, Steady
+from scenarios.results.published import Published
+from scenarios.results.quantities import DIGITS, HEADINGS, UNITS, Quantity
+from scenarios.results.settling import Settling
+
+__all__ = [
+    "BENCHMARKS",
+    "DIGITS",
+    "F_BAND",
+    "HEADINGS",
+    "MPSI_BAND",
+    "UNITS",
+    "Benchmark",
+    "Claim",
+    "Findings",
+    "GraphRun",
+    "Judge",
+    "Published",
+    "Quantity",
+    "Settling",
+    "Steady",
+    "Verdict",
+    "benchmark_of",
+    "judge",
+    "label",
+]

@@ -1,0 +1,47 @@
+"""Measures of the rows of a record, and how a run settles after an event; all pure functions of arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from scenarios.results.history import Flags, Floats, History, Plates
+from scenarios.results.metrics import MPSI, MQSI, V_error, Window, mean_frequency, mean_voltage
+from scenarios.results.settling import Settling, settling
+from scenarios.results.steadiness import STEADY
+
+if TYPE_CHECKING:
+    from gridpeers.scenario import Scenario
+
+__all__ = [
+    "MPSI",
+    "MQSI",
+    "STEADY",
+    "Flags",
+    "Floats",
+    "History",
+    "Plates",
+    "Settling",
+    "V_error",
+    "Window",
+    "mean_frequency",
+    "mean_voltage",
+    "plates_of",
+    "settling",
+]
+
+
+def plates_of(scenario: Scenario, case: str = "") -> Plates:
+    """Return the nameplates of a scenario's inverters, in the order of a record's columns.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    case : str, optional
+        Leave out the inverters that have no agent in this case, as the sharing indices do.
+    """
+    from scenarios.spec.agentless import without_agent
+    from scenarios.spec.moves import inverters_of
+
+    plates = Plates.of(inverters_of(scenario.spec, scenario.feeder))
+    return plates.without(without_agent(scenario.spec, case)) if case else plates

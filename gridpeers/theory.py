@@ -1,0 +1,65 @@
+"""What theory says of a scenario, part by part; `gridpeers.predict` has all of it for one case (docs/theory.md).
+
+The functions take what a scenario holds: its keys as typed values (`Scenario.spec`) and its feeder (`Scenario.feeder`).
+"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from netem.spec.netem import Netem
+from plant.equipment import Feeder
+from plant.tables import read_feeder
+from scenarios.predict.fleet import Fleet, fleet_of
+from scenarios.predict.limits import delay_limit
+from scenarios.predict.loads import load_steps
+from scenarios.predict.model import Loop, Ticks
+from scenarios.predict.sensitivity import Sensitivity, sensitivity
+from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
+from scenarios.predict.var_response import VarResponse, var_growth, var_response
+from scenarios.predict.vars import var_delay_limit
+from scenarios.spec import Case
+from scenarios.spec import Scenario as Spec
+from scenarios.spec.changes import as_in
+
+__all__ = [
+    "Case",
+    "Feeder",
+    "Fleet",
+    "LoadStep",
+    "Loop",
+    "Sensitivity",
+    "Spec",
+    "Ticks",
+    "Times",
+    "VarResponse",
+    "delay_limit",
+    "feeder_of",
+    "first_window",
+    "fleet_of",
+    "load_steps",
+    "predicted_times",
+    "sensitivity",
+    "sharing_index",
+    "var_delay_limit",
+    "var_growth",
+    "var_response",
+    "without_faults",
+]
+
+
+def feeder_of(spec: Spec) -> Feeder:
+    """Return the feeder of a scenario, with what the scenario changes in it."""
+    return as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
+
+
+def without_faults(spec: Spec) -> Spec:
+    """Return a scenario whose links do nothing to messages."""
+    return replace(spec, netem=Netem())
+
+
+def first_window(spec: Spec, length_s: float) -> Spec:
+    """Return a scenario without faults that ends a time (s) after its first event, and has no other."""
+    (first, *_) = spec.events
+    time = replace(spec.time, end_s=first.t_s + length_s)
+    return replace(without_faults(spec), events=(first,), time=time)
