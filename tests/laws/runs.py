@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import gridpeers as gp
 
@@ -11,15 +11,16 @@ SHORT = {"time.end_s": 2.0, "event": [{"label": "event1", "t_s": 1.0, "open": ["
 """One second on the grid, and one of the islands that form then."""
 
 
+Driver = Literal["inprocess", "processes"]
+
+
 @cache
-def islanding(
-    law: str = "consensus", *, short: bool = False, driver: str = "inprocess", **parameters: Any
-) -> gp.Result:
+def islanding(law: str = "consensus", *, short: bool = False, **parameters: Any) -> gp.Result:
     """Result of case IV under a law of the registry, or another reference, with these parameters."""
     changes: dict[str, Any] = {"case.IV.law": {"use": law, **parameters} if parameters else law}
-    return gp.load("islanding").replace(changes | (SHORT if short else {})).run("IV", driver=driver)
+    return gp.load("islanding").replace(changes | (SHORT if short else {})).run("IV")
 
 
-def written(law: Any, *, driver: str = "inprocess") -> gp.Result:
+def written(law: Any, *, driver: Driver = "inprocess") -> gp.Result:
     """Result of the short scenario with a law as a scenario writes it."""
     return gp.load("islanding").replace({"case.IV.law": law, **SHORT}).run("IV", driver=driver)
