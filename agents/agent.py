@@ -12,12 +12,13 @@ from math import inf
 from msgspec.structs import replace
 
 from agents.config import AgentConfig
+from agents.graphs import GraphError
 from agents.handling import Follows, Worth
 from agents.laws.call import LawError, begun, decided
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING, Law, Neighbour, Own
 from agents.slip import Slips
-from agents.topology import in_neighbours
+from agents.topology import in_neighbours, rule_of
 from wire.codec import RejectedError, decode, encode
 from wire.messages import OFF, Measurement, Nameplate, State
 
@@ -94,7 +95,11 @@ class Agent:
     def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
         self.config = config
         self.fault = ""
-        """What the law did that it must not; then the agent stands still, and the inverter is on primary droop."""
+        """What law or graph did that they must not; then the agent stands still, and the inverter is on primary
+        droop."""
+        self._failing = ""
+        """The same, as long as it was not told."""
+        self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
         """Whether the law has decided since it was last on hold."""
@@ -161,10 +166,16 @@ class Agent:
         return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
-        """Whom this agent listens to among the known agents of a roster, by the run's rule."""
+        """Whom this agent listens to among the known agents of a roster, by the run's rule; nobody if that fails."""
         members = {name: self._known[name] for name in roster if name in self._known}
         name = self.config.name
-        return in_neighbours(self.config.control, name, members) if name in members else ()
+        if name not in members or self.fault or self._failing:
+            return ()
+        try:
+            return in_neighbours(self.config.control, name, members, self._rule)
+        except GraphError as error:
+            self._failing = str(error)
+            return ()
 
     def hear(self, state: State) -> None:
         """Note the latest state of somebody whose nameplate is known. Who may speak, `wire.admission` has checked."""
@@ -194,6 +205,9 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
+        if self._failing:
+            self.fault, self._failing = self._failing, ""
+            return replace(self.stand_still(measurement), fault=self.fault)
         if self.fault:
             return self.stand_still(measurement)
         if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds

@@ -6,6 +6,8 @@ from typing import Literal
 
 import msgspec
 
+from wire.plugin import Plugin
+
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
 
@@ -109,8 +111,10 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     secondary: Secondary
     """Which inverters run the secondary law; the others keep their first set-points."""
-    graph: GraphRule
-    """Rule of the communication graph."""
+    graph: str
+    """Rule of the communication graph: a `GraphRule`, or the name of the own one."""
+    own_graph: Plugin | None = None
+    """A rule of somebody's own."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the rule "links"."""
     without: tuple[tuple[str, str], ...] = ()

@@ -1,70 +1,45 @@
 """The communication graph: a rule, applied to nameplates, says who listens to whom.
 
-No agent is told its neighbours. Each applies the run's rule to the nameplates of the agents on the roster, so an agent
-that nobody has heard of can join. All rules are symmetric: who listens to somebody is heard by it. Every link has
-weight c_ij = 1. In matrices the row is the receiver.
+No agent is told its neighbours. Each applies the run's rule (`agents.graphs`) to the nameplates of the agents on the
+roster, so an agent that nobody has heard of can join. The rules of gridpeers are symmetric: who listens to somebody is
+heard by it; somebody's own rule need not be. Every link has weight c_ij = 1. In matrices the row is the receiver.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
 
-from agents.config import Control, GraphRule
+from agents.config import Control
+from agents.graphs import (
+    GFM_only,
+    Graph,
+    Links,
+    Member,
+    clustered,
+    full,
+    make_graph,
+    natural_order,
+    neighbours_by,
+    none,
+    ring,
+)
 
-Links = frozenset[tuple[str, str]]
+__all__ = ["adjacency", "in_neighbours", "is_pairwise", "laplacian", "link_mistakes", "natural_order", "rule_of"]
+
+_OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "clustered": clustered, "ring": ring}
 
 
-class Member(Protocol):
-    """What the rules look at; a `wire.messages.Nameplate` has it."""
+def rule_of(control: Control) -> Graph:
+    """Return the rule of a run.
 
-    @property
-    def kind(self) -> str:
-        """Whether "GFM" or "GFL"."""
-        ...
-
-    @property
-    def microgrid(self) -> str:
-        """Name of the microgrid."""
-        ...
-
-
-def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
-    """Sort key in which inv2 comes before inv10.
-
-    Examples
-    --------
-    >>> sorted(["inv10", "inv2", "inv1"], key=natural_order)
-    ['inv1', 'inv2', 'inv10']
+    Raises
+    ------
+    PluginError
+        If it is somebody's own, and is not there or cannot be made with its parameters.
     """
-    parts = re.findall(r"\d+|\D+", name)
-    return tuple((0, int(part), part) if part.isascii() and part.isdigit() else (1, 0, part) for part in parts)
-
-
-def _full(a: Member, b: Member) -> bool:
-    return True
-
-
-def _none(a: Member, b: Member) -> bool:
-    return False
-
-
-def _GFM_only(a: Member, b: Member) -> bool:
-    return a.kind == b.kind == "GFM"
-
-
-def _clustered(a: Member, b: Member) -> bool:
-    return a.microgrid == b.microgrid or a.kind == b.kind == "GFM"
-
-
-_PAIRWISE: dict[GraphRule, Callable[[Member, Member], bool]] = {
-    "full": _full,
-    "none": _none,
-    "GFM-only": _GFM_only,
-    "clustered": _clustered,
-}
-"""Rules that look at two nameplates and at nobody else."""
+    if control.own_graph is not None:
+        return make_graph(control.own_graph)
+    return Links(control.links) if control.graph == "links" else _OURS[control.graph]
 
 
 def is_pairwise(control: Control) -> bool:
@@ -75,10 +50,12 @@ def is_pairwise(control: Control) -> bool:
     >>> is_pairwise(Control(secondary="all", graph="ring"))
     False
     """
-    return control.graph != "ring"
+    return control.own_graph is None and control.graph != "ring"
 
 
-def in_neighbours(control: Control, name: str, members: Mapping[str, Member]) -> tuple[str, ...]:
+def in_neighbours(
+    control: Control, name: str, members: Mapping[str, Member], rule: Graph | None = None
+) -> tuple[str, ...]:
     """Whom an agent listens to.
 
     Parameters
@@ -89,11 +66,18 @@ def in_neighbours(control: Control, name: str, members: Mapping[str, Member]) ->
         The agent; one of `members`.
     members : Mapping[str, Member]
         Nameplates of everybody on the roster, the agent's own included.
+    rule : Graph, optional
+        What `rule_of` gives for this control, if somebody keeps it.
 
     Returns
     -------
     tuple[str, ...]
         Names of the in-neighbours, in the order of `members`: sums over them then round alike in every process.
+
+    Raises
+    ------
+    GraphError
+        If the rule is somebody's own, and fails or returns no graph.
 
     Examples
     --------
@@ -104,22 +88,9 @@ def in_neighbours(control: Control, name: str, members: Mapping[str, Member]) ->
     >>> in_neighbours(Control(secondary="all", graph="full", without=(("inv4", "inv1"),)), "inv1", members)
     ('inv2', 'inv3')
     """
-    missing = _both_ways(control.without)
-    others = [other for other in members if other != name and (name, other) not in missing]
-    if control.graph == "ring":
-        ring = sorted(members, key=natural_order)
-        at = ring.index(name)
-        beside = {ring[at - 1], ring[(at + 1) % len(ring)]}
-        return tuple(other for other in others if other in beside)
-    if control.graph == "links":
-        links = _both_ways(control.links)
-        return tuple(other for other in others if (name, other) in links)
-    linked, own = _PAIRWISE[control.graph], members[name]
-    return tuple(other for other in others if linked(own, members[other]))
-
-
-def _both_ways(links: Iterable[tuple[str, str]]) -> Links:
-    return frozenset(pair for a, b in links for pair in ((a, b), (b, a)))
+    missing = {pair[0] if pair[1] == name else pair[1] for pair in control.without if name in pair}
+    heard = neighbours_by(rule_of(control) if rule is None else rule, members, control.graph)[name]
+    return tuple(other for other in heard if other not in missing)
 
 
 def link_mistakes(control: Control, names: Sequence[str]) -> tuple[str, ...]:

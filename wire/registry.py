@@ -12,8 +12,8 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import metadata
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from wire.nearest import suggestion
@@ -165,7 +165,9 @@ class Registry(Generic[T]):
                 place = f" in {folder} or" if folder else ""
                 text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
                 raise PluginError(f"{reference}: {text}")
-            return importlib.import_module(name)
+            found = importlib.import_module(name)
+            _check_place(found, name, folder, reference)
+            return found
         except PluginError:
             raise
         except Exception as error:  # whatever a user's module does while it is imported
@@ -180,28 +182,23 @@ class Registry(Generic[T]):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
 
 
-def folder_of(reference: str, folder: str) -> str:
-    """Return where another process finds the module of a reference: `folder` if it is there, else its own folder.
+def _check_place(module: Any, name: str, folder: str, reference: str) -> None:
+    """Refuse a module of the same name as the one in a scenario's folder that is another."""
+    top = sys.modules[name.partition(".")[0]]
+    found = getattr(top, "__spec__", None)
+    meant = PathFinder.find_spec(top.__name__, [folder]) if folder else None
+    if found is None or meant is None or meant.origin == found.origin or _source(meant) == _source(found):
+        return
+    raise PluginError(
+        f"{reference}: Python has another module {top.__name__}, from {found.origin}, than that in {folder}; give one "
+        "of the two another name"
+    )
 
-    Examples
-    --------
-    >>> folder_of("wire.registry:Registry", "here") == str(Path(__file__).resolve().parents[1])
-    True
-    >>> folder_of("nowhere:Mine", "here")
-    'here'
-    """
-    top = reference.partition(":")[0].partition(".")[0]
-    beside = Path(folder)
-    if (beside / f"{top}.py").is_file() or (beside / top).is_dir() or top == NOTEBOOK:
-        return folder
-    try:
-        spec = find_spec(top)
-    except ValueError:  # a module without a specification, as of an embedded interpreter
-        return folder
-    if spec is None or spec.origin is None or spec.origin == "frozen":
-        return folder
-    place = Path(spec.origin).resolve().parent
-    return str(place.parent if spec.submodule_search_locations else place)
+
+def _source(spec: Any) -> str | None:
+    """Text of a module, by which the same file is known under another path."""
+    text = getattr(spec.loader, "get_source", lambda name: None)(spec.name)
+    return None if text is None else str(text)
 
 
 def _home(it: Any) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from plant.equipment import F_NOM, Feeder, InverterRow
 from scenarios.results.history import Flags, Floats
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
+from scenarios.spec.graph import graph_of
 from scenarios.spec.moves import inverters_of
 
 
@@ -148,8 +149,14 @@ def fleet_of(
     rule = scenario.cases[case]
     present = {row.name for row in feeder.inverters} if roster is None else set(roster)
     rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
+    graph, own_graph = graph_of(rule)
     control = Control(
-        secondary=rule.secondary, graph=rule.graph, links=rule.links, without=rule.without, gains=rule.gains
+        secondary=rule.secondary,
+        graph=graph,
+        own_graph=own_graph,
+        links=rule.links,
+        without=rule.without,
+        gains=rule.gains,
     )
     without = without_agent(scenario, case)
     GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)

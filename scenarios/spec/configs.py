@@ -9,6 +9,7 @@ from plant.config import PlantConfig, PlantSettings, SwitchEvent
 from plant.equipment import Feeder
 from scenarios.spec.agentless import with_agent
 from scenarios.spec.changes import changes_of
+from scenarios.spec.graph import graph_of
 from scenarios.spec.law import law_of
 from scenarios.spec.limits import limits_of
 from scenarios.spec.model import Event, Scenario
@@ -44,13 +45,15 @@ def configs(
     run = f"{scenario.name}-{case}"
     endpoints = (endpoint,) if endpoint else ()
     time, rule = scenario.time, scenario.cases[case]
+    graph, own_graph = graph_of(rule)
     inverters, present = inverters_of(scenario, feeder), with_agent(scenario, feeder, case)
     netem = netem_of(scenario, case)
     links = "" if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_text()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
     control = Control(
         secondary=rule.secondary,
-        graph=rule.graph,
+        graph=graph,
+        own_graph=own_graph,
         links=rule.links,
         without=rule.without,
         gains=rule.gains,

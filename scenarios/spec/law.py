@@ -14,8 +14,9 @@ from agents.config import Gains, LawChoice
 from agents.laws.law import Law
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
+from wire.module_folder import folder_of
 from wire.parameters import Range, objections, range_objection
-from wire.registry import PluginError, folder_of
+from wire.registry import PluginError
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[handling]`."""

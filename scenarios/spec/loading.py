@@ -25,6 +25,7 @@ from scenarios.spec.checks import (
     check_switches,
     check_times,
 )
+from scenarios.spec.graph import check_graphs, with_graph_folders
 from scenarios.spec.law import check_laws, with_law_folders
 from scenarios.spec.limits import check_limits
 from scenarios.spec.mistakes import Mistakes, ScenarioError
@@ -123,12 +124,13 @@ def check_tables(
     check_step(scenario, mistakes)
     check_names(scenario, mistakes)
     check_benchmark(scenario, path.parent, mistakes)
-    scenario = with_law_folders(scenario, path.parent)
+    scenario = with_graph_folders(with_law_folders(scenario, path.parent), path.parent)
     check_laws(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)
     check_protection(scenario, feeder.f_nom if feeder else F_NOM, mistakes)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), mistakes)
+    check_graphs(scenario, feeder, mistakes)
     check_events(scenario, mistakes)
     check_netem(scenario, feeder, mistakes)
     if feeder:

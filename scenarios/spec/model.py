@@ -10,9 +10,12 @@ from typing import Any
 
 import msgspec
 
-from agents.config import Gains, GraphRule, Handling, Secondary
+from agents.config import Gains, Handling, Secondary
 from netem.spec.netem import Netem
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
+
+PluginKey = str | dict[str, Any]
+"""What is plugged in: a registered name or `module:Name`, or a table with it as `use`, and parameters."""
 
 LawKey = str | dict[str, Any]
 """A control law: a registered name, `module:Class`, or a table with one of use, command, fmu, and parameters."""
@@ -106,8 +109,9 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     secondary: Secondary
     """Which inverters run the secondary law (12)-(15): "none", "GFM", "all", or a list, e.g. ["inv1", "inv4"]. The
     others keep their first set-points, and whoever listens to them by the graph hears these."""
-    graph: GraphRule
-    """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", or "links" as listed."""
+    graph: PluginKey
+    """Who listens to whom: "full", "none", "GFM-only", "clustered", "ring", "links" as listed, or a rule of your own,
+    "mine:my_graph" or { use = "mine:MyGraph", k = 2 } (`gridpeers doc graphs`)."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the graph "links", e.g. [["inv1", "inv4"], ["inv4", "inv7"]]."""
     without: tuple[tuple[str, str], ...] = ()

@@ -204,7 +204,7 @@ def _named(kind: Any) -> str:
 
 def _placeholder(kind: Any) -> Any:
     """Something of a type to go on with after a mistake; nobody sees it."""
-    if kind == Secondary:
+    if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
         kind = typing.get_args(kind)[0]
     if typing.get_origin(kind) is typing.Literal:
         return typing.get_args(kind)[0]

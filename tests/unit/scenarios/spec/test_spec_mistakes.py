@@ -74,7 +74,7 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         ('open = ["60-160"]', "", r'event\[1\]: event "event2" does nothing'),
         ('["60-160"]', '["60-160"]\nsynchronised = true', r"event\[1\].synchronised: .* closes no switch"),
         ("[gains]", "[plant.sync_check]\nangle_deg = 200\n[gains]", r"plant.sync_check.angle_deg: 200 deg is not"),
-        ('graph = "full"', 'graph = "mesh"', r'case.IV.graph: there is no "mesh"; the choices are full, none'),
+        ('graph = "full"', 'graph = "mesh"', r'case.IV.graph: there is no graph "mesh"; the graphs are full, none'),
         ('graph = "full"', 'graph = "links"', r'case.IV.graph: graph "links" needs the key links'),
         ('graph = "full"', 'graph = "links"\nlinks = [["inv1", "inv12"]]', r'links\[0\]: no inverter "inv12"; did you'),
         ('graph = "full"', 'graph = "full"\nlinks = [["inv1", "inv2"]]', r'the graph is "full"; write graph = "links"'),

@@ -1,0 +1,224 @@
+"""Rules of the communication graph: functions from nameplates to neighbours, and the registry of them.
+
+    @gridpeers.graph("star")
+    def star(members):
+        '''Everybody listens to inv1, and inv1 to everybody.'''
+        return {name: set(members) if name == "inv1" else {"inv1"} for name in members}
+
+A rule is called with the nameplates of all agents on the roster, by name in natural order, and returns whom each
+listens to. Every agent applies it for itself: the same nameplates must give the same graph. A class with parameters
+(`wire.parameters`) and a method `__call__(self, members)` is a rule too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, Protocol
+
+from wire.nearest import suggestion
+from wire.parameters import parameters_of
+from wire.plugin import Plugin, made
+from wire.printable import printable
+from wire.registry import PluginError, Registry
+
+
+class Member(Protocol):
+    """The part of a nameplate that rules look at; a `wire.messages.Nameplate` has it."""
+
+    @property
+    def kind(self) -> str:
+        """Whether "GFM" or "GFL"."""
+        ...
+
+    @property
+    def microgrid(self) -> str:
+        """Name of the microgrid."""
+        ...
+
+    @property
+    def P_rated(self) -> float:
+        """Rated power (W)."""
+        ...
+
+    @property
+    def V_nom(self) -> float:
+        """Nominal terminal voltage (V, line-to-neutral)."""
+        ...
+
+    @property
+    def m_p(self) -> float:
+        """P-f droop (pu per pu)."""
+        ...
+
+    @property
+    def m_q(self) -> float:
+        """Q-V droop (pu per pu)."""
+        ...
+
+
+Members = Mapping[str, Member]
+"""Nameplates by name."""
+
+Graph = Callable[[Members], Mapping[str, Iterable[str]]]
+"""From nameplates to the names that each agent listens to; who is left out listens to nobody."""
+
+
+class GraphError(ValueError):
+    """A rule that failed, or returned no graph; its text says what it did."""
+
+
+def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Sort key in which inv2 comes before inv10.
+
+    Examples
+    --------
+    >>> sorted(["inv10", "inv2", "inv1"], key=natural_order)
+    ['inv1', 'inv2', 'inv10']
+    """
+    parts = re.findall(r"\d+|\D+", name)
+    return tuple((0, int(part), part) if part.isascii() and part.isdigit() else (1, 0, part) for part in parts)
+
+
+def full(members: Members) -> Mapping[str, Iterable[str]]:
+    """Everybody listens to everybody."""
+    return _pairwise(members, lambda a, b: True)
+
+
+def none(members: Members) -> Mapping[str, Iterable[str]]:
+    """Nobody listens to anybody."""
+    return _pairwise(members, lambda a, b: False)
+
+
+def GFM_only(members: Members) -> Mapping[str, Iterable[str]]:
+    """The grid-forming inverters listen to each other."""
+    return _pairwise(members, lambda a, b: a.kind == b.kind == "GFM")
+
+
+def clustered(members: Members) -> Mapping[str, Iterable[str]]:
+    """Inverters of a microgrid listen to each other, and so do all grid-forming ones."""
+    return _pairwise(members, lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM")
+
+
+def ring(members: Members) -> Mapping[str, Iterable[str]]:
+    """Each listens to the one before and the one after it, in natural order of the names."""
+    names = sorted(members, key=natural_order)
+    return {name: {names[i - 1], names[(i + 1) % len(names)]} - {name} for i, name in enumerate(names)}
+
+
+class Links:
+    """The pairs that the case lists under the key `links`, both ways."""
+
+    links: Annotated[tuple[tuple[str, str], ...], "Pairs; written as the case's own key `links`."] = ()
+
+    def __init__(self, links: Iterable[tuple[str, str]] = ()) -> None:
+        self.links = tuple(links)
+
+    def __call__(self, members: Members) -> Mapping[str, Iterable[str]]:
+        """Return whom each listens to."""
+        both = [pair for a, b in self.links for pair in ((a, b), (b, a))]
+        return {name: {b for a, b in both if a == name and b in members} for name in members}
+
+
+def _pairwise(members: Members, linked: Callable[[Member, Member], bool]) -> dict[str, list[str]]:
+    return {
+        name: [other for other in members if other != name and linked(members[name], members[other])]
+        for name in members
+    }
+
+
+def _objection(it: Any) -> str:
+    if not callable(it):
+        return "write a function of the members' nameplates, or a class with a method __call__(self, members)"
+    if isinstance(it, type):
+        if not any("__call__" in vars(base) for base in it.__mro__):
+            return "the class needs a method __call__(self, members)"
+        try:
+            parameters_of(it)
+        except TypeError as error:
+            return str(error)
+    return ""
+
+
+GRAPHS: Registry[Any] = Registry(
+    "graph",
+    "graphs",
+    _objection,
+    own={
+        "full": "agents.graphs:full",
+        "none": "agents.graphs:none",
+        "GFM-only": "agents.graphs:GFM_only",
+        "clustered": "agents.graphs:clustered",
+        "ring": "agents.graphs:ring",
+        "links": "agents.graphs:Links",
+    },
+)
+"""Rules by name; those of gridpeers come first."""
+
+
+def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[str, ...]]:
+    """Return whom each agent listens to by a rule, checked; neighbours in the order of `members`.
+
+    Parameters
+    ----------
+    rule : Graph
+        The rule.
+    members : Members
+        Nameplates in any order; the rule gets them in natural order of the names.
+    name : str
+        What the scenario calls the rule, for messages.
+
+    Raises
+    ------
+    GraphError
+        If it raises, or what it returns is no graph of these agents.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Plate
+    >>> members = {f"inv{i}": Plate(kind="GFL") for i in (1, 2, 3)}
+    >>> neighbours_by(lambda members: {name: {"inv1"} - {name} for name in members}, members, "star")["inv3"]
+    ('inv1',)
+    >>> neighbours_by(lambda members: {"inv3": ["inv33"]}, members, "star")
+    Traceback (most recent call last):
+        ...
+    agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents are inv1, ...
+    """
+    ordered = {one: members[one] for one in sorted(members, key=natural_order)}
+    try:
+        found = rule(ordered)
+        told = {one: frozenset(found[one]) for one in found}
+    except Exception as error:  # a rule is anybody's code
+        text = printable(f"{type(error).__name__}: {error}", 200)
+        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {text}") from error
+    for one, heard in told.items():
+        if one not in members:
+            raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")
+        for other in sorted(heard, key=str):
+            if other not in members:
+                raise GraphError(f"graph {name} lets {one} listen to {_shown(other)}, {_unknown(other, members)}")
+            if other == one:
+                raise GraphError(f"graph {name} lets {one} listen to itself; leave it out of its own neighbours")
+    return {one: tuple(other for other in members if other in told.get(one, ())) for one in members}
+
+
+def make_graph(plugin: Plugin) -> Graph:
+    """Return a rule of somebody's own.
+
+    Raises
+    ------
+    PluginError
+        If there is none, or it cannot be made with these parameters.
+    """
+    rule = made(GRAPHS, plugin)
+    if not callable(rule):
+        raise PluginError(f"{plugin.name}: its class makes what cannot be called with the members' nameplates")
+    return rule  # type: ignore[no-any-return]
+
+
+def _unknown(name: Any, members: Members) -> str:
+    return f"who is no agent of the run; {suggestion(str(name), members, 'agents')}"
+
+
+def _shown(name: Any) -> str:
+    return name if isinstance(name, str) and name.isprintable() else printable(repr(name), 60)

@@ -1,0 +1,48 @@
+"""Keys that name something plugged in: a text, or a table with `use` and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.model import PluginKey
+from wire.plugin import Plugin, plugin_of, problems
+from wire.registry import Registry
+
+
+def placed(key: PluginKey, folder: Path) -> PluginKey:
+    """Return a key with the folder in which its module is looked for: processes may start elsewhere.
+
+    Examples
+    --------
+    >>> placed("ring", Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, Path("/here"))
+    ('ring', {'use': 'mine:Star', 'hub': 'inv1', 'folder': '/here'})
+    """
+    table: dict[str, Any] = {"use": key} if isinstance(key, str) else dict(key)
+    if ":" not in str(table.get("use", "")) or not isinstance(table.get("folder", ""), str):
+        return key
+    return table | {"folder": str((folder / table.get("folder", "")).resolve())}
+
+
+def check_plugin(path: str, key: PluginKey, registry: Registry[Any], mistakes: Mistakes) -> Plugin | None:
+    """Note what is wrong with a key and with what it names; return the plugin if nothing is."""
+    table: dict[str, Any] = {"use": key} if isinstance(key, str) else key
+    for name in ("use", "folder"):
+        if not isinstance(table.get(name, ""), str):
+            mistakes.add(f"{path}.{name}", "must be a text in quotes")
+            return None
+    if not table.get("use"):
+        mistakes.add(path, f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}')
+        return None
+    wrong = [name for name, value in table.items() if not isinstance(value, str | int | float)]
+    for name in wrong:
+        mistakes.add(f"{path}.{name}", "a parameter is a number, a text, or true or false")
+    if wrong:
+        return None
+    plugin = plugin_of(table)
+    found = problems(registry, plugin)
+    for name, text in found:
+        mistakes.add(f"{path}.{name}" if name and isinstance(key, Mapping) else path, text)
+    return None if found else plugin

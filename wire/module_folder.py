@@ -1,0 +1,32 @@
+"""Where another process finds the module of a reference."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from wire.registry import NOTEBOOK
+
+
+def folder_of(reference: str, folder: str) -> str:
+    """Return where another process finds the module of a reference: `folder` if it is there, else its own folder.
+
+    Examples
+    --------
+    >>> folder_of("wire.registry:Registry", "here") == str(Path(__file__).resolve().parents[1])
+    True
+    >>> folder_of("nowhere:Mine", "here")
+    'here'
+    """
+    top = reference.partition(":")[0].partition(".")[0]
+    beside = Path(folder)
+    if (beside / f"{top}.py").is_file() or (beside / top).is_dir() or top == NOTEBOOK:
+        return folder
+    try:
+        spec = find_spec(top)
+    except ValueError:  # a module without a specification, as of an embedded interpreter
+        return folder
+    if spec is None or spec.origin is None or spec.origin == "frozen":
+        return folder
+    place = Path(spec.origin).resolve().parent
+    return str(place.parent if spec.submodule_search_locations else place)

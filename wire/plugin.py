@@ -1,0 +1,114 @@
+"""What a scenario says of something plugged in: its name or reference, where its module is, and its parameters."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from wire.parameters import objections, values_of
+from wire.printable import printable
+from wire.registry import PluginError, Registry
+
+Scalar = float | int | bool | str
+"""Value of a parameter."""
+
+
+class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A function, or a class with parameters, of a registry."""
+
+    use: str
+    """Registered name, or `module:Name`."""
+    folder: str = ""
+    """Where the module is looked for."""
+    parameters: tuple[tuple[str, Scalar], ...] = ()
+    """Name and value of those that do not keep their default, in the order of the names."""
+    label: str = ""
+    """What the scenario calls it, where `use` is another text for another process."""
+
+    @property
+    def name(self) -> str:
+        """The same text in every process, as the scenario has it."""
+        return self.label or self.use
+
+
+def plugin_of(text: str | Mapping[str, Any], folder: str = "") -> Plugin:
+    """Return what a scenario's key says: a text, or a table with `use` and parameters.
+
+    Examples
+    --------
+    >>> plugin_of({"use": "mine:Nearest", "k": 3}).parameters
+    (('k', 3),)
+    """
+    table = {"use": text} if isinstance(text, str) else dict(text)
+    use, place = table.pop("use", ""), table.pop("folder", "")
+    return Plugin(use=use, folder=place or folder, parameters=tuple(sorted(table.items())))
+
+
+def made(registry: Registry[Any], plugin: Plugin) -> Any:
+    """Return the plugged-in function, or an instance of the class with its parameters.
+
+    Raises
+    ------
+    PluginError
+        If there is none, or it cannot be made with these parameters; the text says what would be right.
+    """
+    found = registry.resolve(plugin.use, plugin.folder)
+    given = dict(plugin.parameters)
+    if not isinstance(found, type):
+        if given:
+            raise PluginError(f"{plugin.name} is a function and takes no parameters; leave out {', '.join(given)}")
+        return found
+    try:
+        values = values_of(found, given)
+        if any("__init__" in vars(base) for base in found.__mro__ if base is not object):
+            return found(**values)
+        it = found()
+        for name, value in values.items():
+            setattr(it, name, value)
+    except Exception as error:  # its __init__ is anybody's code
+        text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        raise PluginError(f"{plugin.name} cannot be made: {printable(text, 300)}") from error
+    return it
+
+
+def problems(registry: Registry[Any], plugin: Plugin) -> list[tuple[str, str]]:
+    """Return all that is wrong with a plugin: for each the parameter, "" for the whole, and a sentence."""
+    try:
+        found = registry.resolve(plugin.use, plugin.folder)
+    except PluginError as error:
+        return [("", str(error))]
+    if isinstance(found, type) and (wrong := objections(found, dict(plugin.parameters))):
+        return wrong
+    try:
+        made(registry, plugin)
+    except PluginError as error:
+        return [("", str(error))]
+    return []
+
+
+def portable(registry: Registry[Any], plugin: Plugin) -> Plugin:
+    """Return the plugin as another process finds it, too.
+
+    Raises
+    ------
+    PluginError
+        If it is defined in a notebook or script, where no other process can import it.
+    """
+    use = registry.portable(plugin.use)
+    if use == plugin.use:
+        return plugin
+    return replace(plugin, use=use, folder=plugin.folder or _home_of(use.partition(":")[0]), label=plugin.name)
+
+
+def _home_of(module: str) -> str:
+    """Folder on the path that holds a module which is imported already; "" if it has none."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if not file:
+        return ""
+    parts = str(file).replace("\\", "/").split("/")
+    depth = module.count(".") + (2 if parts[-1] == "__init__.py" else 1)
+    return "/".join(parts[:-depth])
