@@ -1,8 +1,9 @@
 """One directed link: from a message's number, time and size to its fate. Pure.
 
-What is done, in this order: **cut, partition, flap** (dropped, or kept until the link is up), **loss**, **rate** (a
-queue, tail drop), **slots**, **delay**, order (FIFO), **duplicate**, **corrupt**. So a lost message takes no room in
-the queue. Which entries hold is decided by the time at which the message was sent.
+What is done, in this order: **cut, partition, flap** (dropped, or kept until the link is up), **loss**, faults of
+somebody's own in the order of their names, **rate** (a queue, tail drop), **slots**, **delay**, order (FIFO),
+**duplicate**, **corrupt**. So a lost message takes no room in the queue. Which entries hold is decided by the time at
+which the message was sent.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from netem.draws import Stream
+from netem.models.own import DROPPED_BY_OWN, Judge, judge_of
 from netem.schedule import GATES, Schedule
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
+from wire.plugin import Plugin
 
 NEVER = -math.inf
 """A time that no message has."""
@@ -30,12 +33,13 @@ class Fate(NamedTuple):
     """Of each copy the delay (s since it was sent; infinite while a cut without an end keeps it) and the bit that is
     flipped, None if none is."""
     reason: str = ""
-    """Why it was dropped: "cut", "partition", "flap", "loss" or "queue"; empty if it was not."""
+    """Why it was dropped: "cut", "partition", "flap", "loss", "fault" (somebody's own) or "queue"; empty if
+    it was not."""
     held_until: float = NEVER
     """Until when (s of run time) a cut keeps it, infinite for a cut without an end; minus infinity if none does."""
 
 
-DROPPED = {reason: Fate((), reason) for reason in (*GATES, "loss", "queue")}
+DROPPED = {reason: Fate((), reason) for reason in (*GATES, "loss", DROPPED_BY_OWN, "queue")}
 """Fates of dropped messages, made once."""
 
 
@@ -75,6 +79,8 @@ class Channel:
         """The two as they were before the messages that a cut keeps."""
         self._samplers: dict[Span, Callable[..., Any]] = {}
         self._from, self._to = math.inf, -math.inf
+        self.failures: list[str] = []
+        """Sentences on faults of somebody's own that failed."""
         self.checksum = False
         """Whether the link finds flipped bits by itself, at the time of the message judged last."""
 
@@ -128,6 +134,11 @@ class Channel:
                 self._before_hold = None
         if self._lost is not None and self._lost(seq):
             return DROPPED["loss"]
+        for own in self._own:
+            added = own(seq, t, size)
+            if added is None:
+                return DROPPED[DROPPED_BY_OWN]
+            delay += added
         if self._rate is not None:
             through = self._rate.through(t + delay, self._busy_until, size)
             if through is None:
@@ -162,6 +173,8 @@ class Channel:
         self._rate, self._slots = models.get("rate"), models.get("slots")
         self._lost, self._delay = self._sampler(active, "loss"), self._sampler(active, "delay")
         self._copied, self._bit = self._sampler(active, "duplicate"), self._sampler(active, "corrupt")
+        names = sorted(kind for kind, span in active.items() if isinstance(span.model, Plugin))
+        self._own = [self._own_judge(active[name]) for name in names]
         self._single = self._copied is None and self._bit is None
         self._fifo = "delay" in models and models["delay"].fifo
         self.checksum = "corrupt" in models and models["corrupt"].checksum
@@ -174,4 +187,11 @@ class Channel:
             return None
         if span not in self._samplers:
             self._samplers[span] = span.model.sampler(Stream(self._seed, *self.link, kind))
+        return self._samplers[span]
+
+    def _own_judge(self, span: Span) -> Judge:
+        """How a fault of somebody's own judges; one object a span, like the samplers."""
+        if span not in self._samplers:
+            stream = Stream(self._seed, *self.link, span.kind)
+            self._samplers[span] = judge_of(span.model, *self.link, stream, self.failures.append)
         return self._samplers[span]

@@ -234,6 +234,13 @@ class Receiver:
         found = (inbound.ledger.take(src, self.name) for src, inbound in sorted(self._links.items()))
         return tuple(trace for trace in found if trace is not None)
 
+    def take_failures(self) -> tuple[str, ...]:
+        """Sentences since last taken on faults of somebody's own that failed."""
+        found = [text for _, inbound in sorted(self._links.items()) for text in inbound.channel.failures]
+        for inbound in self._links.values():
+            inbound.channel.failures.clear()
+        return tuple(found)
+
     @property
     def trace_sha256(self) -> str:
         """Hash (hex) of all verdicts so far: the same in every process in which the same messages were judged."""

@@ -16,6 +16,7 @@ from netem.ledger import LinkCounts, LinkTrace
 from netem.schedule import GATES
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
+from wire.plugin import Plugin
 
 LEVEL = 0.001
 """Probability that a run without any fault of ours has a warning, over all its tests together (Holm)."""
@@ -91,6 +92,8 @@ def _findings(
     if span.kind in ("rate", "slots"):
         return []
     sent = messages(traces, span)
+    if isinstance(span.model, Plugin):
+        return [(span.kind, "a fault of your own", "not tested: its law is known to you alone", len(sent.seq), None)]
     if span.kind == "loss":
         return check_loss(sent, span.model)
     if span.kind in GATES:
@@ -100,7 +103,8 @@ def _findings(
         return [_share("duplicate", int((arrived.copies - 1).sum()), len(arrived.seq), span.model.p)]
     if span.kind == "corrupt":
         return [_share("corrupt", int(arrived.flipped.sum()), int(arrived.copies.sum()), span.model.p)]
-    masks = [MASKS[other.kind] for other in others if _masks(other, span)] + (["fifo"] if span.model.fifo else [])
+    masks = [MASKS.get(other.kind, other.kind) for other in others if _masks(other, span)]
+    masks += ["fifo"] if span.model.fifo else []
     if masks:
         return [("delay", str(span.model.__struct_config__.tag), f"not tested: {' and '.join(masks)} on it", 0, None)]
     return check_delay(sent, span.model, Stream(seed, *link, "delay"))
@@ -108,9 +112,10 @@ def _findings(
 
 def _masks(other: Span, span: Span) -> bool:
     """Whether another entry adds to the delays of this one."""
-    if other.kind not in MASKS or other.from_s >= span.to_s or span.from_s >= other.to_s:
+    own = isinstance(other.model, Plugin)
+    if (other.kind not in MASKS and not own) or other.from_s >= span.to_s or span.from_s >= other.to_s:
         return False
-    return other.kind not in GATES or other.model.hold
+    return own or other.kind not in GATES or other.model.hold
 
 
 def _share(what: str, found: int, n: int, p: float) -> Finding:

@@ -15,11 +15,13 @@ from netem.models.delay import AnyDelay, Constant
 from netem.models.duplicate import Duplicate
 from netem.models.flap import Flap
 from netem.models.loss import AnyLoss, Bernoulli
+from netem.models.own import FAULTS
 from netem.models.rate import Rate
 from netem.models.slots import Slots
 from netem.spec.pattern import parse
 from netem.spec.profiles import PROFILES
 from wire.nearest import suggestion
+from wire.plugin import Plugin, problems
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""
@@ -41,13 +43,13 @@ class Span(NamedTuple):
     """One fault on one link, for a time."""
 
     kind: str
-    """One of `KINDS`, or "partition", which is a cut by another name."""
+    """One of `KINDS`, or "partition", which is a cut by another name; of somebody's own fault its name."""
     from_s: float
     """From when (s of run time), that instant included."""
     to_s: float
     """Until when (s), that instant not included; infinity is the whole run."""
     model: Any
-    """The struct of `netem.models`."""
+    """The struct of `netem.models`, or the `Plugin` of somebody's own fault."""
 
 
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -77,6 +79,8 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Whether the link is down."""
     flap: Flap | None = None
     """Up and down in turn."""
+    own: tuple[Plugin, ...] = ()
+    """Faults of your own, each under its name: "mine:Jammer" = { share = 0.2 } (`gridpeers doc faults`)."""
 
     @property
     def end(self) -> float:
@@ -84,7 +88,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return math.inf if self.to_s is None else self.to_s
 
     def models(self) -> dict[str, Any]:
-        """The struct of each kind that the entry has, shorthands and profile resolved, in the order of `KINDS`.
+        """What the entry does, by kind, shorthands and profile resolved, in the order of `KINDS`; then its own faults.
 
         Examples
         --------
@@ -104,7 +108,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                 value = model(**{key: float(value)})
             if value is not None:
                 found[kind] = value
-        return found
+        return found | {plugin.name: plugin for plugin in self.own}
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
         """What the entry does to one link."""
@@ -122,7 +126,11 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         if not models and not found:
             text = "does nothing; give it one of profile, " + ", ".join(KINDS)
             found.append(Mistake("cut" if self.cut is False else "", text))
+        for plugin in self.own:
+            found += below(plugin.name, [Mistake(*wrong) for wrong in problems(FAULTS, plugin)])
         for kind, model in models.items():
+            if isinstance(model, Plugin):
+                continue
             wrong = model.mistakes()
             if isinstance(getattr(self, kind), (int, float)):  # the number has no key of its own
                 wrong = [Mistake("", mistake.text) for mistake in wrong]

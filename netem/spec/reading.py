@@ -11,12 +11,14 @@ import msgspec
 from netem.mistakes import Mistake, shown
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
+from netem.models.own import FAULTS
 from netem.plausible import number_in
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from wire.nearest import suggestion
+from wire.plugin import Plugin, plugin_of
 
 ENTRIES: dict[str, type[msgspec.Struct]] = {"link": Fault, "partition": Partition, "node": NodeFault}
 """The keys of a scenario file that are netem's, and what each entry of them is."""
@@ -69,13 +71,16 @@ def read_netem(tables: Mapping[str, Any], seed: int) -> tuple[Netem, list[Mistak
 
 
 def _entry(kind: type[msgspec.Struct], raw: Any, path: str, found: list[Mistake]) -> msgspec.Struct | None:
-    known = {field.encode_name: field for field in msgspec.structs.fields(kind)}
+    known = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.name != "own"}
     if not isinstance(raw, Mapping):
         found.append(Mistake(path, f"must be a table with the keys {', '.join(known)}, got {shown(raw)}"))
         return None
     values: dict[str, Any] = {}
+    own: list[Plugin] = []
     for key in raw:
-        if key not in known:
+        if kind is Fault and key not in known and (":" in key or key in FAULTS.names):
+            own += _own(f"{path}.{key}", key, raw[key], found)
+        elif key not in known:
             found.append(Mistake(f"{path}.{key}", _unknown(key, list(known))))
     for key, field in known.items():
         if key in raw:
@@ -83,11 +88,28 @@ def _entry(kind: type[msgspec.Struct], raw: Any, path: str, found: list[Mistake]
                 values[field.name] = msgspec.convert(raw[key], field.type)
             except msgspec.ValidationError as error:
                 found.append(_wrong(f"{path}.{key}", raw[key], field.type, str(error)))
+    if own:
+        values["own"] = (*values.get("own", ()), *own)
     needed = _NEEDED.get(kind)
     if needed and needed not in raw:
         example = 'on = "inv4 <-> inv7"' if needed == "on" else 'name = "inv3"'
         found.append(Mistake(f"{path}.{needed}", f"is missing; write {example}"))
     return None if needed and needed not in values else kind(**values)
+
+
+def _own(path: str, name: str, raw: Any, found: list[Mistake]) -> list[Plugin]:
+    """A fault of somebody's own: a table of its parameters, or true."""
+    if raw is False:
+        return []
+    table = {} if raw is True else raw
+    if not isinstance(table, Mapping) or not all(isinstance(value, str | int | float) for value in table.values()):
+        text = f"must be true or a table of its parameters such as {{ p = 0.1 }}, got {shown(raw)}"
+        found.append(Mistake(path, text))
+        return []
+    if not isinstance(table.get("folder", ""), str):
+        found.append(Mistake(f"{path}.folder", f"must be a text in quotes, got {shown(table['folder'])}"))
+        return []
+    return [plugin_of({**table, "use": name})]
 
 
 def _unknown(key: str, known: list[str]) -> str:

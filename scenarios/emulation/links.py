@@ -161,7 +161,7 @@ class EmulatedLinks:
         receiver, counts = self._receiver, self._receiver.counts()
         if not last and not any(book.sent for book in counts.values()):
             return ()
-        return parts(receiver.take_trace(), counts, receiver.trace_sha256)
+        return parts(receiver.take_trace(), counts, receiver.trace_sha256, receiver.take_failures())
 
 
 def _spell(node: NodeFault) -> _Spell:

@@ -103,6 +103,8 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             order = msgspec.json.decode(text, type=cls)
         except msgspec.DecodeError as error:
             raise ValueError(f"no order to links: {error}") from None
+        if order.fault is not None and order.fault.own:  # else whoever reaches the run could have any module imported
+            raise ValueError("no order to links: a fault of your own is written in the scenario before the run")
         order.on  # noqa: B018  that it is one of the two
         return order
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
-from wire.bounds import Name
+from wire.bounds import Name, Text
 from wire.messages import LinkReport
 
 
@@ -18,6 +18,8 @@ class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Of each sender how its messages have fared so far."""
     sha256: str = ""
     """Hash (hex) of all verdicts so far."""
+    failures: tuple[Text, ...] = ()
+    """Sentences on faults of somebody's own that failed since the last part."""
 
 
 class LinkStand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -54,8 +56,10 @@ AT_ONCE = 1000
 """Verdicts in one part: some 25 bytes each, so that a part is far below what a message may have."""
 
 
-def parts(traces: tuple[LinkTrace, ...], counts: dict[str, LinkCounts], sha256: str) -> tuple[bytes, ...]:
-    """Cut a book into parts, none of them too long; the counts and the hash stand in the last one."""
+def parts(
+    traces: tuple[LinkTrace, ...], counts: dict[str, LinkCounts], sha256: str, failures: tuple[str, ...] = ()
+) -> tuple[bytes, ...]:
+    """Cut a book into parts, none of them too long; the counts, the hash and what failed stand in the last one."""
     pieces = [
         LinkTrace(
             trace.src, trace.dst, trace.seq[i : i + AT_ONCE], trace.t[i : i + AT_ONCE], trace.outcome[i : i + AT_ONCE]
@@ -70,4 +74,4 @@ def parts(traces: tuple[LinkTrace, ...], counts: dict[str, LinkCounts], sha256: 
         batches[-1].append(piece)
     *first, last = (tuple(batch) for batch in batches)
     books = [LinkBook(traces=batch) for batch in first]
-    return tuple(map(encode_book, [*books, LinkBook(traces=last, counts=counts, sha256=sha256)]))
+    return tuple(map(encode_book, [*books, LinkBook(traces=last, counts=counts, sha256=sha256, failures=failures)]))

@@ -11,6 +11,7 @@ from netem.models.delay import Constant, Uniform
 from netem.models.loss import Bernoulli
 from netem.models.rate import Rate
 from netem.spec.profiles import PROFILES
+from wire.plugin import Plugin
 
 
 def words(kind: str, model: Any) -> str:
@@ -34,6 +35,9 @@ def words(kind: str, model: Any) -> str:
     'loss of lte'
     """
     match model:
+        case Plugin(parameters=parameters):
+            keys = [f"{name} {_shown(value)}" for name, value in parameters]
+            return f"{kind} ({', '.join(keys)})" if keys else kind
         case Cut(hold=hold):
             return f"{kind}, messages kept" if hold else kind
         case Constant(delay_s=delay, fifo=False):

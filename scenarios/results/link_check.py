@@ -43,6 +43,8 @@ class LinkCheck:
         self.rows: tuple[Row, ...] = found.rows
         self.warnings: tuple[str, ...] = found.warnings
         """What chance does not explain, and accounts that do not close."""
+        self.failures = tuple(sorted(record.failures))
+        """Faults of somebody's own that failed."""
 
     def to_json(self) -> str:
         """Text of links.json: the hash of all verdicts, the accounts of every link, every test."""
@@ -61,6 +63,7 @@ class LinkCheck:
         ]
         tests = [row._asdict() for row in self.rows]
         whole = {"trace_sha256": self._record.sha256, "accounts": counts, "tests": tests}
+        whole |= {"failures": list(self.failures)} if self.failures else {}
         return json.dumps(whole, indent=1, default=str) + "\n"
 
     def write(self, folder: Path) -> list[str]:
@@ -83,6 +86,9 @@ class LinkCheck:
             f"{'none' if not self.warnings else len(self.warnings)} failed (links.json, links.csv)"
         )
         yield from (f"WARNING: {warning}" for warning in self.warnings)
+        if self.failures:
+            more = f" (and {len(self.failures) - 1} more of this kind, links.json)" if len(self.failures) > 1 else ""
+            yield f"WARNING: {self.failures[0]}{more}"
 
 
 def _share(part: int, whole: int) -> str:

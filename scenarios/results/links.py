@@ -39,6 +39,8 @@ class LinkRecord:
         """Of each link (src, dst) how its messages fared."""
         self.garbled = 0
         """Reports that could not be read."""
+        self.failures: list[str] = []
+        """Sentences on faults of somebody's own that failed."""
         self._sha256: dict[str, str] = {}
 
     def __call__(self, report: LinkReport) -> None:
@@ -49,6 +51,7 @@ class LinkRecord:
             self.garbled += 1
             return
         self._keep(book.traces)
+        self.failures += book.failures
         self.counts.update({(src, report.sender): counts for src, counts in book.counts.items()})
         if book.sha256:
             self._sha256[report.sender] = book.sha256

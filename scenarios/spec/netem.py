@@ -17,6 +17,7 @@ from scenarios.emulation.setup import Setup
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import inverters_of
+from wire.plugin import Plugin
 
 
 def netem_of(scenario: Scenario, case: str) -> Netem:
@@ -69,7 +70,7 @@ def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenari
     """The scenario with the delays of its trace files, which are seen from its folder."""
 
     def read(netem: Netem, path: str) -> Netem:
-        netem, wrong = with_traces(netem, folder)
+        netem, wrong = with_traces(_with_folders(netem, folder), folder)
         _add(wrong, path, mistakes)
         return netem
 
@@ -78,6 +79,17 @@ def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenari
         for name, case in scenario.cases.items()
     }
     return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
+
+
+def _with_folders(netem: Netem, folder: Path) -> Netem:
+    """The entries with the folder of each fault of somebody's own that stands beside the file."""
+    replace = msgspec.structs.replace
+
+    def placed(it: Plugin) -> Plugin:
+        return replace(it, folder=str((folder / it.folder).resolve())) if ":" in it.use else it
+
+    links = tuple(replace(fault, own=tuple(map(placed, fault.own))) if fault.own else fault for fault in netem.links)
+    return replace(netem, links=links)
 
 
 def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -> None:

@@ -48,7 +48,8 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
             for entries, items in msgspec.to_builtins(value).items():
                 for item in items if isinstance(items, tuple | list) else ():
                     below += ["", f"[[{path}.{entries}]]" if path else f"[[{entries}]]"]
-                    below += [f"{_key(name)} = {_inline(given)}" for name, given in item.items()]
+                    own = {one["use"]: dict(one.get("parameters", ())) | _folder(one) for one in item.pop("own", ())}
+                    below += [f"{_key(name)} = {_inline(given)}" for name, given in (item | own).items()]
             continue
         if isinstance(value, msgspec.Struct):
             below += ["", f"[{where}]", *_table(value, where, common)]
@@ -61,6 +62,10 @@ def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]
         elif value is not None and (value or not isinstance(value, tuple | dict)):
             yield f"{key} = {_inline(value)}"
     yield from below
+
+
+def _folder(plugin: dict[str, Any]) -> dict[str, str]:
+    return {"folder": plugin["folder"]} if plugin.get("folder") else {}
 
 
 def _key(name: str) -> str:

@@ -1,0 +1,178 @@
+"""A fault of somebody's own: its base class, the registry of faults, and how one is called.
+
+    @gridpeers.link_fault("jammer")
+    class Jammer(gridpeers.LinkFault):
+        '''Lose most messages in the first part of every second.'''
+        share: Annotated[float, Range(0, 1), "Part of a second."] = 0.2
+        def judge(self, message, draws):
+            return None if message.t % 1.0 < self.share and draws.uniform() < 0.9 else 0.0
+
+A message meets it after loss and before the line's rate: it is dropped, or goes on, later by what `judge` returns.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, NamedTuple
+
+import msgspec
+
+from netem.draws import Stream
+from wire.parameters import parameters_of, values_of
+from wire.plugin import Plugin, made
+from wire.printable import printable
+from wire.registry import Registry
+
+LONGEST = 3600.0
+"""Longest delay (s) that a fault may add."""
+
+DROPPED_BY_OWN = "fault"
+"""Reason, in links.csv, why a message was dropped by a fault of somebody's own."""
+
+
+class LinkMessage(NamedTuple):
+    """What a fault is told of a message."""
+
+    src: str
+    """Who sent it: an inverter, or "plant"."""
+    dst: str
+    """Who receives it."""
+    seq: int
+    """Its number on this link, from 0; that of the tick."""
+    t: float
+    """When it was sent (s of run time)."""
+    size: int
+    """Its length (bytes)."""
+
+
+class MessageDraws:
+    """Random numbers of one message: the same for every driver, and of no other message, link or fault."""
+
+    __slots__ = ("_seq", "_stream")
+
+    def __init__(self, stream: Stream, seq: int) -> None:
+        self._stream, self._seq = stream, seq
+
+    def uniform(self, index: int = 0) -> float:
+        """Return a number in the open interval (0, 1); another index is another number."""
+        return self._stream.uniform(self._seq, index)
+
+    def normal(self, index: int = 0) -> float:
+        """Return a standard normal number."""
+        return self._stream.normal(self._seq, index)
+
+    def below(self, bound: int, index: int = 0) -> int:
+        """Return a whole number from 0 to bound - 1."""
+        return self._stream.below(bound, self._seq, index)
+
+
+class LinkFault:
+    """Base of all faults of somebody's own. Parameters are annotated attributes (`wire.parameters`).
+
+    There is one object per link and entry. What `judge` returns should depend on the message and the draws alone: a
+    receiver that joins late has not seen the messages before.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong, unknown or missing.
+    """
+
+    def __init__(self, **parameters: Any) -> None:
+        for name, value in values_of(type(self), parameters).items():
+            setattr(self, name, value)
+
+    def judge(self, message: LinkMessage, draws: MessageDraws) -> float | None:
+        """Return by how much a message is delayed (s, at least 0), None if it is lost.
+
+        Parameters
+        ----------
+        message : LinkMessage
+            The message.
+        draws : MessageDraws
+            Its random numbers; nothing else may be random.
+        """
+        raise NotImplementedError
+
+
+def _objection(it: Any) -> str:
+    if isinstance(it, type) and issubclass(it, msgspec.Struct) and it.__module__.startswith("netem.models."):
+        return ""
+    if not (isinstance(it, type) and issubclass(it, LinkFault)):
+        return "derive a class from gridpeers.LinkFault"
+    if it.judge is LinkFault.judge:
+        return "it has no method judge(self, message, draws)"
+    try:
+        inspect.signature(it.judge).bind(None, None, None)
+    except TypeError as error:
+        return f"write its method judge(self, message, draws): {error}"
+    try:
+        parameters_of(it)
+    except TypeError as error:
+        return str(error)
+    return ""
+
+
+FAULTS: Registry[Any] = Registry(
+    "link fault",
+    "link faults",
+    _objection,
+    own={
+        "cut": "netem.models.cut:Cut",
+        "flap": "netem.models.flap:Flap",
+        "loss": "netem.models.loss:Bernoulli",
+        "rate": "netem.models.rate:Rate",
+        "slots": "netem.models.slots:Slots",
+        "delay": "netem.models.delay:Constant",
+        "duplicate": "netem.models.duplicate:Duplicate",
+        "corrupt": "netem.models.corrupt:Corrupt",
+    },
+)
+"""Faults by name; those of gridpeers come first, each by the model that a bare number means."""
+
+Judge = Callable[[int, float, int], float | None]
+"""From number, time (s) and size (bytes) of a message to its delay (s), None if it is lost."""
+
+
+def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[[str], None]) -> Judge:
+    """Return how a fault judges the messages of one link; one that fails does nothing from then on, and is told.
+
+    Parameters
+    ----------
+    plugin : Plugin
+        The fault.
+    src, dst : str
+        The link.
+    stream : Stream
+        Its random numbers.
+    tell : Callable[[str], None]
+        Takes a sentence on a fault that failed.
+    """
+    try:
+        fault = made(FAULTS, plugin)
+    except ValueError as error:
+        tell(f"link fault {plugin.name} on {src} -> {dst} does nothing: {error}")
+        return lambda seq, t, size: 0.0
+    failed = False
+
+    def judge(seq: int, t: float, size: int) -> float | None:
+        nonlocal failed
+        if failed:
+            return 0.0
+        why = ""
+        try:
+            added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
+            if added is None:
+                return None
+            if not isinstance(added, bool) and isfinite(added) and 0.0 <= added <= LONGEST:
+                return float(added)
+            why = f"returned {printable(repr(added), 60)}; return a delay from 0 to {LONGEST:g} s, or None to drop"
+        except Exception as error:  # a fault is anybody's code
+            why = f"raised {printable(f'{type(error).__name__}: {error}', 200)}"
+        failed = True
+        tell(f"link fault {plugin.name} on {src} -> {dst} {why} at t = {t:.6g} s, message {seq}; it does nothing since")
+        return 0.0
+
+    return judge
