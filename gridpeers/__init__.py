@@ -23,25 +23,28 @@ check_origin()
 
 if TYPE_CHECKING:
     from agents.carriers.registry import LAWS
+    from agents.graphs import GRAPHS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
     from gridpeers.comparison import Comparison, compare
     from gridpeers.prediction import Prediction, predict
     from gridpeers.result import Result, Results, read
     from gridpeers.scenario import Scenario, load
     from gridpeers.sweeping import sweep
+    from netem.models.own import FAULTS, LinkFault
     from scenarios.results.folder import FolderError
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
     from scenarios.spec.mistakes import ScenarioError
     from wire.parameters import Range, Unit
 
-    law = LAWS.register
+    graph, law, link_fault = GRAPHS.register, LAWS.register, FAULTS.register
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
     "Comparison": "gridpeers.comparison",
     "FolderError": "scenarios.results.folder",
     "Law": "agents.laws.law",
+    "LinkFault": "netem.models.own",
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.prediction",
@@ -54,7 +57,9 @@ _HOME = {
     "Unit": "wire.parameters",
     "catalogue": "scenarios.spec.loading",
     "compare": "gridpeers.comparison",
+    "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.registry:LAWS.register",
+    "link_fault": "netem.models.own:FAULTS.register",
     "load": "gridpeers.scenario",
     "predict": "gridpeers.prediction",
     "read": "gridpeers.result",
@@ -67,6 +72,7 @@ __all__ = [
     "Comparison",
     "FolderError",
     "Law",
+    "LinkFault",
     "Neighbour",
     "Own",
     "Prediction",
@@ -79,7 +85,9 @@ __all__ = [
     "Unit",
     "catalogue",
     "compare",
+    "graph",
     "law",
+    "link_fault",
     "load",
     "predict",
     "read",

@@ -14,7 +14,7 @@ from scenarios.results.numbers import Clock
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError, model
-from scenarios.spec.law import check_portable
+from scenarios.spec.portability import check_portable
 from wire.nearest import suggestion
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from gridpeers.scenario import Scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.spec import Scenario as Spec
-from scenarios.spec.law import check_portable
 from scenarios.spec.mistakes import Mistakes, ScenarioError
+from scenarios.spec.portability import check_portable
 from scenarios.sweep.columns import FATE, columns_of
 from scenarios.sweep.file.model import Sweep
 from scenarios.sweep.file.plan import Plan, Run

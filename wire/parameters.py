@@ -176,6 +176,7 @@ def range_objection(value: Any, allowed: Range, unit: str) -> str:
     shown = printable(str(value), 60)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return f"must be a number, got {shown}"
+    shown = f"{value:g}"
     low, high = allowed.low, allowed.high
     if not math.isfinite(value):
         return f"must be a finite number, got {shown}"

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from typing import Any
 
 import msgspec
-from msgspec.structs import replace
 
 from wire.parameters import objections, values_of
 from wire.printable import printable
@@ -26,13 +24,11 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Where the module is looked for."""
     parameters: tuple[tuple[str, Scalar], ...] = ()
     """Name and value of those that do not keep their default, in the order of the names."""
-    label: str = ""
-    """What the scenario calls it, where `use` is another text for another process."""
 
     @property
     def name(self) -> str:
-        """The same text in every process, as the scenario has it."""
-        return self.label or self.use
+        """The plugin, for people; the same text in every process."""
+        return self.use
 
 
 def plugin_of(text: str | Mapping[str, Any], folder: str = "") -> Plugin:
@@ -88,27 +84,3 @@ def problems(registry: Registry[Any], plugin: Plugin) -> list[tuple[str, str]]:
     except PluginError as error:
         return [("", str(error))]
     return []
-
-
-def portable(registry: Registry[Any], plugin: Plugin) -> Plugin:
-    """Return the plugin as another process finds it, too.
-
-    Raises
-    ------
-    PluginError
-        If it is defined in a notebook or script, where no other process can import it.
-    """
-    use = registry.portable(plugin.use)
-    if use == plugin.use:
-        return plugin
-    return replace(plugin, use=use, folder=plugin.folder or _home_of(use.partition(":")[0]), label=plugin.name)
-
-
-def _home_of(module: str) -> str:
-    """Folder on the path that holds a module which is imported already; "" if it has none."""
-    file = getattr(sys.modules.get(module), "__file__", None)
-    if not file:
-        return ""
-    parts = str(file).replace("\\", "/").split("/")
-    depth = module.count(".") + (2 if parts[-1] == "__init__.py" else 1)
-    return "/".join(parts[:-depth])

@@ -35,7 +35,7 @@ def graph_of(case: Case) -> tuple[str, Plugin | None]:
 
 def with_graph_folders(scenario: Scenario, folder: Path) -> Scenario:
     """Return the scenario with the folder of each rule that stands beside its file."""
-    cases = {name: replace(case, graph=placed(case.graph, folder)) for name, case in scenario.cases.items()}
+    cases = {name: replace(case, graph=placed(case.graph, GRAPHS, folder)) for name, case in scenario.cases.items()}
     return replace(scenario, cases=cases)
 
 

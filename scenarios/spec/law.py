@@ -72,17 +72,6 @@ def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
             mistakes.add(f"case.{name}.gains", text)
 
 
-def check_portable(scenario: Scenario) -> list[str]:
-    """Return a sentence for each case whose law no other process could import."""
-    found = []
-    for case in scenario.cases:
-        try:
-            LAWS.portable(law_of(scenario, case).use)
-        except PluginError as error:
-            found.append(f"case {case}: {error}")
-    return found
-
-
 def _table(law: LawKey) -> dict[str, Any]:
     return {"use": law} if isinstance(law, str) else dict(law)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from netem.mistakes import Mistake
+from netem.models.own import FAULTS
 from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.trace_file import with_traces
@@ -17,7 +18,7 @@ from scenarios.emulation.setup import Setup
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import inverters_of
-from wire.plugin import Plugin
+from scenarios.spec.plugins import placed_plugin
 
 
 def netem_of(scenario: Scenario, case: str) -> Netem:
@@ -83,13 +84,11 @@ def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenari
 
 def _with_folders(netem: Netem, folder: Path) -> Netem:
     """The entries with the folder of each fault of somebody's own that stands beside the file."""
+    if not any(fault.own for fault in netem.links):
+        return netem
     replace = msgspec.structs.replace
-
-    def placed(it: Plugin) -> Plugin:
-        return replace(it, folder=str((folder / it.folder).resolve())) if ":" in it.use else it
-
-    links = tuple(replace(fault, own=tuple(map(placed, fault.own))) if fault.own else fault for fault in netem.links)
-    return replace(netem, links=links)
+    own = [tuple(placed_plugin(it, FAULTS, folder) for it in fault.own) for fault in netem.links]
+    return replace(netem, links=tuple(replace(fault, own=it) for fault, it in zip(netem.links, own, strict=True)))
 
 
 def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -> None:

@@ -6,24 +6,37 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import PluginKey
+from wire.module_folder import folder_of
 from wire.plugin import Plugin, plugin_of, problems
 from wire.registry import Registry
 
 
-def placed(key: PluginKey, folder: Path) -> PluginKey:
-    """Return a key with the folder in which its module is looked for: processes may start elsewhere.
+def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
+    """Return a key as any process can follow it: a decorator's name as `module:Name`, with the folder of the module.
 
     Examples
     --------
-    >>> placed("ring", Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, Path("/here"))
+    >>> from agents.graphs import GRAPHS
+    >>> placed("ring", GRAPHS, Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, GRAPHS, Path("/here"))
     ('ring', {'use': 'mine:Star', 'hub': 'inv1', 'folder': '/here'})
     """
     table: dict[str, Any] = {"use": key} if isinstance(key, str) else dict(key)
-    if ":" not in str(table.get("use", "")) or not isinstance(table.get("folder", ""), str):
+    use = registry.reference(str(table.get("use", "")))
+    if ":" not in use or not isinstance(table.get("folder", ""), str):
         return key
-    return table | {"folder": str((folder / table.get("folder", "")).resolve())}
+    return table | {"use": use, "folder": folder_of(use, str((folder / table.get("folder", "")).resolve()))}
+
+
+def placed_plugin(plugin: Plugin, registry: Registry[Any], folder: Path) -> Plugin:
+    """Return a plugin as any process can follow it; see `placed`."""
+    use = registry.reference(plugin.use)
+    if ":" not in use:
+        return plugin
+    return replace(plugin, use=use, folder=folder_of(use, str((folder / plugin.folder).resolve())))
 
 
 def check_plugin(path: str, key: PluginKey, registry: Registry[Any], mistakes: Mistakes) -> Plugin | None:

@@ -86,8 +86,8 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
             raise PathError(f"there is no {here}; {suggestion(step, node, f'tables of {way[0]}')}")
         if following is None:
             break
-        if step == "law" and isinstance(node.get(step), str):
-            node[step] = {"use": node[step]}  # a law by its name alone is this table, which takes parameters
+        if step in ("law", "graph") and isinstance(node.get(step), str):
+            node[step] = {"use": node[step]}  # what is given by its name alone is this table, which takes parameters
         node = node[step] if isinstance(step, int) else node.setdefault(step, [] if _numbered(following) else {})
     return node
 

@@ -1,0 +1,37 @@
+"""Whether other processes can import what a scenario plugs in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from agents.carriers.registry import LAWS
+from agents.graphs import GRAPHS
+from netem.models.own import FAULTS
+from scenarios.spec.graph import graph_of
+from scenarios.spec.law import law_of
+from scenarios.spec.model import Scenario
+from scenarios.spec.netem import netem_of
+from wire.registry import PluginError, Registry
+
+
+def check_portable(scenario: Scenario) -> list[str]:
+    """Return a sentence for each law, graph and link fault of a case that no other process could import."""
+    found = []
+    for case in scenario.cases:
+        for registry, use in _used(scenario, case):
+            try:
+                registry.portable(use)
+            except PluginError as error:
+                found.append(f"case {case}: {error}")
+    return list(dict.fromkeys(found))
+
+
+def _used(scenario: Scenario, case: str) -> Iterator[tuple[Registry[Any], str]]:
+    yield LAWS, law_of(scenario, case).use
+    _, graph = graph_of(scenario.cases[case])
+    if graph is not None:
+        yield GRAPHS, graph.use
+    for fault in netem_of(scenario, case).links:
+        for plugin in fault.own:
+            yield FAULTS, plugin.use

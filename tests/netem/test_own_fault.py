@@ -1,0 +1,173 @@
+"""A fault of somebody's own: where it stands among the others, its numbers, and what becomes of one that fails."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from netem.channel import Channel
+from netem.check.verify import verify
+from netem.ledger import LinkTrace
+from netem.models.own import FAULTS, LinkFault
+from netem.receiver import Receiver
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from netem.spec.pattern import Link
+from netem.spec.reading import read_netem
+from scenarios.emulation.orders import Order
+from scenarios.emulation.setup import Setup
+from wire.plugin import Plugin, problems
+from wire.registry import PluginError
+
+MODULE = '''
+from typing import Annotated
+from gridpeers import LinkFault, Range, Unit
+
+class Jam(LinkFault):
+    """Lose messages in the first part of every second, and delay the others."""
+    share: Annotated[float, Range(0, 1), "Part of a second."] = 0.2
+    delay: Annotated[float, Unit("s"), Range(0, 1), "Of the others."] = 0.01
+    def judge(self, message, draws):
+        if message.t % 1.0 < self.share and draws.uniform() < 0.5:
+            return None
+        return self.delay * draws.uniform(1)
+
+class Late(LinkFault):
+    def judge(self, message, draws):
+        if message.seq == 3:
+            raise RuntimeError("no idea")
+        return 0.1
+
+class Early(LinkFault):
+    def judge(self, message, draws):
+        return -0.1
+
+class Deaf(LinkFault):
+    def judge(self, message):
+        return 0.0
+'''
+LINK = Link("inv1", "inv2")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A folder with somebody's module `my_faults`."""
+    (tmp_path / "my_faults.py").write_text(MODULE, encoding="utf-8")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield str(tmp_path)
+    sys.modules.pop("my_faults", None)
+
+
+def fault(folder: str, name: str, **values: object) -> Fault:
+    """An entry with one fault of `my_faults`, and others."""
+    own = Plugin(use=f"my_faults:{name}", folder=folder, parameters=tuple(values.pop("parameters", ())))  # type: ignore[arg-type]
+    return Fault(on="inv1 -> inv2", own=(own,), **values)  # type: ignore[arg-type]
+
+
+def channel(entry: Fault, seed: int = 1) -> Channel:
+    """One link with one entry."""
+    return Channel(LINK, entry.spans(*LINK, {}), seed)
+
+
+def test_its_numbers_are_looked_up_so_that_every_driver_has_the_same(folder: str) -> None:
+    """A message's fate depends on seed, link and number alone, not on which messages were judged before it."""
+    entry = fault(folder, "Jam", parameters=(("share", 0.5),))
+    one, other = channel(entry), channel(msgspec.json.decode(msgspec.json.encode(entry), type=Fault))
+    fates = [one.judge(seq, 0.02 * seq, 100) for seq in range(200)]
+    again = {seq: other.judge(seq, 0.02 * seq, 100) for seq in range(0, 200, 3)}
+    lost = [fate.reason == "fault" for fate in fates]
+
+    assert [again[seq] for seq in again] == fates[::3]
+    assert 25 < sum(lost) < 75
+    assert not any(lost[26:50])
+    assert fates != [channel(entry, seed=2).judge(seq, 0.02 * seq, 100) for seq in range(200)]
+
+
+def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> None:
+    """It acts after loss: what is lost is lost with it or without."""
+    both = channel(fault(folder, "Jam", delay=0.2, loss=0.3))
+    plain = channel(Fault(on="inv1 -> inv2", delay=0.2, loss=0.3))
+    pairs = [(both.judge(seq, 0.02 * seq, 100), plain.judge(seq, 0.02 * seq, 100)) for seq in range(100)]
+
+    assert all((ours.reason == "loss") == (theirs.reason == "loss") for ours, theirs in pairs)
+    assert all(0.2 < ours.deliveries[0][0] < 0.21 for ours, _ in pairs if ours.deliveries)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Late", "link fault my_faults:Late on inv1 -> inv2 raised RuntimeError: no idea at t = 0.06 s, message 3; it"),
+        ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
+    ],
+)
+def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, name: str, said: str) -> None:
+    """The messages go on as if it were not there; the report of the link has the sentence."""
+    receiver = Receiver("inv2", Netem(links=(fault(folder, name),)), {"inv1": "MG1", "inv2": "MG1"})
+    for seq in range(6):
+        receiver.offer("inv1", seq, 0.02 * seq, 0.02 * seq, b"state")
+    arrived = [round(arrival.delay, 9) for arrival in receiver.due(1.0)]
+    (told,) = receiver.take_failures()
+
+    assert sorted(arrived) == ([0.0, 0.0, 0.0, 0.1, 0.1, 0.1] if name == "Late" else [0.0] * 6)
+    assert said in told
+    assert receiver.take_failures() == ()
+
+
+def test_the_self_check_says_that_it_does_not_know_its_law(folder: str) -> None:
+    """Nothing of it is tested, nor a delay behind it; other faults still are."""
+    entry = fault(folder, "Jam", delay=0.2, loss=0.3)
+    link = channel(entry)
+    fates = [link.judge(seq, 0.02 * seq, 100) for seq in range(200)]
+    outcomes = tuple(fate.reason or fate.deliveries[0][0] for fate in fates)
+    trace = LinkTrace(*LINK, tuple(range(200)), tuple(0.02 * seq for seq in range(200)), outcomes)
+    rows = {row.what: row for row in verify([trace], {LINK: entry.spans(*LINK, {})}, seed=1).rows}
+
+    assert rows["my_faults:Jam"].realised == "not tested: its law is known to you alone"
+    assert rows["delay"].realised == "not tested: my_faults:Jam on it"
+    assert rows["loss"].ok is True
+
+
+def test_every_mistake_of_an_entry_is_told_at_its_key(folder: str) -> None:
+    """Parameters with their range, and names that there are not."""
+    tables = {
+        "link": [{"on": "* <-> *", "my_faults:Jam": {"share": 3, "folder": folder}, "my_faults:Jem": True, "jam": 1}]
+    }
+    netem, wrong = read_netem(tables, seed=1)
+    (entry,) = netem.links
+    placed = msgspec.structs.replace(
+        entry, own=tuple(msgspec.structs.replace(it, folder=folder) for it in reversed(entry.own))
+    )
+    told = {mistake.path: mistake.text for mistake in placed.mistakes()}
+
+    assert [mistake.path for mistake in wrong] == ["link[0].jam"]
+    assert told["my_faults:Jam.share"] == "must be from 0 to 1, got 3"
+    assert 'module my_faults has no "Jem"; did you mean "Jam"?' in told["my_faults:Jem"]
+    assert "judge(self, message, draws)" in problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
+    assert read_netem({"link": [{"on": "* <-> *", "my_faults:Jam": 3}]}, seed=1)[1][0].text.startswith(
+        "must be true or"
+    )
+
+
+def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
+    """A live order with a fault of somebody's own is no order; in the setup of a run it travels unharmed."""
+    entry = fault(folder, "Jam")
+    setup = Setup(netem=Netem(links=(entry,)), microgrids={"inv1": "MG1"})
+
+    assert Setup.of_text(setup.to_text()) == setup
+    with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
+        Order.of_text(Order(fault=entry).to_text())
+
+
+def test_a_decorator_adds_a_fault_and_takes_over_none_of_ours() -> None:
+    """`delay` stays what it is."""
+    with pytest.raises(PluginError, match='there is a link fault "delay" already'):
+
+        @FAULTS.register("delay")
+        class Mine(LinkFault):
+            def judge(self, message, draws):  # type: ignore[no-untyped-def]
+                """Nothing."""
+                return 0.0

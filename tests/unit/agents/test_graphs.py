@@ -1,0 +1,162 @@
+"""A rule of the communication graph of somebody's own: what it may be, and what becomes of one that fails."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.config import Control
+from agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
+from agents.topology import adjacency, in_neighbours, is_pairwise
+from tests.toy.toy_configs import agent_config
+from wire.messages import Measurement
+from wire.plugin import Plugin, plugin_of, problems
+from wire.registry import PluginError
+
+MODULE = '''
+from typing import Annotated
+from gridpeers import Range
+
+def star(members):
+    return {name: set(members) - {name} if name == "inv1" else ["inv1"] for name in members}
+
+class Next:
+    """Listen to the k after it."""
+    k: Annotated[int, Range(1, 8), "How many."] = 1
+    def __call__(self, members):
+        names = list(members)
+        return {a: [names[(i + j) % len(names)] for j in range(1, self.k + 1)] for i, a in enumerate(names)}
+
+def of_three(members):
+    return {name: () for name in members} if len(members) != 2 else members["nobody"]
+
+class Wrong:
+    """It cannot be called."""
+'''
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A folder with somebody's module `my_graphs`."""
+    (tmp_path / "my_graphs.py").write_text(MODULE, encoding="utf-8")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield str(tmp_path)
+    sys.modules.pop("my_graphs", None)
+
+
+def control(use: str, folder: str, **parameters: int) -> Control:
+    """Everybody under a rule of somebody's own."""
+    plugin = plugin_of({"use": use, **parameters}, folder)
+    return Control(secondary="all", graph=plugin.use, own_graph=plugin)
+
+
+def plates(n: int) -> dict[str, object]:
+    """Nameplates of n agents, the last first: a rule gets them in order all the same."""
+    return {f"inv{i}": Agent(agent_config(f"inv{i}")).nameplate for i in range(n, 0, -1)}
+
+
+def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
+    """A rule need not be symmetric, is never taken for pairwise, and `without` still takes links out."""
+    star, following = control("my_graphs:star", folder), control("my_graphs:Next", folder, k=2)
+    members = plates(4)
+
+    assert not is_pairwise(star)
+    assert in_neighbours(star, "inv3", members) == ("inv1",)  # type: ignore[arg-type]
+    assert in_neighbours(star, "inv1", members) == ("inv4", "inv3", "inv2")  # type: ignore[arg-type]
+    assert in_neighbours(following, "inv3", members) == ("inv4", "inv1")  # type: ignore[arg-type]
+    assert sum(map(sum, adjacency(following, members))) == 8  # type: ignore[arg-type]
+    assert in_neighbours(replace(star, without=(("inv3", "inv1"),)), "inv3", members) == ()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("use", "parameters", "said"),
+    [
+        ("my_graphs:Next", {"k": 9}, "must be from 1 to 8, got 9"),
+        ("my_graphs:Next", {"kk": 1}, 'unknown parameter; did you mean "k"? The parameters are k'),
+        ("my_graphs:star", {"k": 1}, "my_graphs:star is a function and takes no parameters; leave out k"),
+        (
+            "my_graphs:sta",
+            {},
+            'module my_graphs has no "sta"; did you mean "star"? The graphs are star, Next, of_three',
+        ),
+        ("my_graphs:Wrong", {}, "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
+        ("my_graphs:MODULE", {}, 'module my_graphs has no "MODULE"'),
+        ("no_graphs:star", {}, 'there is no module "no_graphs" in '),
+        ("rings", {}, 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),
+    ],
+)
+def test_a_rule_that_cannot_be_is_told_in_one_line(
+    folder: str, use: str, parameters: dict[str, int], said: str
+) -> None:
+    """What was asked for, and what there is."""
+    (wrong,) = problems(GRAPHS, plugin_of({"use": use, **parameters}, folder))
+    make_graph(Plugin(use="my_graphs:star", folder=folder))
+
+    assert said in wrong[1]
+    assert "\n" not in wrong[1]
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, who is no agent of the run"),
+        (lambda members: {"inv9": []}, "graph mine names inv9, who is no agent of the run"),
+        (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
+        (lambda members: {"inv1": [3]}, "graph mine lets inv1 listen to 3, who is no agent of the run"),
+        (lambda members: {"inv1": 3}, "graph mine of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
+        (lambda members: None, "graph mine of inv1, inv2 failed: TypeError"),
+        (lambda members: 1 / 0, "graph mine of inv1, inv2 failed: ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
+    """Whom it concerns, and what was returned or raised."""
+    with pytest.raises(GraphError) as caught:
+        neighbours_by(rule, plates(2), "mine")  # type: ignore[arg-type]
+
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str) -> None:
+    """The run goes on: its state tells the fault once, and that it is idle from then on."""
+    agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
+    for name in ("inv2", "inv3"):
+        agent.meet(Agent(agent_config(name)).nameplate)
+    now = Measurement(sender="plant", incarnation=1, seq=0, t=0.0, to="inv1", P=3e4, Q=0.0, V=277.0, f=59.9, P_set=3e4,
+                      V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))  # fmt: skip
+
+    assert agent.in_neighbours(("inv1", "inv2", "inv3")) == ()
+    assert agent.tick(now).fault == ""
+    assert agent.in_neighbours(("inv1", "inv3")) == ()
+    first, second = agent.tick(now), agent.tick(now)
+
+    assert first.fault == "graph my_graphs:of_three of inv1, inv3 failed: KeyError: 'nobody'"
+    assert (first.idle, first.P_set) == (True, 3e4)
+    assert (second.idle, second.fault) == (True, "")
+
+
+def test_a_decorators_name_is_a_rule_and_never_taken_over() -> None:
+    """What gridpeers or somebody else has under a name stays."""
+
+    @GRAPHS.register("nobody-at-all")
+    def nobody(members):  # type: ignore[no-untyped-def]
+        """Nobody."""
+        return {}
+
+    assert GRAPHS.resolve("nobody-at-all") is nobody
+    with pytest.raises(PluginError, match='there is a graph "ring" already; choose another name'):
+        GRAPHS.register("ring")(nobody)
+
+
+def test_two_modules_of_one_name_are_not_taken_for_each_other(folder: str, tmp_path: Path) -> None:
+    """A module of the same name in another scenario's folder is refused, not silently the first one again."""
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "my_graphs.py").write_text("def star(members):\n    return {}\n", encoding="utf-8")
+    make_graph(Plugin(use="my_graphs:star", folder=folder))
+    ((_, said),) = problems(GRAPHS, Plugin(use="my_graphs:star", folder=str(other)))
+
+    assert "Python has another module my_graphs, from " in said
