@@ -17,7 +17,6 @@ from importlib.util import find_spec
 from typing import Any, Generic, TypeVar
 
 from wire.nearest import suggestion
-from wire.printable import printable
 
 T = TypeVar("T")
 
@@ -171,6 +170,8 @@ class Registry(Generic[T]):
         except PluginError:
             raise
         except Exception as error:  # whatever a user's module does while it is imported
+            from wire.printable import printable  # it brings msgspec, and the command line's help waits for this module
+
             text = printable(f"{type(error).__name__}: {error}", 300)
             raise PluginError(f"{reference}: importing {name} failed: {text}") from error
 

@@ -17,7 +17,7 @@ TEMPLATE = Path(__file__).parents[1] / "template"
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project, new or empty.")],
 ) -> None:
-    """Make a project of one's own: a control law, a scenario and a test.
+    """Make a project of your own: a law, a scenario and a test.
 
     Exit code: 0 it was made, 2 the folder cannot be used.
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from gridpeers.theory import Spec
+from scenarios.spec import Scenario
 
 
-def settings(scenarios: dict[str, Spec]) -> list[tuple[str, str, str]]:
+def settings(scenarios: dict[str, Scenario]) -> list[tuple[str, str, str]]:
     """What, its value with the unit, and why, for the scenarios of a report.
 
     Parameters
     ----------
-    scenarios : dict[str, Spec]
+    scenarios : dict[str, Scenario]
         By name of the part.
     """
     first = next(iter(scenarios.values()))
