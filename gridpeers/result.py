@@ -18,7 +18,10 @@ import pandas as pd
 from gridpeers import frames
 from plant.equipment import Feeder
 from plant.tables import read_feeder
+from scenarios.results.benchmarks import benchmark_of
+from scenarios.results.claims import Verdict, judge
 from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.findings import Findings, find
 from scenarios.results.folder import FolderError, refusal, shown, write_whole
 from scenarios.results.history import History, Plates, read_history
 from scenarios.results.moves import as_they_came
@@ -147,11 +150,8 @@ class Results(Mapping[str, "Result"]):
         """
         from scenarios.results.plots import draw_all
 
-        folder = Path(folder)
+        folder = empty_folder(Path(folder))
         try:
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                kind = "is not empty" if folder.is_dir() else "is a file"
-                raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
             shutil.copytree(self.folder, folder, dirs_exist_ok=True)
             text = self.report.replace(f"Results: {shown(self.folder)}/\n", f"Results: {shown(folder)}/\n")
             write_whole(folder / "report.txt", text)
@@ -161,15 +161,36 @@ class Results(Mapping[str, "Result"]):
             raise FolderError(refusal(folder, error)) from error
         return folder
 
+    @cached_property
+    def findings(self) -> Findings:
+        """What was measured, as claims judge it (`gridpeers.benchmarks`); of a run that followed its scenario.
+
+        Raises
+        ------
+        ValueError
+            If it was a run by hand, whose windows people made.
+        """
+        if self.driver == "by hand":
+            raise ValueError("this was a run by hand: its windows are those that people made, see metrics")
+        plates = Plates.of(inverters_of(self._spec, self._feeder))
+        histories = {case: result.record for case, result in self.items()}
+        came = {case: as_they_came(self._spec, _plant_events(result)) for case, result in self.items()}
+        return find(self._spec, self._feeder, plates, histories, came)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Claims of the scenario's benchmark, judged; none without one, or in a run that was disturbed."""
+        if any(result.disturbed for result in self.values()):
+            return ()
+        return judge(self.findings, benchmark_of(self._spec.paper).claims)
+
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return what the figures of some cases share (`scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
         plates = Plates.of(inverters_of(spec, self._feeder))
         histories = {case: result.record for case, result in cases.items()}
         *_, last = cases.values()  # in wall-clock time each case has its own events
-        rows = last.events.itertuples(index=False)
-        events = [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
-        return drawing_of(spec, self._feeder, plates, histories, as_they_came(spec, events))
+        return drawing_of(spec, self._feeder, plates, histories, as_they_came(spec, _plant_events(last)))
 
     def __repr__(self) -> str:
         return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"
@@ -238,6 +259,11 @@ class Result:
         return str(self._whole.get("links_sha256", ""))
 
     @property
+    def disturbed(self) -> list[str]:
+        """Windows of a run in real time in which something happened that the scenario does not tell."""
+        return list(self._whole.get("disturbed", ()))
+
+    @property
     def report(self) -> str:
         """What the command `gridpeers run` prints at the end, of all cases of the run."""
         return self._run.report
@@ -272,6 +298,29 @@ class Result:
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
+
+
+def empty_folder(folder: Path) -> Path:
+    """Make a folder for results.
+
+    Raises
+    ------
+    FolderError
+        If there is something in it, or it cannot be made.
+    """
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            kind = "is not empty" if folder.is_dir() else "is a file"
+            raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FolderError(refusal(folder, error)) from error
+    return folder
+
+
+def _plant_events(result: Result) -> list[PlantEvent]:
+    rows = result.events.itertuples(index=False)
+    return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
 
 
 def read(folder: str | Path) -> Result | Results:

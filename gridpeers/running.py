@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypedDict, get_args
 
 import msgspec
 
-from gridpeers.result import Results, RunFolder
+from gridpeers.result import Results, RunFolder, empty_folder
 from scenarios.results.numbers import Clock
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
@@ -31,6 +31,7 @@ class How(TypedDict, total=False):
     speed: float
     strict: bool
     progress: Progress | None
+    folder: str | Path | None
 
 
 def run(
@@ -42,29 +43,33 @@ def run(
     speed: float = 1.0,
     strict: bool = False,
     progress: Progress | None = None,
+    folder: str | Path | None = None,
 ) -> Results:
     """Run some cases of a scenario, or all, into a folder of their own; see `gridpeers.Scenario.run`."""
     spec = with_cases(scenario.spec, cases)
     check_how(driver, clock, speed, strict=strict)
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
-    folder = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
+    if folder is None:
+        home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
+    else:
+        home = RunFolder(empty_folder(Path(folder)))
     request = Request(
         scenario=spec,
         feeder=scenario.feeder,
         driver=driver,
-        folder=folder.path,
+        folder=home.path,
         clock=clock,
         speed=speed,
         strict=strict,
-        figures=False,
+        figures=folder is not None,
     )
     try:
         run_request(request, progress or _silent)
     except BrokenRunError as error:
-        folder.keep()
-        raise BrokenRunError(f"{error}; what came until then is in {folder.path}") from error
-    return Results(folder, spec, scenario.feeder)
+        home.keep()
+        raise BrokenRunError(f"{error}; what came until then is in {home.path}") from error
+    return Results(home, spec, scenario.feeder)
 
 
 def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:

@@ -176,6 +176,9 @@ class Scenario:
             In real time: whether the run breaks when it cannot keep pace.
         progress : Callable[[str, float, float], None], optional
             Told the case, the time that it has reached (s) and its end (s).
+        folder : str or Path, optional
+            New or empty; takes the whole run folder with its figures, as `Result.save` writes it. When left out, the
+            files live as long as the results.
 
         Returns
         -------
@@ -187,6 +190,8 @@ class Scenario:
             If there is no such case, driver or clock.
         BrokenRunError
             If a case could not be finished; the text says where the log is.
+        FolderError
+            If there is something in the folder, or it cannot be written.
         """
         from gridpeers.running import run
 

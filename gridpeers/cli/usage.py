@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
@@ -32,6 +33,14 @@ def refuse(error: ScenarioError) -> NoReturn:
     count = len(error.mistakes)
     head = [] if count == 1 else [f"{count} mistakes:"]
     fail([*head, *error.mistakes], BAD_INPUT)
+
+
+def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
+    """End with the nearest word if a value is none of those that an option takes."""
+    from wire.nearest import suggestion
+
+    if value not in known:
+        fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
 
 
 def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:

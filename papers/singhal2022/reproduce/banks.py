@@ -12,11 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgspec.structs import replace
-
-from papers.singhal2022.reproduce.topology import run_all
-from plant.tables.read import DATA
-from scenarios.spec import Scenario
+import gridpeers as gp
+from gridpeers.folders import feeder_folder
 
 CASES = ("I", "II", "III", "IV")
 EVENTS = ("event1", "event2")
@@ -40,7 +37,7 @@ class BankRun:
     """By event."""
 
 
-def study(base: Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int) -> tuple[BankRun, ...]:
+def study(base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None) -> tuple[BankRun, ...]:
     """Run all cases over all variants.
 
     Parameters
@@ -51,22 +48,25 @@ def study(base: Scenario, folder: Path, tell: Callable[[int, int], None], jobs: 
         Takes the variants' feeders.
     tell : Callable[[int, int], None]
         Told how many runs are done, and of how many.
-    jobs : int
-        Runs at a time.
+    jobs : int or None
+        Runs at a time; None is one per core, or one where joblib is not installed.
     """
-    runs = []
-    for number, (variant, banks) in enumerate(BANKS.items()):
-        feeder = _feeder(DATA / base.plant.feeder, folder / f"feeder{number}", banks)
-        scenario = replace(base, plant=replace(base.plant, feeder=str(feeder)), paper="")
-        runs += [(variant, scenario, case) for case in CASES]
-    found = {}
-    tell(0, len(runs))
-    for end in run_all([(scenario, case) for _, scenario, case in runs], jobs):
-        if end.status == "broke":
-            raise RuntimeError(f"capacitor banks, {runs[end.number][0]}, case {runs[end.number][2]}: {end.why}")
-        found[end.number] = {event: end.measures[f"{event}.MQSI"] or 0.0 for event in EVENTS}
-        tell(len(found), len(runs))
-    return tuple(BankRun(variant, case, found[i]) for i, (variant, _, case) in enumerate(runs))
+    standard = feeder_folder(base.spec.plant.feeder)
+    feeders = {
+        str(_feeder(standard, folder.absolute() / f"feeder{number}", banks)): variant
+        for number, (variant, banks) in enumerate(BANKS.items())
+    }
+    tell(0, len(BANKS) * len(CASES))
+    varied = {"plant.feeder": list(feeders)}
+    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, progress=tell)
+    found = []
+    for row in rows.to_dict("records"):
+        variant = feeders[row["plant.feeder"]]
+        if row["status"] == "broke":
+            raise RuntimeError(f"capacitor banks, {variant}, case {row['case']}: {row['why']}")
+        MQSI = {event: row[f"{event}.MQSI"] for event in EVENTS}
+        found.append(BankRun(variant, row["case"], {event: 0.0 if x != x else x for event, x in MQSI.items()}))
+    return tuple(found)
 
 
 def _feeder(standard: Path, folder: Path, banks: Mapping[str, int]) -> Path:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, require
+import gridpeers as gp
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, check_choice, fail, refuse, require
 from papers.singhal2022.reproduce.parts import CHOICES, chosen
 
 _NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
@@ -44,14 +44,9 @@ def reproduce(
 
     Example:  gridpeers reproduce --driver inprocess
     """
-    from wire.nearest import suggestion
-
-    if driver not in ("processes", "inprocess"):
-        fail(
-            [f'--driver: no driver "{driver}"; {suggestion(driver, ("processes", "inprocess"), "drivers")}'], BAD_INPUT
-        )
-    if only is not None and only not in CHOICES:
-        fail([f'--only: no part "{only}"; {suggestion(only, CHOICES, "parts")}'], BAD_INPUT)
+    check_choice("--driver: ", "driver", driver, ("processes", "inprocess"))
+    if only is not None:
+        check_choice("--only: ", "part", only, CHOICES)
     require(_NEEDED | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, out)
 
@@ -65,12 +60,10 @@ def _reproduce(
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
-    from gridpeers.folders import FolderError, new_folder, refusal, set_broken, shown
+    from gridpeers.folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
     from papers.singhal2022.reproduce.found import Reproduction
     from papers.singhal2022.reproduce.work import Work
     from papers.singhal2022.reproduce.writing import write
-    from scenarios.run import BrokenRunError
-    from wire.driver.output import OutputLostError
 
     now = datetime.now().astimezone()
     try:
@@ -79,7 +72,7 @@ def _reproduce(
         fail([str(error)], BAD_INPUT)
 
     console = Console()
-    work = Work(chosen(only), driver, folder / "runs", seed, jobs or len(os.sched_getaffinity(0)))
+    work = Work(chosen(only), driver, folder / "runs", seed, jobs)
     results = []
     try:
         with interruptible():
@@ -94,7 +87,10 @@ def _reproduce(
                 only=only or "",
             )
             write(whole, work, folder)
-    except (BrokenRunError, RuntimeError, OSError) as error:
+    except gp.ScenarioError as error:
+        set_broken(folder, "; ".join(error.mistakes))
+        refuse(error)
+    except (RuntimeError, OSError) as error:
         why = refusal(folder, error) if isinstance(error, OSError) else str(error)
         set_broken(folder, why)
         fail([f"a run broke: {why}", f"what came until then is in {shown(folder)}/"], BROKEN)

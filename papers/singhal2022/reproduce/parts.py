@@ -18,6 +18,11 @@ class Picture:
     note: str = ""
     """What a reader should see in it besides the claims."""
 
+    @property
+    def stem(self) -> str:
+        """Name of the file without its ending."""
+        return self.file.partition(".")[0]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Part:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from scenarios.spec import Scenario
+from gridpeers.theory import Spec
 
 
-def settings(scenarios: dict[str, Scenario]) -> list[tuple[str, str, str]]:
+def settings(scenarios: dict[str, Spec]) -> list[tuple[str, str, str]]:
     """What, its value with the unit, and why, for the scenarios of a report.
 
     Parameters
     ----------
-    scenarios : dict[str, Scenario]
+    scenarios : dict[str, Spec]
         By name of the part.
     """
     first = next(iter(scenarios.values()))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Callable, Iterator, Sequence
-from importlib.util import find_spec
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
-from msgspec.structs import replace
-
-from gridpeers.benchmarks import Findings, GraphRun, Steady
+import gridpeers as gp
+from gridpeers.benchmarks import Findings, GraphRun, Settling, Steady
 from gridpeers.graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
-from gridpeers.measures import Settling
-from scenarios.spec import Case, Scenario, load_scenario
-from scenarios.sweep.one import Done, run_one
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
 """Links of the connected graphs; most where the paper's curve bends."""
@@ -56,7 +53,7 @@ def graphs(inverters: int, seed: int) -> Iterator[Edges]:
         yield from connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def study(seed: int, tell: Told, *, jobs: int) -> Findings:
+def study(seed: int, tell: Told, *, jobs: int | None) -> Findings:
     """Run the islanding of case IV on every graph, always in one process each.
 
     Parameters
@@ -65,73 +62,45 @@ def study(seed: int, tell: Told, *, jobs: int) -> Findings:
         Of the graphs.
     tell : Told
         Told of progress.
-    jobs : int
-        How many runs at a time; with joblib not installed, one.
+    jobs : int or None
+        How many runs at a time; None is one per core, or one where joblib is not installed.
     """
-    scenario, feeder = load_scenario("islanding")
-    names = tuple(row.name for row in feeder.inverters)
+    scenario = gp.load("islanding")
+    names = scenario.inverters
     drawn = list(graphs(len(names), seed))
-    done = dict.fromkeys(range(len(drawn)), Done(number=0, status="broke"))
+    links = [[[names[i], names[j]] for i, j in edges] for edges in drawn]
+    first = {"case.IV.graph": "links", "case.IV.links": links[0], "time.end_s": END_S, "paper": None}
+    base = scenario.replace({**first, "event": scenario.tables["event"][:1]})
     tell(0, len(drawn))
-    for count, end in enumerate(run_all([(_on(scenario, names, edges), "IV") for edges in drawn], jobs), start=1):
-        if end.status == "broke":
-            raise RuntimeError(f"topology, graph {end.number} with {len(drawn[end.number])} links: {end.why}")
-        done[end.number] = end
-        tell(count, len(drawn))
-    return Findings(results={}, graphs=tuple(_graph_run(len(names), edges, done[i]) for i, edges in enumerate(drawn)))
+    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, progress=tell)
+    for edges, (_, row) in zip(drawn, rows.iterrows(), strict=True):
+        if row["status"] == "broke":
+            raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")
+    runs = zip(drawn, rows.to_dict("records"), strict=True)
+    return Findings(results={}, graphs=tuple(_graph_run(len(names), edges, row) for edges, row in runs))
 
 
-def _on(scenario: Scenario, names: tuple[str, ...], edges: Edges) -> Scenario:
-    """The islanding alone, on one graph."""
-    links = tuple((names[i], names[j]) for i, j in edges)
-    case: Case = replace(scenario.cases["IV"], graph="links", links=links)
-    time = replace(scenario.time, end_s=END_S)
-    return replace(scenario, time=time, events=scenario.events[:1], cases={"IV": case}, paper="")
+def _graph_run(inverters: int, edges: Edges, row: Mapping[str, Any]) -> GraphRun:
+    at = {name.removeprefix("event1."): value for name, value in row.items() if name.startswith("event1.")}
 
-
-def run_all(runs: Sequence[tuple[Scenario, str]], jobs: int) -> Iterator[Done]:
-    """Run cases without their folders, several at a time where joblib is there; each comes back when it is done.
-
-    Parameters
-    ----------
-    runs : Sequence[tuple[Scenario, str]]
-        Scenarios, and the case of each.
-    jobs : int
-        How many at a time.
-    """
-    if jobs == 1 or find_spec("joblib") is None:
-        for number, (scenario, case) in enumerate(runs):
-            yield run_one(number, scenario, case)
-        return
-    from scenarios.sweep.file import Run
-    from scenarios.sweep.workers import on_this_machine
-
-    numbered = [(i, Run(sample=i, case=case, scenario=scenario, shown={})) for i, (scenario, case) in enumerate(runs)]
-    yield from on_this_machine(numbered, jobs)
-
-
-def _graph_run(inverters: int, edges: Edges, done: Done) -> GraphRun:
-    at = {name.removeprefix("event1."): value for name, value in done.measures.items()}
-
-    def number(name: str) -> float:
-        value = at[name]
-        return float("nan") if value is None else value
+    def time(name: str) -> float | None:
+        return None if math.isnan(at[name]) else float(at[name])
 
     return GraphRun(
         links=len(edges),
         connected=algebraic_connectivity(inverters, edges) > NOT_CONNECTED,
         settled=Settling(
-            t_f_s=at["t_f_s"],
-            t_share_s=at["t_share_s"],
-            f_swing_Hz=number("f_swing_Hz"),
-            V_swing_pu=number("V_swing_pu"),
+            t_f_s=time("t_f_s"),
+            t_share_s=time("t_share_s"),
+            f_swing_Hz=at["f_swing_Hz"],
+            V_swing_pu=at["V_swing_pu"],
         ),
         steady=Steady(
-            f_error_Hz=number("f_error_Hz"),
-            MPSI=number("MPSI"),
-            V_error=number("V_error"),
-            MQSI=number("MQSI"),
-            t_restore_s=at["t_restore_s"],
-            p={name.removeprefix("p."): number(name) for name in at if name.startswith("p.")},
+            f_error_Hz=at["f_error_Hz"],
+            MPSI=at["MPSI"],
+            V_error=at["V_error"],
+            MQSI=at["MQSI"],
+            t_restore_s=time("t_restore_s"),
+            p={name.removeprefix("p."): value for name, value in at.items() if name.startswith("p.")},
         ),
     )

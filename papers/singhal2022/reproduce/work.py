@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from msgspec.structs import replace
-
+import gridpeers as gp
 from gridpeers.benchmarks import Findings, judge
-from gridpeers.folders import new_folder
-from gridpeers.theory import Feeder
+from gridpeers.cli.remaining import Tell
+from gridpeers.theory import Spec
 from papers.singhal2022.benchmarks import ISLANDING
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.reproduce import banks, topology
 from papers.singhal2022.reproduce.found import Result
 from papers.singhal2022.reproduce.parts import Part
 from papers.singhal2022.tables import tables_of
-from scenarios.run import Driver, Request, run
-from scenarios.spec import Scenario, load_scenario
 
-Tell = Callable[[str, float], None]
-"""Told what is being done, and how much of all is done."""
+if TYPE_CHECKING:
+    from gridpeers.figures import Format
+
+Driver = Literal["processes", "inprocess"]
+"""How cases are run."""
+
+FORMATS: tuple[Format, ...] = ("png", "pdf", "svg")
+"""Files of each figure."""
 
 
 class Work:
@@ -45,22 +47,24 @@ class Work:
         Runs of the topologies at a time.
     """
 
-    def __init__(self, parts: tuple[Part, ...], driver: Driver, folder: Path, seed: int | None, jobs: int) -> None:
+    def __init__(
+        self, parts: tuple[Part, ...], driver: Driver, folder: Path, seed: int | None, jobs: int | None
+    ) -> None:
         self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
-        self._loaded: dict[str, tuple[Scenario, Feeder]] = {}
-        for part in parts:
-            scenario, feeder = load_scenario("islanding" if part.name in _STUDIES else part.name)
-            self._loaded[part.name] = (scenario if seed is None else replace(scenario, seed=seed)), feeder
+        changes = {} if seed is None else {"seed": seed}
+        self._loaded = {
+            part.name: gp.load("islanding" if part.name in _STUDIES else part.name).replace(changes) for part in parts
+        }
         self._before = 0.0
 
     @property
     def seed(self) -> int:
         """Seed of the first part; all scenarios of the catalogue have the same."""
-        return next(iter(self._loaded.values()))[0].seed
+        return next(iter(self._loaded.values())).spec.seed
 
-    def scenario(self, part: str) -> Scenario:
-        """Scenario of a part."""
-        return self._loaded[part][0]
+    def spec(self, part: str) -> Spec:
+        """Keys of the scenario of a part."""
+        return self._loaded[part].spec
 
     @property
     def total_s(self) -> float:
@@ -78,7 +82,7 @@ class Work:
         for part in self.parts:
             with _timed() as took:
                 do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
-                found, sha256, metrics, plots = do(part, tell)
+                found, sha256, metrics, plots = do(part, tell, figures)
             self._before += self._length(part)
             yield Result(
                 part=part,
@@ -95,63 +99,68 @@ class Work:
     def _length(self, part: Part) -> float:
         if part.name == "topology":
             return topology.END_S * sum(1 for _ in topology.graphs(9, self.seed))
-        scenario = self.scenario(part.name)
+        scenario = self.spec(part.name)
         if part.name == "var-sharing":
             return scenario.time.end_s * len(banks.BANKS) * len(banks.CASES)
         return scenario.time.end_s * len(scenario.cases)
 
-    def _scenario(self, part: Part, tell: Tell) -> _Done:
-        scenario, feeder = self._loaded[part.name]
-        folder = new_folder(self.folder / part.name, scenario.name, _never)
+    def _scenario(self, part: Part, tell: Tell, figures: bool) -> _Done:
+        scenario, folder = self._loaded[part.name], self.folder / part.name
         order = list(scenario.cases)
 
         def note(case: str, t: float, end: float) -> None:
             tell(f"{part.name}, case {case}", self._before + order.index(case) * end + t)
 
-        report = run(Request(scenario=scenario, feeder=feeder, driver=self.driver, folder=folder), note)
-        metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-        sha256 = {case: values["history_sha256"] for case, values in metrics["cases"].items()}
-        return report.found, sha256, metrics, folder / "plots"
+        run = scenario.run(driver=self.driver, progress=note, folder=folder)
+        if figures:
+            from gridpeers.figures import save  # matplotlib takes longer to import than a case to run
 
-    def _topology(self, part: Part, tell: Tell) -> _Done:
-        folder = new_folder(self.folder / part.name, part.name, _never)
+            for picture in part.pictures:
+                save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
+        return run.findings, run.sha256, run.numbers, folder / "plots"
+
+    def _topology(self, part: Part, tell: Tell, figures: bool) -> _Done:
+        folder = self._folder_of(part)
 
         def note(done: int, of: int) -> None:
             tell(f"topology, {done} of {of} graphs", self._before + done * topology.END_S)
 
         found = topology.study(self.seed, note, jobs=self.jobs)
+        if figures:
+            from gridpeers.figures import save
+            from papers.singhal2022.figures.topologies import topologies
 
-        from gridpeers.figures import save
-        from papers.singhal2022.figures.topologies import (
-            topologies,  # matplotlib takes longer to import than a case to run
-        )
-
-        save(topologies(found.graphs), folder, Path(part.pictures[0].file).stem)
+            save(topologies(found.graphs), folder, part.pictures[0].stem, FORMATS)
         return found, {}, None, folder
 
-    def _banks(self, part: Part, tell: Tell) -> _Done:
-        folder = new_folder(self.folder / part.name, part.name, _never)
-        scenario = self.scenario(part.name)
+    def _banks(self, part: Part, tell: Tell, figures: bool) -> _Done:
+        folder, scenario = self._folder_of(part), self._loaded[part.name]
 
         def note(done: int, of: int) -> None:
-            tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.time.end_s)
+            tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
 
         runs = banks.study(scenario, folder, note, self.jobs)
         paper: dict[tuple[str, str], float] = {}
         ours: dict[str, dict[tuple[str, str], float]] = {}
         for one in runs:
             for event in banks.EVENTS:
-                cell = ISLANDING.number(one.case, event, "MQSI")
-                assert cell is not None
-                paper[one.case, event] = cell.paper
+                number = ISLANDING.number(one.case, event, "MQSI")
+                assert number is not None
+                paper[one.case, event] = number.paper
                 ours.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
+        if figures:
+            from gridpeers.figures import save
+            from papers.singhal2022.figures.var_sharing import var_sharing
 
-        from gridpeers.figures import save
-        from papers.singhal2022.figures.var_sharing import var_sharing  # as above
-
-        save(var_sharing(paper, ours, banks.CASES, banks.EVENTS), folder, Path(part.pictures[0].file).stem)
+            save(var_sharing(paper, ours, banks.CASES, banks.EVENTS), folder, part.pictures[0].stem, FORMATS)
         told = [{"variant": one.variant, "case": one.case, "MQSI": dict(one.MQSI)} for one in runs]
         return Findings(results={}), {}, told, folder
+
+    def _folder_of(self, part: Part) -> Path:
+        """Make the folder of a part that is many runs."""
+        folder = self.folder / part.name
+        folder.mkdir(parents=True)
+        return folder
 
 
 _Done = tuple[Findings, dict[str, str], Any, Path]
@@ -168,7 +177,3 @@ def _timed() -> Iterator[dict[str, float]]:
     wall, cpu = perf_counter(), sum(os.times()[:4])
     yield took
     took["wall"], took["cpu"] = perf_counter() - wall, sum(os.times()[:4]) - cpu
-
-
-_never: Any = None
-"""No time is needed for the name of a folder that is given."""

@@ -11,7 +11,7 @@ from papers.singhal2022.reproduce.found import Reproduction, metrics_json
 from papers.singhal2022.reproduce.markdown import markdown
 from papers.singhal2022.reproduce.page import html
 from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.work import Work
+from papers.singhal2022.reproduce.work import FORMATS, Work
 
 
 def write(whole: Reproduction, work: Work, folder: Path) -> None:
@@ -31,11 +31,12 @@ def write(whole: Reproduction, work: Work, folder: Path) -> None:
     for result in whole.results:
         figures = {}
         for picture, path in result.figures.items():
+            for kind in FORMATS:
+                shutil.copyfile(path.with_suffix(f".{kind}"), folder / "figures" / f"{picture.key}.{kind}")
             figures[picture] = folder / "figures" / f"{picture.key}.png"
-            shutil.copyfile(path, figures[picture])
         results.append(replace(result, figures=figures))
     whole = replace(whole, results=tuple(results))
-    ours = settings({part.name: work.scenario(part.name) for part in work.parts})
+    ours = settings({part.name: work.spec(part.name) for part in work.parts})
     write_whole(folder / "report.html", html(whole, ours))
     write_whole(folder / "report.md", markdown(whole, ours))
     write_whole(folder / "metrics.json", metrics_json(whole))

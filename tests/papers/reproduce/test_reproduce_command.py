@@ -26,6 +26,9 @@ def test_one_part_from_end_to_end(tmp_path: Path) -> None:
         "runs",
         "status.txt",
     }
+    assert {path.name for path in (out / "figures").iterdir()} == {
+        f"switching.{kind}" for kind in ("png", "pdf", "svg")
+    }
     assert (out / "status.txt").read_text(encoding="utf-8") == "complete\n"
     assert {cell["within"] for cell in json.loads((out / "metrics.json").read_text(encoding="utf-8"))["tables"]} == {
         True

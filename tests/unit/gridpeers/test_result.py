@@ -114,3 +114,15 @@ def test_a_temporary_folder_goes_with_its_results(scenario: gp.Scenario) -> None
     gc.collect()
 
     assert not folder.exists()
+
+
+def test_a_run_into_a_folder_is_the_commands_folder_and_is_judged(scenario: gp.Scenario, tmp_path: Path) -> None:
+    """Its files stay, with figures; findings and verdicts are those of the report. Claims that need more say so."""
+    runs = scenario.run(["I", "IV"], folder=tmp_path / "mine")
+
+    assert (tmp_path / "mine" / "plots" / "overview.png").is_file()
+    assert runs.findings.results["IV"]["islanding"].V_error == runs["IV"].metrics.loc["islanding", "V_error"]
+    assert runs.verdicts
+    assert all(f"{verdict.status:7}  {verdict.claim.text}" in runs.report for verdict in runs.verdicts)
+    with pytest.raises(gp.FolderError, match="not empty"):
+        scenario.run("I", folder=tmp_path / "mine")
