@@ -70,6 +70,9 @@ def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
         if law.name != PAPER and case.gains not in (scenario.gains, Gains()):
             text = f'[gains] are those of the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
             mistakes.add(f"case.{name}.gains", text)
+        if law.name != PAPER and case.handling.weights != "paper":
+            text = f'weights other than "paper" are the law "{PAPER}"\'s, and this case has {law.name}; leave them out'
+            mistakes.add(f"case.{name}.handling.weights", text)
 
 
 def _table(law: LawKey) -> dict[str, Any]:
