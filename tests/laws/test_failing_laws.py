@@ -99,8 +99,8 @@ def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
     """They would do nothing, and nobody would know."""
     with pytest.raises(gp.ScenarioError, match=r'\[gains\] are those of the law "consensus", and this case has dapi'):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
+    weights = {"weights": "degree-normalised"}
     with pytest.raises(gp.ScenarioError, match=r'case.IV.handling.weights: weights other than "paper" are the law'):
-        weights = {"weights": "degree-normalised"}
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.handling": weights}).check()
 
 
