@@ -10,7 +10,8 @@ from scenarios.results.settling import Settling, settling
 from scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
-    from gridpeers.scenario import Scenario
+    from plant.equipment import Feeder
+    from scenarios.spec import Scenario
 
 __all__ = [
     "MPSI",
@@ -30,18 +31,18 @@ __all__ = [
 ]
 
 
-def plates_of(scenario: Scenario, case: str = "") -> Plates:
+def plates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Plates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
     Parameters
     ----------
-    scenario : Scenario
-        What was run.
+    spec, feeder : Scenario, Feeder
+        What was run (`gridpeers.Scenario.spec`, `gridpeers.Scenario.feeder`).
     case : str, optional
         Leave out the inverters that have no agent in this case, as the sharing indices do.
     """
     from scenarios.spec.agentless import without_agent
     from scenarios.spec.moves import inverters_of
 
-    plates = Plates.of(inverters_of(scenario.spec, scenario.feeder))
-    return plates.without(without_agent(scenario.spec, case)) if case else plates
+    plates = Plates.of(inverters_of(spec, feeder))
+    return plates.without(without_agent(spec, case)) if case else plates

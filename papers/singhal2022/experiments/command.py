@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, load, refuse, require
+import gridpeers as gp
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
 
 if TYPE_CHECKING:
     from papers.singhal2022.experiments.registry import FromScenario, FromSweep
@@ -41,14 +42,12 @@ def experiment(
 
     from gridpeers.folders import RUNS, refusal, shown
     from papers.singhal2022.experiments.registry import EXPERIMENTS, FromSweep
-    from wire.nearest import suggestion
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
             typer.echo(f"{known:14} {_title(source)}")
         return
-    if name not in EXPERIMENTS:
-        fail([f'no experiment "{name}"; {suggestion(name, tuple(EXPERIMENTS), "experiments")}'], BAD_INPUT)
+    check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
     again = f"gridpeers experiment {name}" + (f" --out {shlex.quote(str(out))}" if out else "")
     result = _swept(source, folder, jobs, again) if isinstance(source, FromSweep) else _told(source, folder)
@@ -67,13 +66,12 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     check_packages()
     import pyarrow.parquet as pq
 
+    from gridpeers.sweep_files import read_sweep
     from papers.singhal2022.experiments.swept import Swept
-    from scenarios.spec import ScenarioError
-    from scenarios.sweep.file import read_sweep
 
     try:
         plan = read_sweep(source.sweep)
-    except ScenarioError as error:
+    except gp.ScenarioError as error:
         refuse(error)
     summary = finish(source.sweep, plan, folder, jobs, "", again)
     if sum(summary.broke.values()):
@@ -84,39 +82,30 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
 
 def _told(source: FromScenario, folder: Path) -> Result:
     """Run every case of the scenario in this process, and draw."""
-    from datetime import datetime
-
     from rich.console import Console
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import progress
-    from gridpeers.folders import FolderError, new_folder, shown
+    from gridpeers.folders import shown
     from papers.singhal2022.experiments.told import Told
-    from scenarios.results.history import read_history
-    from scenarios.run import BrokenRunError, Request
-    from scenarios.run import run as run_scenario
 
-    scenario, feeder = load(source.scenario)
+    scenario = gp.load(source.scenario)
     try:
-        new_folder(folder, scenario.name, datetime.now().astimezone())
         with interruptible(), progress(Console(), tuple(scenario.cases)) as tell:
-            run_scenario(Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=folder), tell)
-    except FolderError as error:
+            run = scenario.run(progress=tell, folder=folder)
+    except gp.FolderError as error:
         fail([str(error)], BAD_INPUT)
-    except BrokenRunError as error:
+    except gp.BrokenRunError as error:
         fail([f"the run broke: {error}"], BROKEN)
     except KeyboardInterrupt as error:
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
-    histories = {case: read_history(folder / case / "history.csv") for case in scenario.cases}
-    return source.make(Told(scenario=scenario, feeder=feeder, histories=histories))
+    histories = {case: result.record for case, result in run.items()}
+    return source.make(Told(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))
 
 
 def _title(source: FromSweep | FromScenario) -> str:
     """The title of the file that is run."""
+    from gridpeers.sweep_files import sweep_title
     from papers.singhal2022.experiments.registry import FromScenario
-    from scenarios.spec.catalogue import CATALOGUE, SWEEPS
-    from scenarios.spec.loading import read_toml
 
-    if isinstance(source, FromScenario):
-        return str(read_toml(CATALOGUE / f"{source.scenario}.toml")[1]["title"])
-    return str(read_toml(SWEEPS / f"{source.sweep}.toml")[1]["title"])
+    return gp.load(source.scenario).title if isinstance(source, FromScenario) else sweep_title(source.sweep)

@@ -8,7 +8,6 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from gridpeers.measures import Floats
@@ -17,16 +16,15 @@ from gridpeers.theory import (
     Fleet,
     LoadStep,
     Sensitivity,
+    Spec,
     VarResponse,
+    feeder_of,
+    first_window,
     fleet_of,
     load_steps,
     sensitivity,
     var_response,
 )
-from netem.spec.netem import Netem
-from plant.tables import read_feeder
-from scenarios.spec import Scenario
-from scenarios.spec.changes import as_in
 
 Row = Mapping[str, Any]
 """Columns of one run."""
@@ -48,7 +46,7 @@ class Swept:
 
     rows: Sequence[Row]
     """All runs, in the order of the sweep."""
-    base: Scenario
+    base: Spec
     """The scenario that was varied."""
     window: str
     """Label of the event that is measured."""
@@ -88,14 +86,12 @@ class Swept:
     @cached_property
     def feeder(self) -> Feeder:
         """The feeder."""
-        return as_in(self.base, read_feeder(self.base.plant.feeder, self.base.plant.load_set))
+        return feeder_of(self.base)
 
     @cached_property
-    def calm(self) -> Scenario:
+    def calm(self) -> Spec:
         """The scenario with links that do nothing, its first event alone, and an end before long."""
-        events = self.base.events[:1]
-        time = msgspec.structs.replace(self.base.time, end_s=events[0].t_s + 3.0)
-        return msgspec.structs.replace(self.base, netem=Netem(), events=events, time=time)
+        return first_window(self.base, 3.0)
 
     @cached_property
     def load(self) -> LoadStep:

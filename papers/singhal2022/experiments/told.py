@@ -6,23 +6,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import msgspec
 import numpy as np
 
-from gridpeers.measures import STEADY, Floats, History, Plates, Settling, Window, settling
-from gridpeers.theory import Feeder, Fleet, LoadStep, fleet_of, load_steps
-from netem.spec.netem import Netem
-from scenarios.results import metrics
-from scenarios.spec import Scenario
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.moves import inverters_of
+from gridpeers.measures import (
+    MPSI,
+    MQSI,
+    STEADY,
+    Floats,
+    History,
+    Plates,
+    Settling,
+    Window,
+    mean_frequency,
+    plates_of,
+    settling,
+)
+from gridpeers.theory import Feeder, Fleet, LoadStep, Spec, fleet_of, load_steps, without_faults
 
 
 @dataclass(frozen=True, kw_only=True)
 class Told:
     """A scenario that was run."""
 
-    scenario: Scenario
+    scenario: Spec
     feeder: Feeder
     histories: Mapping[str, History]
     """By case."""
@@ -30,23 +36,23 @@ class Told:
     @cached_property
     def plates(self) -> Plates:
         """Nameplates in the order of the histories' columns."""
-        return Plates.of(inverters_of(self.scenario, self.feeder))
+        return plates_of(self.scenario, self.feeder)
 
     def _plates_in(self, case: str) -> Plates:
         """The same without those that have no agent in a case, where sharing is meant."""
-        return self.plates.without(without_agent(self.scenario, case))
+        return plates_of(self.scenario, self.feeder, case)
 
     def f(self, case: str) -> Floats:
         """Frequency (Hz), mean of the GFM."""
-        return metrics.mean_frequency(self.histories[case], self.plates)
+        return mean_frequency(self.histories[case], self.plates)
 
     def MPSI(self, case: str) -> Floats:
         """Mean power sharing index, (16)."""
-        return metrics.MPSI(self.histories[case], self._plates_in(case))
+        return MPSI(self.histories[case], self._plates_in(case))
 
     def MQSI(self, case: str) -> Floats:
         """Mean var sharing index, (17)."""
-        return metrics.MQSI(self.histories[case], self._plates_in(case))
+        return MQSI(self.histories[case], self._plates_in(case))
 
     def t(self, case: str) -> Floats:
         """Time of the rows (s)."""
@@ -70,8 +76,8 @@ class Told:
     @cached_property
     def loads(self) -> dict[str, LoadStep]:
         """The step of load of each event, from the plant on droop alone."""
-        calm = msgspec.structs.replace(self.scenario, netem=Netem())
-        return {step.label: step.load for step in load_steps(calm, self.feeder) if step.load is not None}
+        steps = load_steps(without_faults(self.scenario), self.feeder)
+        return {step.label: step.load for step in steps if step.load is not None}
 
 
 def cut_between(fleet: Fleet, groups: Mapping[str, str]) -> set[tuple[str, str]]:
