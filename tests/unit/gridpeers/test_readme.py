@@ -19,7 +19,8 @@ from tests.command_line import invoke
 
 README = Path(__file__).parents[3] / "README.md"
 TEXT = README.read_text(encoding="utf-8")
-SNIPPETS = [block for block in re.findall(r"```\n(.*?)```", TEXT, re.S) if re.search(r"^\[\[?[a-z]", block, re.M)]
+BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", TEXT, re.S | re.M)
+SNIPPETS = [block for language, block in BLOCKS if not language and re.search(r"^\[\[?[a-z]", block, re.M)]
 ROWS = [line for line in TEXT.splitlines() if line.startswith("| ") and "gridpeers" in line]
 SWEEP_EXTRA = ("joblib", "pyarrow", "dask", "distributed")
 """Modules that the extra `sweep` installs besides what everybody has."""
