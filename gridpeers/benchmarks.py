@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from scenarios.results.benchmarks import BENCHMARKS, Benchmark, benchmark_of
 from scenarios.results.claims.claim import Claim, Judge, Verdict, judge
-from scenarios.results.findings import Findings, GraphRun, label
+from scenarios.results.findings import Findings, label
 from scenarios.results.metrics import F_BAND, MPSI_BAND, Steady
 from scenarios.results.published import Published
 from scenarios.results.quantities import DIGITS, HEADINGS, UNITS, Quantity
@@ -23,7 +23,6 @@ __all__ = [
     "Benchmark",
     "Claim",
     "Findings",
-    "GraphRun",
     "Judge",
     "Published",
     "Quantity",

@@ -6,11 +6,12 @@ A benchmark is data and pure functions. It is added from outside, by decorator, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scenarios.results.published import Published
+from wire.plugin import plugin_of
 from wire.registry import Registry
 
 if TYPE_CHECKING:
@@ -60,12 +61,13 @@ BENCHMARKS: Registry[Benchmark] = Registry(
 """Benchmarks by name; those that come with gridpeers are references, which are imported when a run is judged."""
 
 
-def benchmark_of(name: str) -> Benchmark:
-    """Return the benchmark that a scenario names; an empty one for the name "".
+def benchmark_of(key: str | Mapping[str, Any]) -> Benchmark:
+    """Return the benchmark that a scenario names in its key `paper`; an empty one for "".
 
     Raises
     ------
     PluginError
         If there is none of this name.
     """
-    return BENCHMARKS.resolve(name) if name else NO_BENCHMARK
+    plugin = plugin_of(key)
+    return BENCHMARKS.resolve(plugin.use, plugin.folder) if plugin.use else NO_BENCHMARK

@@ -36,18 +36,6 @@ def label(measure: str, f_nom: float = F_NOM) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GraphRun:
-    """One run of the experiment with random communication graphs."""
-
-    links: int
-    """Links of the graph."""
-    connected: bool
-    """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
-    settled: Settling
-    steady: Steady
-
-
-@dataclass(frozen=True, kw_only=True)
 class Findings:
     """What one experiment came to."""
 
@@ -67,8 +55,6 @@ class Findings:
     """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
-    graphs: tuple[GraphRun, ...] = ()
-    """Runs over random graphs."""
 
     def apart(self, case: str, event: str) -> bool:
         """Whether an event left several islands: each shares for itself, and what the whole shares means nothing."""

@@ -13,7 +13,7 @@ import msgspec
 from plant.equipment import F_NOM, Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.spec.agentless import check_agentless
-from scenarios.spec.benchmark import check_benchmark
+from scenarios.spec.benchmark import check_benchmark, with_benchmark_folder
 from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
 from scenarios.spec.changes import as_in, check_changes
 from scenarios.spec.checks import (
@@ -123,7 +123,8 @@ def check_tables(
     check_times(scenario, mistakes)
     check_step(scenario, mistakes)
     check_names(scenario, mistakes)
-    check_benchmark(scenario, path.parent, mistakes)
+    scenario = with_benchmark_folder(scenario, path.parent)
+    check_benchmark(scenario, mistakes)
     scenario = with_graph_folders(with_law_folders(scenario, path.parent), path.parent)
     check_laws(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)

@@ -147,7 +147,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Name of the run folder; without it, that of the file."""
     title: str = ""
     """One line for `gridpeers list`."""
-    paper: str = ""
+    paper: PluginKey = ""
     """Benchmark whose published numbers and claims the run is judged by: "islanding", "intermittency", "communication",
     "switching", "plug-n-play", "wind-up", those of the paper, or your own as "module:Name"; "" judges nothing."""
     seed: int = 1

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from statistics import median
 
-from gridpeers.benchmarks import MPSI_BAND, Claim, Findings, GraphRun
+from gridpeers.benchmarks import MPSI_BAND, Claim, Findings
+from papers.singhal2022.graph_runs import GraphRun, graph_runs
 from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
 
 TREE = 8
@@ -24,7 +25,7 @@ def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
 
 def connected(found: Findings) -> tuple[GraphRun, ...]:
     """Runs on connected graphs."""
-    return tuple(run for run in found.graphs if run.connected)
+    return tuple(run for run in graph_runs(found) if run.connected)
 
 
 def _falls(found: Findings) -> tuple[bool, str]:
@@ -54,7 +55,7 @@ def _same_end(found: Findings) -> tuple[bool, str]:
 
 
 def _none_below(found: Findings) -> tuple[bool, str]:
-    runs = [run for run in found.graphs if run.links < TREE]
+    runs = [run for run in graph_runs(found) if run.links < TREE]
     least = min((run.steady.MPSI for run in runs), default=0.0)
     return bool(runs) and least >= MPSI_BAND, f"{len(runs)} graphs: MPSI at least {least:.3f}"
 

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gridpeers.benchmarks import GraphRun
 from gridpeers.figures import PAGE
 from papers.singhal2022.claims.topology import TREE, medians
+from papers.singhal2022.graph_runs import GraphRun
 
 LEAST = 1e-6
 """MPSI below this is drawn as this: on an axis of logarithms there is no 0."""

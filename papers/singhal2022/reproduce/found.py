@@ -12,6 +12,7 @@ from typing import Any
 
 from gridpeers.benchmarks import Findings, Verdict
 from gridpeers.folders import versions
+from papers.singhal2022.graph_runs import graph_runs
 from papers.singhal2022.headline import Number, numbers
 from papers.singhal2022.reproduce.parts import Part, Picture
 from papers.singhal2022.tables import Cell, PaperTable
@@ -151,7 +152,7 @@ def metrics_json(whole: Reproduction) -> str:
                 **{"MPSI": run.steady.MPSI, "f_error_Hz": run.steady.f_error_Hz},
             }
             for result in whole.results
-            for run in result.found.graphs
+            for run in graph_runs(result.found)
         ],
     }
     return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import gridpeers as gp
-from gridpeers.benchmarks import Findings, GraphRun, Settling, Steady
+from gridpeers.benchmarks import Settling, Steady
 from gridpeers.graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
+from papers.singhal2022.graph_runs import GraphFindings, GraphRun
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
 """Links of the connected graphs; most where the paper's curve bends."""
@@ -53,7 +54,7 @@ def graphs(inverters: int, seed: int) -> Iterator[Edges]:
         yield from connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def study(seed: int, tell: Told, *, jobs: int | None) -> Findings:
+def study(seed: int, tell: Told, *, jobs: int | None) -> GraphFindings:
     """Run the islanding of case IV on every graph, always in one process each.
 
     Parameters
@@ -77,7 +78,7 @@ def study(seed: int, tell: Told, *, jobs: int | None) -> Findings:
         if row["status"] == "broke":
             raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")
     runs = zip(drawn, rows.to_dict("records"), strict=True)
-    return Findings(results={}, graphs=tuple(_graph_run(len(names), edges, row) for edges, row in runs))
+    return GraphFindings(results={}, graphs=tuple(_graph_run(len(names), edges, row) for edges, row in runs))
 
 
 def _graph_run(inverters: int, edges: Edges, row: Mapping[str, Any]) -> GraphRun:

@@ -5,10 +5,11 @@ from dataclasses import replace
 import pytest
 
 from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.graph_runs import GraphFindings, GraphRun
 from papers.singhal2022.tables import tables_of
 from papers.singhal2022.tolerances import TABLE
 from scenarios.results.claims import Verdict, judge
-from scenarios.results.findings import Findings, GraphRun
+from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.settling import Settling
 
@@ -148,7 +149,7 @@ def over_graphs(**times: float | None) -> Findings:
                 steady=Steady(f_error_Hz=0.0, MPSI=shared, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
             )
         )
-    return Findings(results={}, graphs=tuple(runs))
+    return GraphFindings(results={}, graphs=tuple(runs))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Benchmarks: what is published of an experiment, added from outside."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,9 @@ from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import Report, plain
 from scenarios.spec import ScenarioError, load_scenario
-from scenarios.spec.loading import CATALOGUE
+from scenarios.spec.loading import CATALOGUE, check_tables
+from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.writing import to_toml
 
 MODULE = """
 from scenarios.results.benchmarks import Benchmark
@@ -46,6 +49,8 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     """Its number is in the table with its source, its claim has a verdict, its summary follows."""
     spec, _ = load_scenario(scenario(tmp_path, "my_benchmark:MINE"))
     benchmark = benchmark_of(spec.paper)
+    again, _ = check_tables(tomllib.loads(to_toml(spec, {})), tmp_path / "elsewhere" / "again.toml", Mistakes("again"))
+    assert again.paper == {"use": "my_benchmark:MINE", "folder": str(tmp_path)}
     steady = Steady(f_error_Hz=0.0, MPSI=0.09, V_error=0.0, MQSI=0.0, t_restore_s=None, p={})
     found = Findings(results={"IV": {"event1": steady}})
     verdicts = judge(found, benchmark.claims)
@@ -64,7 +69,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
         ("my_benchmark:MINES", 'my_benchmark:MINES: module my_benchmark has no "MINES"; did you mean "MINE"?'),
         ("my_benchmark:OTHER", "my_benchmark:OTHER is no benchmark: it is no gridpeers.benchmarks.Benchmark"),
         ("no_such_module:MINE", 'no_such_module:MINE: there is no module "no_such_module"'),
-        ("island", 'paper: there is no "island"; did you mean "islanding"?'),
+        ("island", 'paper: there is no benchmark "island"; did you mean "islanding"?'),
     ],
 )
 def test_a_benchmark_that_is_none_is_told_before_anything_runs(tmp_path: Path, paper: str, said: str) -> None:

@@ -84,7 +84,11 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
         ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
         ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
-        ('paper = "islanding"', 'paper = "islands"', r'paper: there is no "islands"'),
+        (
+            'paper = "islanding"',
+            'paper = "islands"',
+            r'paper: there is no benchmark "islands"; did you mean',
+        ),
         ("[plant]", "[plant.gfm]\nT_p = 0.01\n\n[plant]", r"plant.gfm.T_p: unknown key; write T_p_s, in seconds"),
         ("[plant]", "[plant.gfm]\nP_max_pu = 100\n\n[plant]", r"plant.gfm.P_max_pu: .* did you mean 1 \(100 %\)\?"),
         (

@@ -1,0 +1,43 @@
+"""Figures of the paper that are of no single run."""
+
+import numpy as np
+
+from gridpeers.benchmarks import Settling, Steady
+from papers.singhal2022.figures.topologies import topologies
+from papers.singhal2022.figures.var_sharing import var_sharing
+from papers.singhal2022.graph_runs import GraphRun
+
+
+def graph_run(links: int, t: float | None, *, connected: bool) -> GraphRun:
+    """One run over a graph."""
+    return GraphRun(
+        links=links,
+        connected=connected,
+        settled=Settling(t_f_s=t, t_share_s=t, f_swing_Hz=0.0, V_swing_pu=0.0),
+        steady=Steady(f_error_Hz=0.0, MPSI=1e-5 if connected else 0.1, V_error=0.0, MQSI=0.0, t_restore_s=t, p={}),
+    )
+
+
+def test_graphs_in_parts_are_not_drawn_as_connected_ones() -> None:
+    """Also with links enough for a tree: they have a mark of their own, are named, and are not in the median."""
+    runs = [graph_run(8, 1.0, connected=True), graph_run(9, 0.8, connected=True), graph_run(9, None, connected=False)]
+    page = topologies(runs)
+    left, right = page.axes
+
+    marks = {line.get_marker(): list(line.get_xdata()) for line in right.get_lines() if line.get_marker() in "ox"}
+    assert marks == {"o": [8, 9], "x": [9]}
+    median = next(line for line in left.get_lines() if line.get_linewidth() == 2.0)
+    assert list(median.get_ydata()) == [1.0, 0.8]
+    assert "a graph in parts" in [text.get_text() for text in page.legends[0].get_texts()]
+    assert "never" in [text.get_text() for text in left.texts]
+
+
+def test_small_and_large_var_sharing_are_both_seen() -> None:
+    """MQSI goes from 0.01 to 4: on an axis of logarithms each number has its place, and the paper's has its line."""
+    values = {("I", "event1"): 4.0, ("IV", "event1"): 0.01}
+    (panel,) = var_sharing(values, {"ours": values, "moved": values}, ("I", "IV"), ("event1",)).axes
+
+    assert panel.get_yscale() == "log"
+    low, high = panel.get_ylim()
+    assert low < 0.01 < 4.0 < high
+    assert np.log(0.01 / low) / np.log(high / low) > 0.05
