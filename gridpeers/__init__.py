@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from agents.carriers.registry import LAWS
     from agents.graphs import GRAPHS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
-    from gridpeers.comparison import Comparison, compare
-    from gridpeers.prediction import Prediction, predict
-    from gridpeers.result import Result, Results, read
+    from gridpeers.runs.reading import read
+    from gridpeers.runs.result import Result, Results
     from gridpeers.scenario import Scenario, load
-    from gridpeers.sweeping import sweep
+    from gridpeers.studies.comparison import Comparison, compare
+    from gridpeers.studies.prediction import Prediction, predict
+    from gridpeers.studies.sweeping import sweep
     from netem.models.own import FAULTS, LinkFault
     from scenarios.results.folder import FolderError
     from scenarios.run import BrokenRunError
@@ -41,29 +42,29 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
-    "Comparison": "gridpeers.comparison",
+    "Comparison": "gridpeers.studies.comparison",
     "FolderError": "scenarios.results.folder",
     "Law": "agents.laws.law",
     "LinkFault": "netem.models.own",
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
-    "Prediction": "gridpeers.prediction",
+    "Prediction": "gridpeers.studies.prediction",
     "Range": "wire.parameters",
-    "Result": "gridpeers.result",
-    "Results": "gridpeers.result",
+    "Result": "gridpeers.runs.result",
+    "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
     "ScenarioError": "scenarios.spec.mistakes",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
     "catalogue": "scenarios.spec.loading",
-    "compare": "gridpeers.comparison",
+    "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.registry:LAWS.register",
     "link_fault": "netem.models.own:FAULTS.register",
     "load": "gridpeers.scenario",
-    "predict": "gridpeers.prediction",
-    "read": "gridpeers.result",
-    "sweep": "gridpeers.sweeping",
+    "predict": "gridpeers.studies.prediction",
+    "read": "gridpeers.runs.reading",
+    "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
 

@@ -16,8 +16,8 @@ from scenarios.sweep.file.paths import PathError, Tree, put, remove
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from gridpeers.result import Result, Results
-    from gridpeers.running import How
+    from gridpeers.runs.result import Result, Results
+    from gridpeers.runs.running import How
     from plant.equipment import Feeder
     from scenarios.run import Driver
 
@@ -193,7 +193,7 @@ class Scenario:
         FolderError
             If there is something in the folder, or it cannot be written.
         """
-        from gridpeers.running import run
+        from gridpeers.runs.running import run
 
         results = run(self, [case] if isinstance(case, str) else case, driver, **how)
         return results[case] if isinstance(case, str) else results

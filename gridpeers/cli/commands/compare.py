@@ -30,7 +30,7 @@ def compare(
     if out.suffix not in kinds:
         fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
 
-    from gridpeers.comparison import compare as compare_runs
+    from gridpeers.studies.comparison import compare as compare_runs
     from scenarios.results.folder import FolderError, refusal, shown
     from scenarios.spec import ScenarioError
 

@@ -34,7 +34,7 @@ def predict(
     spec = chosen(spec, case, None)
     require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
 
-    from gridpeers.prediction import predictions
+    from gridpeers.studies.prediction import predictions
     from scenarios.run import BrokenRunError
     from scenarios.spec import ScenarioError
 

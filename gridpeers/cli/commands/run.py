@@ -63,7 +63,7 @@ def run(
     """
     from datetime import datetime
 
-    from gridpeers.running import check_how
+    from gridpeers.runs.running import check_how
     from scenarios.spec import ScenarioError
 
     spec, feeder = load(scenario)

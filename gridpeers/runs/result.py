@@ -1,4 +1,4 @@
-"""What a run came to: its tables and figures, read from its folder; `save` copies the folder, `read` opens one."""
+"""What a run came to: its tables and figures, read from its folder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import pandas as pd
 
-from gridpeers import frames
+from gridpeers.runs import frames
+from gridpeers.runs.run_folder import RunFolder, empty_folder
+from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
 from plant.tables import read_feeder
 from scenarios.results.benchmarks import benchmark_of
@@ -36,27 +38,6 @@ from wire.nearest import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class RunFolder:
-    """A run folder; a temporary one is removed when nobody holds a result of it any more.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    temporary : bool
-        Whether it is to be removed.
-    """
-
-    def __init__(self, path: Path, *, temporary: bool = False) -> None:
-        self.path = path
-        self._removal = weakref.finalize(self, shutil.rmtree, path, ignore_errors=True) if temporary else None
-
-    def keep(self) -> None:
-        """Leave a temporary folder where it is."""
-        if self._removal is not None:
-            self._removal.detach()
 
 
 class Results(Mapping[str, "Result"]):
@@ -128,7 +109,7 @@ class Results(Mapping[str, "Result"]):
         ValueError
             If the run has no such figure.
         """
-        return _drawn(self.drawing(self._results), figure)
+        return drawn(self.drawing(self._results), figure)
 
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, figures included.
@@ -281,7 +262,7 @@ class Result:
         ValueError
             If the run has no such figure.
         """
-        return _drawn(self.drawing(), figure)
+        return drawn(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
         """Return what the figures of the case share (`scenarios.results.plots`)."""
@@ -300,84 +281,6 @@ class Result:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
 
 
-def empty_folder(folder: Path) -> Path:
-    """Make a folder for results.
-
-    Raises
-    ------
-    FolderError
-        If there is something in it, or it cannot be made.
-    """
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            kind = "is not empty" if folder.is_dir() else "is a file"
-            raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FolderError(refusal(folder, error)) from error
-    return folder
-
-
 def _plant_events(result: Result) -> list[PlantEvent]:
     rows = result.events.itertuples(index=False)
     return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
-
-
-def read(folder: str | Path) -> Result | Results:
-    """Open the folder of a run, whoever made it: `Result.save`, `gridpeers run` or `gridpeers up`.
-
-    Returns
-    -------
-    Result or Results
-        A `Result` if the run has one case, else `Results`.
-
-    Raises
-    ------
-    FolderError
-        If it is no folder of a run, or of one that did not come to its end.
-    """
-    path = Path(folder)
-    if not (path / "status.txt").is_file():
-        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt")
-    status = (path / "status.txt").read_text(encoding="utf-8").strip()
-    if status != "complete":
-        raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
-    try:
-        text, tables = read_toml(path / "scenario.toml")
-        mistakes = Mistakes(str(path / "scenario.toml"), text)
-        spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
-        mistakes.raise_if_any()
-        feeder = as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
-        results = Results(RunFolder(path), spec, feeder)
-    except (OSError, ValueError, KeyError) as error:
-        text = "; ".join(getattr(error, "mistakes", ())) or str(error)
-        raise FolderError(f"{folder}: cannot be read: {text}") from error
-    return next(iter(results.values())) if len(results) == 1 else results
-
-
-def _drawn(drawing: Drawing, name: str) -> Figure:
-    from scenarios.results.plots import draw, figures_of
-
-    shown_in_notebooks()
-    names = figures_of(drawing)
-    if name not in names:
-        raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, names, "figures")}')
-    return draw(drawing, name)
-
-
-def shown_in_notebooks() -> None:
-    """Have a notebook show a figure that is the value of a cell as a picture, also without pyplot."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    if shell is None:
-        return
-    from matplotlib.figure import Figure
-
-    formatter = shell.display_formatter.formatters["image/png"]
-    if formatter.for_type(Figure) is None:  # whoever has chosen another format keeps it
-        formatter.for_type(Figure, _png)
-
-
-def _png(figure: Figure) -> bytes:
-    file = BytesIO()
-    figure.savefig(file, format="png")
-    return file.getvalue()

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, TypedDict, get_args
 
 import msgspec
 
-from gridpeers.result import Results, RunFolder, empty_folder
+from gridpeers.runs.result import Results
+from gridpeers.runs.run_folder import RunFolder, empty_folder
 from scenarios.results.numbers import Clock
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request

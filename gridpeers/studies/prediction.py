@@ -7,7 +7,7 @@ from functools import cached_property
 
 import pandas as pd
 
-from gridpeers.running import with_cases
+from gridpeers.runs.running import with_cases
 from gridpeers.scenario import Scenario
 from plant.equipment import Feeder
 from scenarios.predict.closed_form import Kind, delay_limit_closed, modes

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from gridpeers.result import Result, Results, read, shown_in_notebooks
+from gridpeers.runs.reading import read
+from gridpeers.runs.result import Result, Results
+from gridpeers.runs.showing import shown_in_notebooks
 from scenarios.spec.mistakes import ScenarioError
 from scenarios.spec.writing import to_toml
 from scenarios.sweep.file.paths import flatten

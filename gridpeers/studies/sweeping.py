@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from gridpeers import frames
+from gridpeers.runs import frames
 from gridpeers.scenario import Scenario
 from gridpeers.values import plain
 from scenarios.results.history import History

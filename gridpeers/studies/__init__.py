@@ -1,0 +1,1 @@
+"""What is made of runs, or before them: sweeps, comparisons, predictions."""
