@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import sys
-import weakref
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +16,6 @@ from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder, empty_folder
 from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
-from plant.tables import read_feeder
 from scenarios.results.benchmarks import benchmark_of
 from scenarios.results.claims import Verdict, judge
 from scenarios.results.drawing import Drawing, drawing_of
@@ -28,11 +24,7 @@ from scenarios.results.folder import FolderError, refusal, shown, write_whole
 from scenarios.results.history import History, Plates, read_history
 from scenarios.results.moves import as_they_came
 from scenarios.spec import model
-from scenarios.spec.changes import as_in
-from scenarios.spec.loading import read_toml
-from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of
-from scenarios.spec.reading import read_tables
 from wire.messages import PlantEvent
 from wire.nearest import suggestion
 

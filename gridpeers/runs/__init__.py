@@ -1,0 +1,1 @@
+"""One run: started, and its folder as tables and figures."""

@@ -1,0 +1,48 @@
+"""The folder of a run, which goes with its results if nobody has asked to keep it."""
+
+from __future__ import annotations
+
+import shutil
+import weakref
+from pathlib import Path
+
+from scenarios.results.folder import FolderError, refusal
+
+
+class RunFolder:
+    """A run folder; a temporary one is removed when nobody holds a result of it any more.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    temporary : bool
+        Whether it is to be removed.
+    """
+
+    def __init__(self, path: Path, *, temporary: bool = False) -> None:
+        self.path = path
+        self._removal = weakref.finalize(self, shutil.rmtree, path, ignore_errors=True) if temporary else None
+
+    def keep(self) -> None:
+        """Leave a temporary folder where it is."""
+        if self._removal is not None:
+            self._removal.detach()
+
+
+def empty_folder(folder: Path) -> Path:
+    """Make a folder for results.
+
+    Raises
+    ------
+    FolderError
+        If there is something in it, or it cannot be made.
+    """
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            kind = "is not empty" if folder.is_dir() else "is a file"
+            raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FolderError(refusal(folder, error)) from error
+    return folder
