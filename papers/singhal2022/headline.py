@@ -70,8 +70,8 @@ def _relative(all_numbers: Sequence[Number]) -> list[str]:
     near, judged = within(about, Cell.within_relative)
     far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
     return [
-        f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE.value:g} % of the paper's number "
-        f"(0.000: below 0.0005 pu); farthest off: {far}."
+        f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE.value:g} % of the paper's number or "
+        f"half of its last digit; farthest off: {far}."
     ]
 
 

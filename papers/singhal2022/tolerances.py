@@ -73,8 +73,8 @@ TABLE: dict[tuple[Number, Quantity], Tolerance] = {
 
 V_RELATIVE = Bound(
     0.25,
-    "of the paper's own V_error: as much as printing hides of 0.002, which it prints most often; a zero passes no such "
-    "bound, as it passes one of 0.003 pu (1)",
+    "of the paper's number, which is what printing hides of the 0.002 that it prints most often, or half of its last "
+    "digit: a zero passes a bound of 0.003 pu, and not this one (1)",
 )
 MQSI_FACTOR = Bound(
     2.0, f"how many times an MQSI may be the paper's, or the paper's it, to be told as near: it {_PLACES}"
