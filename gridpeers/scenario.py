@@ -22,6 +22,21 @@ if TYPE_CHECKING:
     from scenarios.run import Driver
 
 
+def as_scenario(it: Scenario | str | Path) -> Scenario:
+    """Return a scenario that may be given by its name or path.
+
+    Raises
+    ------
+    ScenarioError
+        If it is none, or has mistakes.
+    """
+    if isinstance(it, Scenario):
+        return it
+    if isinstance(it, str | Path):
+        return load(it)
+    raise ScenarioError([f"needs a scenario, its name or its path, got {it!r:.60}"])
+
+
 def load(name_or_path: str | Path) -> Scenario:
     """Read and check a scenario.
 
@@ -80,6 +95,7 @@ class Scenario:
                 tree[key] = plain(value)
             except ValueError as error:
                 mistakes.add(key, str(error))
+        mistakes.raise_if_any()
         self._set(tree, Path("scenario.toml").absolute(), "", frozenset(), mistakes)
 
     @classmethod
@@ -121,6 +137,10 @@ class Scenario:
         scenarios.spec.mistakes.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
         replace: gains.k_p: must be a number, got "much"
         """
+        if not isinstance(changes, Mapping) or not all(isinstance(path, str) for path in changes):
+            raise ScenarioError(
+                [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
+            )
         tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
         mistakes = Mistakes(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
         for path, value in changes.items():

@@ -41,7 +41,9 @@ def plain(value: Any) -> Any:
         return _reference(value)
     if callable(getattr(value, "tolist", None)):  # numpy and pandas, which need not be imported for this
         return plain(value.tolist())
-    raise ValueError(f"a scenario cannot hold a {type(value).__name__}; give a number, a text, a list or a table")
+    raise ValueError(
+        f"a value of type {type(value).__name__} is none of a scenario's; give a number, text, list or table"
+    )
 
 
 def _reference(it: Any) -> str:

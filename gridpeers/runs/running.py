@@ -117,8 +117,8 @@ def check_how(driver: str, clock: str, speed: float, *, strict: bool, dash: str 
             wrong = f"{dash}{name}: simulated time has no pace to keep; use it with {dash}clock wall"
     elif driver == "inprocess":
         wrong = f"{dash}clock wall: needs a process per agent; use {dash}driver processes"
-    elif not low <= speed <= high:
-        wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {speed:g}"
+    elif not (isinstance(speed, int | float) and low <= speed <= high):
+        wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {speed}"
     if wrong:
         raise ScenarioError([wrong])
 

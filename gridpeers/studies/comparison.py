@@ -49,6 +49,9 @@ def compare(a: Run, b: Run, *, names: tuple[str, str] = ("a", "b")) -> Compariso
     if len(set(names)) != 2:
         raise ScenarioError([f"names: two different words are needed, got {names[0]!r} and {names[1]!r}"])
     first, second = (read(run) if isinstance(run, str | Path) else run for run in (a, b))
+    for run in (first, second):
+        if not isinstance(run, Result | Results):
+            raise ScenarioError([f"compare: needs results or folders of runs, got {run!r:.60}"])
     return Comparison(_pairs(first, second), names)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import cached_property
+from pathlib import Path
 
 import pandas as pd
 
 from gridpeers.runs.running import with_cases
-from gridpeers.scenario import Scenario
+from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
 from scenarios.predict.closed_form import Kind, delay_limit_closed, modes
 from scenarios.predict.fleet import Fleet, fleet_of
@@ -29,13 +30,13 @@ _LIMITS: dict[str, Kind] = {
 """Delays whose limit is known, and their names in `scenarios.predict`."""
 
 
-def predict(scenario: Scenario, case: str, *, voltage: bool = True) -> Prediction:
+def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
     """Predict how a case will go, without running it.
 
     Parameters
     ----------
-    scenario : Scenario
-        The experiment.
+    scenario : Scenario, str or Path
+        The experiment, or its name or path.
     case : str
         Its case.
     voltage : bool
@@ -48,7 +49,8 @@ def predict(scenario: Scenario, case: str, *, voltage: bool = True) -> Predictio
     BrokenRunError
         If the plant has no solution on droop alone.
     """
-    return predictions(with_cases(scenario.spec, [case]), scenario.feeder, voltage=voltage)[case]
+    known = as_scenario(scenario)
+    return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
 
 
 def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:

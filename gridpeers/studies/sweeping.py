@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from gridpeers.runs import frames
-from gridpeers.scenario import Scenario
+from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.spec import Scenario as Spec
@@ -30,13 +31,13 @@ Values = Mapping[str, Iterable[Any]]
 
 
 def sweep(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     grid: Values | None = None,
     *,
     zip: Values | None = None,
-    cases: Iterable[str] = (),
+    cases: str | Iterable[str] = (),
     seeds: int = 1,
-    metrics: Iterable[str] | None = None,
+    metrics: str | Iterable[str] | None = None,
     histories: bool = False,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -45,8 +46,8 @@ def sweep(
 
     Parameters
     ----------
-    scenario : Scenario
-        What is varied.
+    scenario : Scenario, str or Path
+        What is varied, or its name or path.
     grid : Mapping[str, Iterable], optional
         Values by the dotted path of a key, as in `Scenario.replace`; every combination is run.
     zip : Mapping[str, Iterable], optional
@@ -79,7 +80,7 @@ def sweep(
     --------
     >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
     """
-    plan = _plan(scenario, grid or {}, zip or {}, tuple(cases), seeds)
+    plan = _plan(as_scenario(scenario), grid or {}, zip or {}, _names(cases), seeds)
     runs = list(enumerate(plan.runs))
     done: dict[int, Done] = {}
     kept: dict[int, pd.DataFrame] = {}
@@ -93,7 +94,7 @@ def sweep(
     del columns["sample"]
     frame = pd.DataFrame({name: _column(name, values, plan) for name, values in columns.items()})
     if metrics is not None:
-        frame = frame[_chosen(list(frame), list(metrics), plan)]
+        frame = frame[_chosen(list(frame), _names(metrics), plan)]
     frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
     if histories:
         frame["history"] = [kept.get(number) for number in sorted(done)]
@@ -108,13 +109,22 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
     for table, values, lists in (("grid", grid, crossed), ("zip", zipped, paired)):
         for path, items in values.items():
             try:
+                if isinstance(items, str):
+                    raise TypeError
                 lists[path] = [plain(item) for item in items]
             except (TypeError, ValueError) as error:
                 text = str(error) if isinstance(error, ValueError) else f"needs a list of values, got {items!r}"
                 mistakes.add(f"{table}.{path}", text)
+    if not isinstance(seeds, int):
+        mistakes.add("seeds", f"must be a whole number, got {seeds!r}")
     mistakes.raise_if_any()
     request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
     return plan_of(request, Base(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
+
+
+def _names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names of which a single one may stand alone."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def _jobs(plan: Plan, jobs: int | None) -> int:
@@ -158,7 +168,7 @@ def _column(name: str, values: list[Any], plan: Plan) -> list[Any]:
     return [math.nan if value is None else value for value in values]
 
 
-def _chosen(columns: list[str], metrics: list[str], plan: Plan) -> list[str]:
+def _chosen(columns: list[str], metrics: tuple[str, ...], plan: Plan) -> list[str]:
     """Return the columns of some metrics behind those that say which run it is."""
     head = [name for name in columns if name in ("case", "seed", "status", "why", *plan.parameters)]
     known = dict.fromkeys(name.partition(".")[2] or name for name in columns if name not in (*head, *FATE))

@@ -81,7 +81,7 @@ def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
     with pytest.raises(gp.ScenarioError) as caught:
         gp.load("islanding").replace({"seed": object(), "title": Inside})
 
-    assert "replace: seed: a scenario cannot hold a object" in str(caught.value)
+    assert "replace: seed: a value of type object" in str(caught.value)
     assert "replace: title: " in str(caught.value)
     assert "defined inside a function" in str(caught.value)
 
@@ -104,3 +104,18 @@ def test_an_unknown_case_driver_or_clock_is_one_line() -> None:
         with pytest.raises(gp.ScenarioError, match=text) as caught:
             scenario.run(**words)  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
+
+
+def test_a_scenario_without_events_runs_and_has_no_windows() -> None:
+    """There is nothing to measure, and nothing breaks."""
+    run = gp.load("islanding").replace({"event": None, "time.end_s": 0.5}).run("IV")
+
+    assert len(run.metrics) == 0
+    assert len(run.history) == 51
+
+
+def test_what_is_no_change_is_refused_in_one_line() -> None:
+    """Changes are values by the path of their key."""
+    for changes in ([("seed", 1)], {3: 1}, None):
+        with pytest.raises(gp.ScenarioError, match="replace: needs values by the path of their key"):
+            gp.load("islanding").replace(changes)  # type: ignore[arg-type]

@@ -61,7 +61,9 @@ def test_all_mistakes_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario
     assert "sweep: grid.gains.kp: unknown key" in str(caught.value)
     assert 'grid.time.T_c_s: must be a number, got "x"' in str(caught.value)
     with pytest.raises(gp.ScenarioError, match=r"sweep: grid\.gains\.k_p: needs a list of values, got 3"):
-        gp.sweep(scenario, {"gains.k_p": 3})  # type: ignore[dict-item]
+        gp.sweep(scenario, {"gains.k_p": 3}, seeds="two")  # type: ignore[dict-item, arg-type]
+    with pytest.raises(gp.ScenarioError, match="needs a scenario, its name or its path, got 3"):
+        gp.sweep(3, {"gains.k_p": [0.001]})  # type: ignore[arg-type]
     with pytest.raises(gp.ScenarioError, match="nothing is varied"):
         gp.sweep(scenario)
     with pytest.raises(gp.ScenarioError, match='no metric "MPSY"; did you mean "MPSI"'):
@@ -133,5 +135,7 @@ def test_runs_without_a_common_case_are_not_compared(scenario: gp.Scenario) -> N
 
     with pytest.raises(gp.ScenarioError, match='no case "I" in the second run'):
         gp.compare(runs, gp.load("islanding").replace({"time.end_s": 4.5}).run(["II", "III"]))
+    with pytest.raises(gp.ScenarioError, match="needs results or folders of runs, got 3"):
+        gp.compare(runs, 3)  # type: ignore[arg-type]
     with pytest.raises(gp.ScenarioError, match="two different words"):
         gp.compare(runs, runs, names=("a", "a"))
