@@ -237,6 +237,11 @@ class Result:
         return list(self._whole.get("disturbed", ()))
 
     @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Claims of the scenario's benchmark, judged, of all cases of the run; see `Results.verdicts`."""
+        return self._run.verdicts
+
+    @property
     def report(self) -> str:
         """What the command `gridpeers run` prints at the end, of all cases of the run."""
         return self._run.report
