@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from wire.registry import NOTEBOOK
+from wire.registry import NOTEBOOK, is_of_another
 
 
 def folder_of(reference: str, folder: str) -> str:
@@ -26,7 +26,7 @@ def folder_of(reference: str, folder: str) -> str:
         spec = find_spec(top)
     except ValueError:  # a module without a specification, as of an embedded interpreter
         return folder
-    if spec is None or spec.origin is None or spec.origin == "frozen":
+    if spec is None or spec.origin is None or spec.origin == "frozen" or is_of_another(spec, folder):
         return folder
     place = Path(spec.origin).resolve().parent
     return str(place.parent if spec.submodule_search_locations else place)

@@ -12,13 +12,20 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import metadata
-from importlib.machinery import PathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
+from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from wire.nearest import suggestion
 
 T = TypeVar("T")
+
+_folders: set[str] = set()
+"""Folders of scenarios that registries have put on the Python path of this process."""
+
+_changed: dict[str, int] = {}
+"""When the file of each module from there was changed last (ns), as of its import."""
 
 NOTEBOOK = "__main__"
 """Module of what is defined in a notebook or in the script that runs: no other process can import it."""
@@ -159,14 +166,17 @@ class Registry(Generic[T]):
     def _module(self, name: str, reference: str, folder: str) -> Any:
         if folder and folder not in sys.path:
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
+            _folders.add(folder)
         try:
-            if name not in sys.modules and find_spec(name) is None:
+            known = name in sys.modules
+            spec = sys.modules[name].__spec__ if known else find_spec(name)
+            if (spec is None and not known) or is_of_another(spec, folder):
                 place = f" in {folder} or" if folder else ""
                 text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
                 raise PluginError(f"{reference}: {text}")
             found = importlib.import_module(name)
             _check_place(found, name, folder, reference)
-            return found
+            return _as_it_is_now(found)
         except PluginError:
             raise
         except Exception as error:  # whatever a user's module does while it is imported
@@ -194,6 +204,26 @@ def _check_place(module: Any, name: str, folder: str, reference: str) -> None:
         f"{reference}: Python has another module {top.__name__}, from {found.origin}, than that in {folder}; give one "
         "of the two another name"
     )
+
+
+def is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
+    """Whether a module stands in the folder of another scenario: only this process would find it there."""
+    place = "" if spec is None or not spec.has_location or not spec.origin else spec.origin.rpartition("/")[0]
+    own = spec is not None and folder and PathFinder.find_spec(spec.name.partition(".")[0], [folder])
+    return place in _folders and place != folder and not own
+
+
+def _as_it_is_now(module: ModuleType) -> ModuleType:
+    """Return a module from the folder of a scenario, imported again if its file has changed since."""
+    spec, name = module.__spec__, module.__name__
+    if spec is None or not spec.origin or spec.origin.rpartition("/")[0] not in _folders:
+        return module
+    loader: Any = spec.loader
+    when = int(loader.path_stats(spec.origin)["mtime"] * 1e9)
+    if _changed.setdefault(name, when) != when:
+        _changed[name] = when
+        return importlib.reload(module)
+    return module
 
 
 def _source(spec: Any) -> str | None:

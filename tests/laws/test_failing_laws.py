@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -117,4 +117,25 @@ def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:
     scenario = gp.load(file)
 
     assert scenario.run("IV").sha256 == scenario.run("IV", driver="processes").sha256
-    assert sys.path[-1] == str(tmp_path)
+
+
+def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
+    """Who changes a law between two runs of a notebook sees the new one, in process as with processes."""
+    text = "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n        return "
+    module = tmp_path / "edited_law.py"
+    law = {"use": "edited_law:Hold", "folder": str(tmp_path)}
+    module.write_text(text + "gp.SetPoints(own.P_set, own.V_set)\n")
+    first = written(law)
+    module.write_text(text + "gp.SetPoints(0.9 * own.P_set, own.V_set)\n")
+    os.utime(module, ns=(0, 10**18))
+
+    assert written(law).sha256 != first.sha256
+
+
+def test_a_module_of_another_scenario_is_not_taken_for_ones_own(tmp_path: Path) -> None:
+    """Two projects may each have a module of the same name; none finds the other's by chance."""
+    (tmp_path / "theirs.py").write_text("from tests.laws.bad_laws import Failing\n")
+    written({"use": "theirs:Failing", "folder": str(tmp_path), "how": "raises"})
+
+    with pytest.raises(gp.ScenarioError, match=r'there is no module "theirs" in .* on the Python path'):
+        written({"use": "theirs:Failing", "folder": str(tmp_path.parent), "how": "raises"})
