@@ -3,7 +3,7 @@
     @gridpeers.graph("star")
     def star(members):
         '''Everybody listens to inv1, and inv1 to everybody.'''
-        return {name: set(members) if name == "inv1" else {"inv1"} for name in members}
+        return {name: set(members) - {name} if name == "inv1" else {"inv1"} for name in members}
 
 A rule is called with the nameplates of all agents on the roster, by name in natural order, and returns whom each
 listens to. Every agent applies it for itself: the same nameplates must give the same graph. A class with parameters

@@ -32,16 +32,20 @@ if TYPE_CHECKING:
     from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.sweeping import sweep
     from netem.models.own import FAULTS, LinkFault
+    from scenarios.results.claims.claim import Claim
     from scenarios.results.folder import FolderError
+    from scenarios.results.own.claim_registry import CLAIMS
+    from scenarios.results.own.metric import METRICS
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
     from scenarios.spec.mistakes import ScenarioError
     from wire.parameters import Range, Unit
 
-    graph, law, link_fault = GRAPHS.register, LAWS.register, FAULTS.register
+    claim, graph, law, link_fault, metric = (it.register for it in (CLAIMS, GRAPHS, LAWS, FAULTS, METRICS))
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
+    "Claim": "scenarios.results.claims.claim",
     "Comparison": "gridpeers.studies.comparison",
     "FolderError": "scenarios.results.folder",
     "Law": "agents.laws.law",
@@ -57,11 +61,13 @@ _HOME = {
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
     "catalogue": "scenarios.spec.loading",
+    "claim": "scenarios.results.own.claim_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.registry:LAWS.register",
     "link_fault": "netem.models.own:FAULTS.register",
     "load": "gridpeers.scenario",
+    "metric": "scenarios.results.own.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
     "read": "gridpeers.runs.reading",
     "sweep": "gridpeers.studies.sweeping",
@@ -70,6 +76,7 @@ _HOME = {
 
 __all__ = [
     "BrokenRunError",
+    "Claim",
     "Comparison",
     "FolderError",
     "Law",
@@ -85,11 +92,13 @@ __all__ = [
     "SetPoints",
     "Unit",
     "catalogue",
+    "claim",
     "compare",
     "graph",
     "law",
     "link_fault",
     "load",
+    "metric",
     "predict",
     "read",
     "sweep",

@@ -5,6 +5,7 @@ The drivers (`scenarios.drivers`) are given configurations here, and their telem
 
 from __future__ import annotations
 
+import dataclasses
 import platform
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -33,10 +34,14 @@ from scenarios.results.messages import messages_saved
 from scenarios.results.metrics import windows
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.numbers import Clock, Ran, metrics_json
+from scenarios.results.own.claim import judged
+from scenarios.results.own.measuring import own_measures
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import Report, plain
+from scenarios.spec.agentless import with_agent
 from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
+from scenarios.spec.own import claims_of
 from scenarios.spec.writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
@@ -156,13 +161,16 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         for case, one in compared.items()
         if one.disturbed
     ]
+    opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
     saved = {
         case: messages_saved(
-            record.quiet, windows(came[case], scenario.time.end_s), len(record.inverters), scenario.time.T_c_s
+            record.quiet, opened[case], len(with_agent(scenario, request.feeder, case)), scenario.time.T_c_s
         )
         for case, record in recorded.items()
     }
     notes += [f"case {case}: {note}" for case, record in recorded.items() for note in _of_laws(record, saved[case])]
+    own = own_measures(scenario, request.feeder, plates, histories, opened, saved)
+    found = dataclasses.replace(found, own=own)
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
     if request.figures:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
@@ -171,7 +179,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         found=found,
-        verdicts=judge(found, benchmark.claims),
+        verdicts=(*judge(found, benchmark.claims), *(() if disturbed else judged(found, claims_of(scenario)))),
         benchmark=benchmark,
         notes=[*notes, *_notes(recorded, request.clock)],
         folder=shown(folder) + "/",

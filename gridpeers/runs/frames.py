@@ -13,6 +13,7 @@ import pandas as pd
 
 from scenarios.results.history import History
 from scenarios.results.links import COLUMNS
+from scenarios.sweep.words import unit_of
 
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's index and quantities."""
@@ -57,7 +58,8 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     frame["reasons"] = [
         "; ".join(f"{name}: {text}" for name, text in window.get("reasons", {}).items()) for window in windows.values()
     ]
-    frame.attrs["units"] = {name: unit for name, unit in METRIC_UNITS.items() if name in frame}
+    units = {name: METRIC_UNITS.get(name) or unit_of(name) for name in frame}
+    frame.attrs["units"] = {name: unit for name, unit in units.items() if unit}
     return frame
 
 

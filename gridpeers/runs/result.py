@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,9 +23,13 @@ from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import Findings, find
 from scenarios.results.folder import FolderError, refusal, shown, write_whole
 from scenarios.results.history import History, Plates, read_history
+from scenarios.results.metrics import windows
 from scenarios.results.moves import as_they_came
+from scenarios.results.own.claim import judged
+from scenarios.results.own.measuring import own_measures
 from scenarios.spec import model
 from scenarios.spec.moves import inverters_of
+from scenarios.spec.own import claims_of
 from wire.messages import PlantEvent
 from wire.nearest import suggestion
 
@@ -148,14 +153,22 @@ class Results(Mapping[str, "Result"]):
         plates = Plates.of(inverters_of(self._spec, self._feeder))
         histories = {case: result.record for case, result in self.items()}
         came = {case: as_they_came(self._spec, _plant_events(result)) for case, result in self.items()}
-        return find(self._spec, self._feeder, plates, histories, came)
+        found = find(self._spec, self._feeder, plates, histories, came)
+        opened = {case: windows(came[case], self._spec.time.end_s) for case in came}
+        saved = {
+            case: {label: of.get("messages_saved") or 0.0 for label, of in frames.windows_of(result._whole).items()}
+            for case, result in self.items()
+        }
+        own = own_measures(self._spec, self._feeder, plates, histories, opened, saved)
+        return replace(found, own=own)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Claims of the scenario's benchmark, judged; none without one, or in a run that was disturbed."""
+        """Claims of the scenario's benchmark, and its own, judged; none in a run that was disturbed."""
         if any(result.disturbed for result in self.values()):
             return ()
-        return judge(self.findings, benchmark_of(self._spec.paper).claims)
+        found = self.findings
+        return (*judge(found, benchmark_of(self._spec.paper).claims), *judged(found, claims_of(self._spec)))
 
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return what the figures of some cases share (`scenarios.results.plots`)."""

@@ -15,8 +15,10 @@ from gridpeers.runs import frames
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
+from scenarios.results.own.metric import METRICS
 from scenarios.spec import Scenario as Spec
 from scenarios.spec.mistakes import Mistakes, ScenarioError
+from scenarios.spec.own import metrics_of
 from scenarios.spec.portability import check_portable
 from scenarios.sweep.columns import FATE, columns_of
 from scenarios.sweep.file.model import Sweep
@@ -37,7 +39,7 @@ def sweep(
     zip: Values | None = None,
     cases: str | Iterable[str] = (),
     seeds: int = 1,
-    metrics: str | Iterable[str] | None = None,
+    metrics: str | Iterable[Any] | None = None,
     histories: bool = False,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -56,8 +58,9 @@ def sweep(
         Cases that are run; all when left out.
     seeds : int
         How many seeds every point is run with: the scenario's, and those that follow it.
-    metrics : iterable of str, optional
-        Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out.
+    metrics : iterable, optional
+        Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out. One of your own is a
+        function of a window, its registered name, `module:Name`, or a table with `use` and parameters.
     histories : bool
         Whether each row has its history, in a column of that name, as `Result.history`.
     jobs : int, optional
@@ -80,7 +83,8 @@ def sweep(
     --------
     >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
     """
-    plan = _plan(as_scenario(scenario), grid or {}, zip or {}, _names(cases), seeds)
+    checked, chosen = _with_metrics(as_scenario(scenario), metrics)
+    plan = _plan(checked, grid or {}, zip or {}, _names(cases), seeds)
     runs = list(enumerate(plan.runs))
     done: dict[int, Done] = {}
     kept: dict[int, pd.DataFrame] = {}
@@ -93,12 +97,26 @@ def sweep(
     columns = columns_of(plan, done)
     del columns["sample"]
     frame = pd.DataFrame({name: _column(name, values, plan) for name, values in columns.items()})
-    if metrics is not None:
-        frame = frame[_chosen(list(frame), _names(metrics), plan)]
+    if chosen is not None:
+        frame = frame[_chosen(list(frame), tuple(chosen), plan)]
     frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
     if histories:
         frame["history"] = [kept.get(number) for number in sorted(done)]
     return frame
+
+
+def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tuple[Scenario, list[str] | None]:
+    """Return the scenario with metrics of one's own beside its own, and the names of all that were asked for."""
+    if metrics is None:
+        return scenario, None
+    asked: list[Any] = [metrics] if isinstance(metrics, str) or callable(metrics) else list(metrics)
+    own = [it for it in asked if not isinstance(it, str) or ":" in METRICS.reference(it)]
+    if own:
+        before = len(scenario.spec.metrics)
+        scenario = scenario.replace({"metrics": [*scenario.spec.metrics, *own]})
+        added = iter(metrics_of(scenario.spec)[before:])
+        asked = [it if isinstance(it, str) and ":" not in METRICS.reference(it) else next(added)[0] for it in asked]
+    return scenario, asked
 
 
 def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
@@ -133,7 +151,7 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
         raise ScenarioError([f"jobs: must be 1 or more, got {jobs}"])
     if jobs is None and find_spec("joblib") is None:
         return 1
-    if any(check_portable(run.scenario) for run in plan.runs):
+    if any(check_portable(run.scenario, measures=True) for run in plan.runs):
         return 1
     if jobs is None:
         from scenarios.sweep.workers import cores
@@ -171,7 +189,10 @@ def _column(name: str, values: list[Any], plan: Plan) -> list[Any]:
 def _chosen(columns: list[str], metrics: tuple[str, ...], plan: Plan) -> list[str]:
     """Return the columns of some metrics behind those that say which run it is."""
     head = [name for name in columns if name in ("case", "seed", "status", "why", *plan.parameters)]
+    head += [name for name in columns if name == "metric_warnings"]
     known = dict.fromkeys(name.partition(".")[2] or name for name in columns if name not in (*head, *FATE))
-    if unknown := [name for name in metrics if name not in known]:
+    several = {name.partition(".")[0] for name in known}
+    if unknown := [name for name in metrics if name not in known and name not in several]:
         raise ScenarioError(f'metrics: no metric "{name}"; {suggestion(name, known, "metrics")}' for name in unknown)
-    return head + [name for name in columns if (name.partition(".")[2] or name) in metrics and name not in head]
+    wanted = {name for name in known if name in metrics or name.partition(".")[0] in metrics}
+    return head + [name for name in columns if (name.partition(".")[2] or name) in wanted and name not in head]

@@ -10,6 +10,7 @@ from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
+from scenarios.results.own.metric import Measured
 from scenarios.results.published import Published
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
@@ -55,6 +56,8 @@ class Findings:
     """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
+    own: Mapping[str, Mapping[str, Measured]] = field(default_factory=dict)
+    """The scenario's own metrics, by case and event."""
 
     def apart(self, case: str, event: str) -> bool:
         """Whether an event left several islands: each shares for itself, and what the whole shares means nothing."""

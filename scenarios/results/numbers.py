@@ -78,6 +78,11 @@ def metrics_json(
             cases[case][label].get("reasons", {}).pop("MPSI", None)
             cases[case][label].get("reasons", {}).pop("MQSI", None)
             cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
+        for label, measured in found.own.get(case, {}).items():
+            if label in cases[case]:
+                cases[case][label] |= measured.values
+                if measured.reasons:
+                    cases[case][label].setdefault("reasons", {}).update(measured.reasons)
         if case in found.without_agent:
             cases[case]["without_agent"] = list(found.without_agent[case])
         cases[case]["history_sha256"] = sha256[case]

@@ -14,12 +14,13 @@ from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
+from scenarios.results.own import pages as own_pages
 from scenarios.spec.model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time, key_of
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
 
-TOPICS = ("keys", "messages", "scenario")
+TOPICS = ("keys", "messages", "scenario", *own_pages.PAGES)
 """Pages there are."""
 
 _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
@@ -50,6 +51,8 @@ def page(topic: str) -> str:
     topic : str
         One of `TOPICS`.
     """
+    if topic in own_pages.PAGES:
+        return "\n".join(own_pages.page(topic)) + "\n"
     makers = {"keys": _keys, "messages": _messages, "scenario": _scenario}
     return "\n".join(makers[topic]()) + "\n"
 
@@ -92,6 +95,7 @@ def _scenario() -> Iterator[str]:
     yield "here."
     for title, cls in _SCENARIO_TABLES:
         by_name = {field.encode_name: key_of(cls, field) for field in msgspec.structs.fields(cls)}
+        by_name |= {"own": '"mine:Name"'} if cls is Fault else {}  # what it is called in the file is up to its author
         yield ""
         yield f"## {title}"
         yield ""

@@ -62,7 +62,8 @@ def grids(report: Report) -> tuple[Grid, ...]:
     """Tables for our results, laid out as the paper's Tables I and II, with its numbers beside where there are any."""
     if not any(report.found.results.values()):
         return ()  # without events there is no window to measure in
-    return tuple(_grid(report, title, quantities) for title, quantities in _GRIDS)
+    found = [_grid(report, title, quantities) for title, quantities in _GRIDS]
+    return (*found, _own_grid(report)) if report.found.own else tuple(found)
 
 
 def plain(report: Report) -> str:
@@ -149,6 +150,22 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
             ]
         ),
     )
+
+
+def _own_grid(report: Report) -> Grid:
+    """The scenario's own metrics; "-" where there is no value, with the reason below."""
+    own = report.found.own
+    places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
+    rows, reasons = [], []
+    for case, of in own.items():
+        row = [f"{case} {report.titles.get(case, '')}".strip()]
+        for event, name in places:
+            value = of[event].values.get(name) if event in of else None
+            row.append("-" if value is None else f"{value:.5g}")
+        rows.append(tuple(row))
+        reasons += [f"case {case}, {event}: {name} {text}" for event in of for name, text in of[event].reasons.items()]
+    header = ("case", *(f"{event}\n{name}" for event, name in places))
+    return Grid(title="Metrics of the scenario", header=header, rows=tuple(rows), legend="\n".join(reasons))
 
 
 def _row(

@@ -32,6 +32,7 @@ from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.spec.model import Scenario
 from scenarios.spec.moves import check_moves, inverters_of
 from scenarios.spec.netem import check_netem, with_delays
+from scenarios.spec.own import check_own, with_own_folders
 from scenarios.spec.protection import check_protection
 from scenarios.spec.reading import read_tables
 from scenarios.spec.supply import check_supply
@@ -126,6 +127,8 @@ def check_tables(
     scenario = with_benchmark_folder(scenario, path.parent)
     check_benchmark(scenario, mistakes)
     scenario = with_graph_folders(with_law_folders(scenario, path.parent), path.parent)
+    scenario = with_own_folders(scenario, path.parent)
+    check_own(scenario, mistakes)
     check_laws(scenario, mistakes)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, mistakes)
     feeder = _feeder_of(scenario, mistakes, read_feeder)

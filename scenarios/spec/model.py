@@ -152,6 +152,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     "switching", "plug-n-play", "wind-up", those of the paper, or your own as "module:Name"; "" judges nothing."""
     seed: int = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""
+    metrics: tuple[PluginKey, ...] = ()
+    """Metrics of your own, measured in every window: ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05, name =
+    "within_50mHz" }] (`gridpeers doc metrics`)."""
+    claims: tuple[PluginKey, ...] = ()
+    """Claims of your own that the run is judged by: ["mine:restored"] (`gridpeers doc claims`)."""
     without_agent: tuple[str, ...] = ()
     """Inverters that have no agent, in every case, e.g. ["inv2"]: the plant runs them on primary droop at their first
     set-points, nobody hears of them, and the sharing indices leave them out."""

@@ -8,18 +8,28 @@ from typing import Any
 from agents.carriers.registry import LAWS
 from agents.graphs import GRAPHS
 from netem.models.own import FAULTS
+from scenarios.results.own.metric import METRICS
 from scenarios.spec.graph import graph_of
 from scenarios.spec.law import law_of
 from scenarios.spec.model import Scenario
 from scenarios.spec.netem import netem_of
+from scenarios.spec.own import metrics_of
 from wire.registry import PluginError, Registry
 
 
-def check_portable(scenario: Scenario) -> list[str]:
-    """Return a sentence for each law, graph and link fault of a case that no other process could import."""
+def check_portable(scenario: Scenario, *, measures: bool = False) -> list[str]:
+    """Return a sentence for everything in a scenario's cases that no other process could import.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Checked.
+    measures : bool, optional
+        Whether other processes measure, too, as those of a sweep do; those of a run do not.
+    """
     found = []
     for case in scenario.cases:
-        for registry, use in _used(scenario, case):
+        for registry, use in _used(scenario, case, measures):
             try:
                 registry.portable(use)
             except PluginError as error:
@@ -27,7 +37,7 @@ def check_portable(scenario: Scenario) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _used(scenario: Scenario, case: str) -> Iterator[tuple[Registry[Any], str]]:
+def _used(scenario: Scenario, case: str, measures: bool) -> Iterator[tuple[Registry[Any], str]]:
     yield LAWS, law_of(scenario, case).use
     _, graph = graph_of(scenario.cases[case])
     if graph is not None:
@@ -35,3 +45,5 @@ def _used(scenario: Scenario, case: str) -> Iterator[tuple[Registry[Any], str]]:
     for fault in netem_of(scenario, case).links:
         for plugin in fault.own:
             yield FAULTS, plugin.use
+    for _, metric in metrics_of(scenario) if measures else ():
+        yield METRICS, metric.use

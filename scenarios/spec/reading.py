@@ -196,6 +196,8 @@ def _named(kind: Any) -> str:
         return " or ".join(map(_named, typing.get_args(kind)))
     if typing.get_origin(kind) is tuple:
         inner = typing.get_args(kind)[0]
+        if typing.get_origin(inner) is types.UnionType:
+            return 'a list such as ["mine:Name"]'
         if inner in (int, float):
             return "a list of numbers"
         return 'a list of pairs such as [["inv1", "inv4"]]' if typing.get_origin(inner) else 'a list such as ["13-152"]'

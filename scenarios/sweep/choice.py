@@ -57,7 +57,7 @@ def choose(table: pa.Table) -> Choice:
     first = names.index(FATE[0])
     varied = [name for name in names[:first] if name not in REPEATS and len(set(columns[name])) > 1]
     indexes: dict[str, list[str]] = {}
-    for name in names[first + len(FATE) :]:
+    for name in (name for name in names[first:] if name not in FATE):
         window, _, index = name.rpartition(".")
         if window and not window.endswith(".p"):
             indexes.setdefault(window, []).append(index)

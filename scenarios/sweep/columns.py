@@ -8,7 +8,7 @@ from typing import Any
 from scenarios.sweep.file import Plan
 from scenarios.sweep.one import Done
 
-FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256")
+FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256", "metric_warnings")
 """Columns between parameters and indexes."""
 
 
@@ -30,6 +30,8 @@ def columns_of(plan: Plan, done: Mapping[int, Done]) -> dict[str, list[Any]]:
     columns["link_warnings"] = [end.link_warnings or None for end in ends]
     columns["history_sha256"] = [end.sha256 or None for end in ends]
     columns["links_sha256"] = [end.links_sha256 or None for end in ends]
+    if any(run.scenario.metrics for run in rows):
+        columns["metric_warnings"] = [end.metric_warnings or None for end in ends]
     for name in dict.fromkeys(name for end in ends for name in end.measures):
         columns[name] = [end.measures.get(name) for end in ends]
     return columns

@@ -26,7 +26,9 @@ from scenarios.emulation.setup import Setup
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.links import LinkRecord
+from scenarios.results.messages import messages_saved
 from scenarios.results.moves import as_they_came
+from scenarios.results.own.measuring import own_measures
 from scenarios.results.record import Tape
 from scenarios.results.settling import settling
 from scenarios.spec import Scenario
@@ -59,6 +61,8 @@ class Done(msgspec.Struct, frozen=True, kw_only=True):
     """Of all verdicts of the emulated links; "" without."""
     trips: str = ""
     """Who tripped, when and why; "" when nobody did. What is measured is of those that are left."""
+    metric_warnings: str = ""
+    """What of the scenario's own metrics has no value, and why; "" when all have."""
     link_warnings: str = ""
     """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
     measures: dict[str, float | None] = {}
@@ -95,15 +99,22 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[Done, History | No
     history = History.of(recorded.inverters, recorded.rows)
     plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}
+    windows = metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
     with np.errstate(all="ignore"):  # what is no number is told as such
-        for window in metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s):
+        for window in windows:
             steady, settled = (of(history, plates, window, feeder.f_nom) for of in (metrics.measure, settling))
             numbers = asdict(steady) | asdict(settled)
             reasons = numbers.pop("reasons")
             measures |= flat(window.label, numbers | {"steady": float(not reasons)})
+    saved = messages_saved(recorded.quiet, windows, len(agents), scenario.time.T_c_s)
+    own = own_measures(scenario, feeder, plates, {case: history}, {case: windows}, {case: saved}).get(case, {})
+    for label, found in own.items():
+        measures |= flat(label, dict(found.values))
+    failed = [f"{label}: {name} {text}" for label, found in own.items() for name, text in found.reasons.items()]
     done = Done(
         number=number,
         status="ran",
+        metric_warnings="; ".join(failed),
         sha256=recorded.sha256,
         links_sha256=links.sha256 if links.counts else "",
         trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
@@ -132,7 +143,8 @@ def _warnings(links: str, record: LinkRecord) -> str:
     from scenarios.results.link_check import LinkCheck  # scipy.stats takes longer to import than a run
 
     setup = Setup.of_text(links)
-    return "; ".join(LinkCheck(record, setup.netem, setup.microgrids).warnings)
+    check = LinkCheck(record, setup.netem, setup.microgrids)
+    return "; ".join((*check.warnings, *check.failures))
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:

@@ -16,6 +16,11 @@ class Topic(StrEnum):
     keys = "keys"
     messages = "messages"
     scenario = "scenario"
+    laws = "laws"
+    metrics = "metrics"
+    claims = "claims"
+    faults = "faults"
+    graphs = "graphs"
 
 
 def list_() -> None:
@@ -60,10 +65,11 @@ def check(
     )
 
 
-def doc(topic: Annotated[Topic, typer.Argument(metavar="keys|messages|scenario", help="What to print.")]) -> None:
+def doc(topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to print: {', '.join(Topic)}.")]) -> None:
     """Print a reference page that is made from the code.
 
-    keys and messages are those of the wire; scenario is the scenario file, with units and defaults.
+    keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, metrics,
+    claims, faults and graphs are what can be plugged in: those that there are, with their parameters, and your own.
 
     Example:  gridpeers doc scenario
     """

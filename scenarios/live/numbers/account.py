@@ -20,8 +20,10 @@ from scenarios.results.messages import messages_saved
 from scenarios.results.metrics import Window
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.results.numbers import Ran, metrics_json
+from scenarios.results.own.measuring import own_measures
 from scenarios.results.record import Recorded
 from scenarios.results.report import Report, plain
+from scenarios.spec.agentless import with_agent
 from scenarios.spec.moves import inverters_of
 from wire.messages import Pacing
 
@@ -65,6 +67,16 @@ class Account:
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
         history, plates = self._columns(recorded)
         found = find_in({case: compared.opened.measured}, compared.happened, ran.feeder, plates, {case: history})
+        saved = messages_saved(
+            recorded.quiet,
+            compared.opened.measured,
+            len(with_agent(ran.scenario, ran.feeder, case)),
+            ran.scenario.time.T_c_s,
+        )
+        own = own_measures(
+            compared.happened, ran.feeder, plates, {case: history}, {case: compared.opened.measured}, {case: saved}
+        )
+        found = replace(found, own=own)
         report = Report(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},
@@ -76,9 +88,6 @@ class Account:
         )
         pacing = {} if self._pacing is None else {case: self._pacing}
         links = {case: sha256} if (sha256 := self._book.links_sha256) else {}
-        saved = messages_saved(
-            recorded.quiet, compared.opened.measured, len(recorded.inverters), ran.scenario.time.T_c_s
-        )
         by_hand = {
             "ended_s": compared.ended,
             "windows": _windows(compared),

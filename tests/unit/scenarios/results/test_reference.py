@@ -58,6 +58,8 @@ def test_every_key_of_a_scenario_is_on_its_page() -> None:
     for cls in (*TABLES, *ENTRIES.values()):
         for field in msgspec.structs.fields(cls):
             key = key_of(cls, field)
+            if key == "own":
+                key = '"mine:Name"'
             if field.type is Netem:  # written as the entries, which have sections of their own
                 continue
             assert any(form in text for form in (f"`{key}`", f"[{key}", f".{key}]", f".{key}.")), (cls, key)

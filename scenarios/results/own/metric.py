@@ -1,0 +1,164 @@
+"""Metrics: functions of an event's window, the registry of them, and what becomes of one that fails.
+
+    @gridpeers.metric("nadir_Hz")
+    def nadir(window):
+        '''Lowest frequency of a grid-forming inverter (Hz).'''
+        return window.f[:, window.plates.GFM].min()
+
+A metric returns a number, or several by name. A name ends in the unit, as a key does. A class with parameters
+(`wire.parameters`) and a method `__call__(self, window)` is a metric too.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from wire.parameters import parameters_of
+from wire.plugin import Plugin, made
+from wire.printable import printable
+from wire.registry import Registry
+
+if TYPE_CHECKING:
+    from scenarios.results.own.window_data import WindowData
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
+
+ALWAYS = ("f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s", "p", "messages_saved")
+"""Metrics of gridpeers that every run has."""
+
+_OURS = (*ALWAYS, "t_f_s", "t_share_s", "f_swing_Hz", "V_swing_pu")
+
+
+def callable_with(it: Any, argument: str) -> str:
+    """Why something is no function, nor class of functions, of one argument; "" if it is."""
+    if isinstance(it, type):
+        call = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
+        if call is None:
+            return f"the class needs a method __call__(self, {argument})"
+        try:
+            inspect.signature(call).bind(None, None)
+            parameters_of(it)
+        except TypeError as error:
+            return f"write its method __call__(self, {argument}): {error}"
+        return ""
+    if not callable(it):
+        return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
+    try:
+        inspect.signature(it).bind(None)
+    except TypeError as error:
+        return f"it is called with one argument, the {argument}: {error}"
+    except ValueError:  # a function of C tells no signature
+        return ""
+    return ""
+
+
+METRICS: Registry[Any] = Registry(
+    "metric",
+    "metrics",
+    lambda it: callable_with(it, "window"),
+    own={name: f"scenarios.results.own.builtin:{name}" for name in _OURS},
+)
+"""Metrics by name; those of gridpeers come first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """What the metrics of a scenario came to in one window."""
+
+    values: Mapping[str, float | None] = field(default_factory=dict)
+    """By name; None where there is no value."""
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """Why a metric has no value, where it should have one."""
+
+
+def name_of(plugin: Plugin, label: str = "") -> str:
+    """Return the name of a metric in tables: its label, or the last part of its reference.
+
+    Examples
+    --------
+    >>> name_of(Plugin(use="mine:nadir_Hz")), name_of(Plugin(use="MPSI")), name_of(Plugin(use="mine:Within"), "near")
+    ('nadir_Hz', 'MPSI', 'near')
+    """
+    return label or plugin.use.rpartition(":")[2].rpartition(".")[2]
+
+
+def good_name(name: str) -> bool:
+    """Whether a metric can stand in tables under a name."""
+    return bool(_NAME.fullmatch(name))
+
+
+def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: WindowData) -> Measured:
+    """Return the values of some metrics, each of which may fail without harm to the others.
+
+    Parameters
+    ----------
+    metrics : Sequence[tuple[str, Callable]]
+        Name and function of each.
+    data : WindowData
+        The window.
+    """
+    values: dict[str, float | None] = {}
+    reasons: dict[str, str] = {}
+    for name, metric in metrics:
+        try:
+            found = metric(data)
+        except Exception as error:  # a metric is anybody's code
+            values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
+            continue
+        several = found if isinstance(found, Mapping) else {"": found}
+        for key, value in several.items():
+            full = f"{name}.{key}" if key != "" else name
+            values[full], reasons[full] = _number(value)
+    return Measured(values=values, reasons={name: text for name, text in reasons.items() if text})
+
+
+def make_metrics(plugins: Sequence[tuple[str, Plugin]]) -> list[tuple[str, Callable[[WindowData], Any]]]:
+    """Return the functions of some metrics; one that cannot be made fails in every window.
+
+    Parameters
+    ----------
+    plugins : Sequence[tuple[str, Plugin]]
+        Name in tables, and metric.
+    """
+    return [(name, _made(plugin)) for name, plugin in plugins]
+
+
+def _made(plugin: Plugin) -> Callable[[WindowData], Any]:
+    try:
+        return made(METRICS, plugin)  # type: ignore[no-any-return]
+    except ValueError as error:
+        kept = error
+
+        def fail(data: WindowData) -> Any:
+            raise kept
+
+        return fail
+
+
+def _number(value: Any) -> tuple[float | None, str]:
+    """Return a value as a number, or None and why; None itself is "there was none", as of a time that never came."""
+    if value is None:
+        return None, ""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return None, f"returned {printable(repr(value), 80)}; return a number, or numbers by name"
+    return (number, "") if math.isfinite(number) else (None, f"is no finite number: {number}")
+
+
+def _shown(error: Exception) -> str:
+    text = printable(str(error), 160)
+    return text if type(error).__name__ == "PluginError" else f"{type(error).__name__}: {text}"
+
+
+def _columns(error: Exception, data: WindowData) -> str:
+    """What a table has, for a metric that asked for something else."""
+    if not isinstance(error, (KeyError, AttributeError, IndexError)):
+        return ""
+    few = ", ".join(data.inverters[:12]) + (", ..." if len(data.inverters) > 12 else "")
+    return f"; the inverters are {few}, their quantities f, P, Q, V, P_set, V_set"
