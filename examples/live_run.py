@@ -41,4 +41,5 @@ with tempfile.TemporaryDirectory() as parent:
 
     result = gp.read(folder)
     print(result.events.to_string(index=False))
+    result.plot("plug-n-play").savefig("live_run.png")
     print(f"P of inv2 at the end: {result.history['inv2']['P'].iloc[-1]:.0f} W")

@@ -17,6 +17,8 @@ from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder, empty_folder
 from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
+from scenarios.live.numbers.departures import compare
+from scenarios.live.numbers.drawing import drawing_by_hand
 from scenarios.results.benchmarks import benchmark_of
 from scenarios.results.claims import Verdict, judge
 from scenarios.results.drawing import Drawing, drawing_of
@@ -173,10 +175,14 @@ class Results(Mapping[str, "Result"]):
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return what the figures of some cases share (`scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
+        *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
+        events = _plant_events(last)
+        if self.driver == "by hand":
+            compared = compare(spec, self._feeder, events, float(last.record.t[-1]))
+            return drawing_by_hand(compared, spec, self._feeder, case, last.record, events)
         plates = Plates.of(inverters_of(spec, self._feeder))
         histories = {case: result.record for case, result in cases.items()}
-        *_, last = cases.values()  # in wall-clock time each case has its own events
-        return drawing_of(spec, self._feeder, plates, histories, as_they_came(spec, _plant_events(last)))
+        return drawing_of(spec, self._feeder, plates, histories, as_they_came(spec, events))
 
     def __repr__(self) -> str:
         return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"

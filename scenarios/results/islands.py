@@ -69,6 +69,17 @@ def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[H
     return replace(history, inverters=names, **columns), replace(plates, names=names, **mine)
 
 
+def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[History, Plates]:
+    """Return a history without the spare inverters that nobody ever started, and nameplates in its order.
+
+    In a run by hand all spare inverters have columns; in others those have that the scenario lets join.
+    """
+    rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
+    own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
+    names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
+    return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
+
+
 def spells_of(scenario: Scenario, feeder: Feeder) -> tuple[Spell, ...]:
     """When there are several islands, and which."""
     starts = [event.t_s for event in scenario.events]

@@ -6,25 +6,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import msgspec
-
 from scenarios.live.book import Book
 from scenarios.live.numbers.departures import Compared, compare
+from scenarios.live.numbers.drawing import drawing_by_hand
 from scenarios.results.benchmarks import NO_BENCHMARK, benchmark_of
-from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find_in
 from scenarios.results.folder import shown, write_whole
-from scenarios.results.history import History, Plates
-from scenarios.results.islands import part_of
+from scenarios.results.history import History
+from scenarios.results.islands import taken_part
 from scenarios.results.messages import messages_saved
 from scenarios.results.metrics import Window
-from scenarios.results.moves import as_they_came, late_moves
+from scenarios.results.moves import late_moves
 from scenarios.results.numbers import Ran, metrics_json
 from scenarios.results.own.measuring import own_measures
 from scenarios.results.record import Recorded
 from scenarios.results.report import Report, plain
 from scenarios.spec.agentless import with_agent
-from scenarios.spec.moves import inverters_of
 from wire.messages import Pacing
 
 _SHOWN = 3
@@ -65,7 +62,7 @@ class Account:
         assert self._recorded is not None
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
-        history, plates = self._columns(recorded)
+        history, plates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
         found = find_in({case: compared.opened.measured}, compared.happened, ran.feeder, plates, {case: history})
         saved = messages_saved(
             recorded.quiet,
@@ -107,29 +104,10 @@ class Account:
 
         from scenarios.results.plots import draw_all  # matplotlib takes longer to import than all else
 
-        draw_all(self._drawing(compared, history, plates), ran.folder / "plots")
+        draw_all(
+            drawing_by_hand(compared, ran.scenario, ran.feeder, case, history, recorded.events), ran.folder / "plots"
+        )
         return report
-
-    def _columns(self, recorded: Recorded) -> tuple[History, Plates]:
-        """The history without the spare inverters that nobody ever started, and nameplates in its order."""
-        feeder, history = self._ran.feeder, History.of(recorded.inverters, recorded.rows)
-        rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
-        own, present = {row.name for row in inverters_of(self._ran.scenario, feeder)}, history.present
-        names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
-        return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
-
-    def _drawing(self, compared: Compared, history: History, plates: Plates) -> Drawing:
-        """What to draw: the whole run, with all events by name, and a line where people departed otherwise from it."""
-        assert self._recorded is not None
-        scenario, events = self._ran.scenario, self._recorded.events
-        reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
-        marks = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-        marks += [
-            ("by hand" if event.kind == "switch" else "", event.t) for event in compared.departures if event.t > 0.0
-        ]
-        marks = list(dict.fromkeys(marks))
-        drawing = drawing_of(compared.happened, self._ran.feeder, plates, {self._case: history}, marks)
-        return replace(drawing, moves=any(event.kind == "inverter" for event in events))
 
     def _notes(self, compared: Compared) -> Iterable[str]:
         """What a reader must know of these numbers."""
