@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.results.published import Published
 from wire.plugin import plugin_of
+from wire.printable import printable
 from wire.registry import Registry
 
 if TYPE_CHECKING:
@@ -33,6 +34,13 @@ class Benchmark:
     """What it says in words."""
     summary: Callable[[Findings], Sequence[str]] = _nothing
     """How near we come, in a few lines below the claims."""
+
+    def lines(self, found: Findings) -> list[str]:
+        """Return the summary of a run; one that raises an exception is a line that says why."""
+        try:
+            return [printable(str(line), 1000) for line in self.summary(found)]
+        except Exception as error:  # a benchmark is anybody's code
+            return [printable(f"The benchmark's summary failed: {type(error).__name__}: {error}", 300)]
 
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
         """Return the published number at a place of our results, or None where there is none."""

@@ -241,7 +241,7 @@ def _plain_grid(grid: Grid) -> str:
 
 def _summary(report: Report) -> list[str]:
     """How many claims hold, and how near the paper's tables are."""
-    return [_count(report.verdicts), *report.benchmark.summary(report.found)]
+    return [_count(report.verdicts), *report.benchmark.lines(report.found)]
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:

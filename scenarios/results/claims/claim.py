@@ -12,6 +12,7 @@ from typing import Literal
 
 from scenarios.results.findings import Findings
 from scenarios.results.quantities import Quantity
+from wire.printable import printable
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
@@ -59,8 +60,15 @@ class Verdict:
 
 
 def judge(found: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
-    """Judge claims by what was found."""
-    return tuple(_verdict(claim, found) for claim in claims)
+    """Judge claims by what was found; one that raises an exception fails, and its verdict says why."""
+    verdicts = []
+    for claim in claims:
+        try:
+            verdicts.append(_verdict(claim, found))
+        except Exception as error:  # a claim is anybody's code
+            text = printable(f"{type(error).__name__}: {error}", 200)
+            verdicts.append(Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {text}"))
+    return tuple(verdicts)
 
 
 def _verdict(claim: Claim, found: Findings) -> Verdict:

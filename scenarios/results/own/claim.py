@@ -57,9 +57,5 @@ def judged(found: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
             claim = Claim(name=plugin.use, text=plugin.use, source="", judge=lambda _: (False, ""), measures=())
             verdicts.append(Verdict(claim=claim, status="FAIL", found=str(error)))
             continue
-        try:
-            verdicts += judge(found, (claim,))
-        except Exception as error:  # a claim is anybody's code
-            text = printable(f"{type(error).__name__}: {error}", 200)
-            verdicts.append(Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {text}"))
+        verdicts += judge(found, (claim,))
     return tuple(verdicts)

@@ -1,12 +1,13 @@
 """Benchmarks: what is published of an experiment, added from outside."""
 
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from scenarios.results.benchmarks import BENCHMARKS, NO_BENCHMARK, benchmark_of
-from scenarios.results.claims import judge
+from scenarios.results.benchmarks import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
+from scenarios.results.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import Report, plain
@@ -79,6 +80,19 @@ def test_a_benchmark_that_is_none_is_told_before_anything_runs(tmp_path: Path, p
 
     assert len(error.value.mistakes) == 1
     assert said in error.value.mistakes[0]
+
+
+def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:
+    """A claim and a summary are anybody's code: the report says what went wrong in them."""
+    odd = partial(Claim, name="odd", text="it is odd", source="", measures=())
+    claim = odd(judge=lambda found: (found.results["V"] is None, ""))
+    broken = Benchmark(claims=(claim,), summary=lambda found: [found.no_such_thing])  # type: ignore[attr-defined]
+    found = Findings(results={"IV": {}})
+    verdicts = judge(found, broken.claims)
+    report = Report(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/")
+
+    assert [(verdict.status, verdict.found) for verdict in verdicts] == [("FAIL", "cannot be judged: KeyError: 'V'")]
+    assert "The benchmark's summary failed: AttributeError" in plain(report)
 
 
 def test_every_benchmark_of_the_catalogue_is_there() -> None:
