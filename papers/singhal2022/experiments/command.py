@@ -11,8 +11,8 @@ import gridpeers as gp
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
 
 if TYPE_CHECKING:
+    from papers.singhal2022.experiments.output.result import Result
     from papers.singhal2022.experiments.registry import FromScenario, FromSweep
-    from papers.singhal2022.experiments.result import Result
 
 
 def experiment(
@@ -67,7 +67,7 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     import pyarrow.parquet as pq
 
     from gridpeers.sweep_files import read_sweep
-    from papers.singhal2022.experiments.swept import Swept
+    from papers.singhal2022.experiments.data.swept import Swept
 
     try:
         plan = read_sweep(source.sweep)
@@ -87,7 +87,7 @@ def _told(source: FromScenario, folder: Path) -> Result:
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import progress
     from gridpeers.folders import shown
-    from papers.singhal2022.experiments.told import Told
+    from papers.singhal2022.experiments.data.told import Told
 
     scenario = gp.load(source.scenario)
     try:

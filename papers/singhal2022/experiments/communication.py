@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gridpeers.theory import predicted_times, var_growth
+from papers.singhal2022.experiments.data.swept import Swept
 from papers.singhal2022.experiments.delay import DELAY, INDEXES, of_times
-from papers.singhal2022.experiments.page import Curve, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.table import Cell, Table
+from papers.singhal2022.experiments.output.page import Curve, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Cell, Table
 
 X = "delay of every agent-agent link (s)"
 

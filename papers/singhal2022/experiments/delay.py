@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from gridpeers.theory import Times, predicted_times
-from papers.singhal2022.experiments.page import Curve, Look, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.table import Table
+from papers.singhal2022.experiments.data.swept import Swept
+from papers.singhal2022.experiments.output.page import Curve, Look, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Table
 
 DELAY, K_Q = "link[0].delay", "gains.k_q"
 WHOLE, ALONE = 0.25, 1e5

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gridpeers.theory import Case, Times, predicted_times
+from papers.singhal2022.experiments.data.told import Told, without
 from papers.singhal2022.experiments.delay import of_times
-from papers.singhal2022.experiments.page import Curve, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.table import Cell, Table
-from papers.singhal2022.experiments.told import Told, without
+from papers.singhal2022.experiments.output.page import Curve, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Cell, Table
 
 
 def flapping(told: Told) -> Result:

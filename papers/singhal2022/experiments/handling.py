@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from gridpeers.theory import predicted_times
+from papers.singhal2022.experiments.data.swept import Row, Swept
 from papers.singhal2022.experiments.delay import INDEXES, of_times
-from papers.singhal2022.experiments.page import Curve, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Row, Swept
-from papers.singhal2022.experiments.table import Cell, Table
+from papers.singhal2022.experiments.output.page import Curve, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Cell, Table
 
 CASES = ("full", "reduced", "path")
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from gridpeers.theory import predicted_times
+from papers.singhal2022.experiments.data.swept import Swept
 from papers.singhal2022.experiments.delay import INDEXES, of_times
-from papers.singhal2022.experiments.page import Curve, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.table import Table
+from papers.singhal2022.experiments.output.page import Curve, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Table
 
 DELAY, LOSS = "link[0].delay", "link[0].loss"
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from gridpeers.measures import Floats, Settling
 from gridpeers.theory import Loop, Ticks, sharing_index
-from papers.singhal2022.experiments.page import Curve, Look, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.table import Cell, Table
-from papers.singhal2022.experiments.told import Told, cut_between, without
+from papers.singhal2022.experiments.data.told import Told, cut_between, without
+from papers.singhal2022.experiments.output.page import Curve, Look, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Cell, Table
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),

@@ -10,11 +10,11 @@ import numpy as np
 
 from gridpeers.measures import Flags, Floats
 from gridpeers.theory import delay_limit, var_delay_limit, var_growth
+from papers.singhal2022.experiments.data.swept import Swept
 from papers.singhal2022.experiments.delay import ALONE, DELAY, K_Q, WHOLE
-from papers.singhal2022.experiments.page import Curve, Line, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.table import Table
+from papers.singhal2022.experiments.output.page import Curve, Line, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Table
 
 ON = "link[0].on"
 

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from papers.singhal2022.experiments.communication import communication
+from papers.singhal2022.experiments.data.swept import Swept
+from papers.singhal2022.experiments.data.told import Told
 from papers.singhal2022.experiments.delay import delay
 from papers.singhal2022.experiments.flapping import flapping
 from papers.singhal2022.experiments.handling import handling
 from papers.singhal2022.experiments.loss import loss
+from papers.singhal2022.experiments.output.result import Result
 from papers.singhal2022.experiments.partition import partition
 from papers.singhal2022.experiments.places import places
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.told import Told
 from papers.singhal2022.experiments.topology import topology
 
 

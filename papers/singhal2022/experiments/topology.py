@@ -10,11 +10,11 @@ import numpy as np
 from gridpeers.graphs import Control, adjacency
 from gridpeers.measures import Floats
 from gridpeers.theory import Fleet, predicted_times
+from papers.singhal2022.experiments.data.swept import Row, Swept
 from papers.singhal2022.experiments.delay import INDEXES, of_times
-from papers.singhal2022.experiments.page import Curve, Look, Page, Panel
-from papers.singhal2022.experiments.result import Result
-from papers.singhal2022.experiments.swept import Row, Swept
-from papers.singhal2022.experiments.table import Table
+from papers.singhal2022.experiments.output.page import Curve, Look, Page, Panel
+from papers.singhal2022.experiments.output.result import Result
+from papers.singhal2022.experiments.output.table import Table
 
 DELAY, LINKS = "link[0].delay", "graph.links"
 

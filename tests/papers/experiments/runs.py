@@ -9,8 +9,8 @@ import msgspec
 
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from papers.singhal2022.experiments.swept import Swept
-from papers.singhal2022.experiments.told import Told
+from papers.singhal2022.experiments.data.swept import Swept
+from papers.singhal2022.experiments.data.told import Told
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History

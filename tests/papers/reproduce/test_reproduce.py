@@ -15,7 +15,7 @@ from papers.singhal2022.reproduce.markdown import markdown
 from papers.singhal2022.reproduce.page import html
 from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
 from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.topology import graphs
+from papers.singhal2022.reproduce.studies.topology import graphs
 from papers.singhal2022.tables import TABLES, Cell, tables_of
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings

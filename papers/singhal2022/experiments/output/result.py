@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from papers.singhal2022.experiments.page import Page
-from papers.singhal2022.experiments.table import Table
+from papers.singhal2022.experiments.output.page import Page
+from papers.singhal2022.experiments.output.table import Table
 
 FIGURE = "figure.png"
 
@@ -20,7 +20,9 @@ class Result:
 
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write figure.png, table.csv and table.md into a folder; the files."""
-        from papers.singhal2022.experiments import plots  # matplotlib takes long to import; nothing else waits for it
+        from papers.singhal2022.experiments.output import (
+            plots,  # matplotlib takes long to import; nothing else waits for it
+        )
 
         self.table.write(folder)
         return plots.draw(self.page, folder / FIGURE), folder / "table.csv", folder / "table.md"

@@ -1,0 +1,1 @@
+"""What an experiment comes to: a page of curves and a table, as files."""

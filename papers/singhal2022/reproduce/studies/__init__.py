@@ -1,0 +1,1 @@
+"""Parts of the paper that are many short runs of the islanding."""
