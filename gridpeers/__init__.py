@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from scenarios.results.folder import FolderError
     from scenarios.results.own.claim_registry import CLAIMS
     from scenarios.results.own.metric import METRICS
+    from scenarios.results.own.window_data import WindowData
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
     from scenarios.spec.mistakes import ScenarioError
@@ -60,6 +61,7 @@ _HOME = {
     "ScenarioError": "scenarios.spec.mistakes",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
+    "WindowData": "scenarios.results.own.window_data",
     "catalogue": "scenarios.spec.loading",
     "claim": "scenarios.results.own.claim_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
@@ -91,6 +93,7 @@ __all__ = [
     "ScenarioError",
     "SetPoints",
     "Unit",
+    "WindowData",
     "catalogue",
     "claim",
     "compare",

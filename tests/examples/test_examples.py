@@ -32,7 +32,7 @@ def outputs(folder: Path, *words: str) -> str:
     [
         ("first_figure.py", "inv1 falls to 59.7", "first_figure.png"),
         ("own_feeder.py", "consensus islanding", "own_feeder.png"),
-        ("latency_study.py", "overshoot", ""),
+        ("latency_study.py", "event2.swing_pu", ""),
     ],
 )
 def test_an_example_runs_to_its_end(tmp_path: Path, script: str, says: str, figure: str) -> None:
