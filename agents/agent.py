@@ -95,10 +95,10 @@ class Agent:
     def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
         self.config = config
         self.fault = ""
-        """What law or graph did that they must not; then the agent stands still, and the inverter is on primary
-        droop."""
-        self._failing = ""
-        """The same, as long as it was not told."""
+        """What the law did that it must not; then the agent stands still, and the inverter is on primary droop."""
+        self._no_graph = self._no_graph_told = ""
+        """What the rule of the graph did with the present roster that it must not, and what of it was told last; the
+        agent stands still as long as it does."""
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
@@ -169,13 +169,15 @@ class Agent:
         """Whom this agent listens to among the known agents of a roster, by the run's rule; nobody if that fails."""
         members = {name: self._known[name] for name in roster if name in self._known}
         name = self.config.name
-        if name not in members or self.fault or self._failing:
+        if name not in members:
             return ()
         try:
-            return in_neighbours(self.config.control, name, members, self._rule)
+            found = in_neighbours(self.config.control, name, members, self._rule)
         except GraphError as error:
-            self._failing = str(error)
+            self._no_graph = str(error)
             return ()
+        self._no_graph = ""
+        return found
 
     def hear(self, state: State) -> None:
         """Note the latest state of somebody whose nameplate is known. Who may speak, `wire.admission` has checked."""
@@ -205,9 +207,10 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
-        if self._failing:
-            self.fault, self._failing = self._failing, ""
-            return replace(self.stand_still(measurement), fault=self.fault)
+        if self._no_graph:
+            news = self._no_graph if self._no_graph != self._no_graph_told else ""
+            self._no_graph_told = self._no_graph
+            return replace(self.stand_still(measurement), fault=news)
         if self.fault:
             return self.stand_still(measurement)
         if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds

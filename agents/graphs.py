@@ -156,8 +156,8 @@ GRAPHS: Registry[Any] = Registry(
 """Rules by name; those of gridpeers come first."""
 
 
-def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[str, ...]]:
-    """Return whom each agent listens to by a rule, checked; neighbours in the order of `members`.
+def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = False) -> dict[str, tuple[str, ...]]:
+    """Return whom each agent listens to by a rule; neighbours in the order of `members`.
 
     Parameters
     ----------
@@ -167,6 +167,9 @@ def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[s
         Nameplates in any order; the rule gets them in natural order of the names.
     name : str
         What the scenario calls the rule, for messages.
+    strict : bool, optional
+        Whether who is no member is a mistake, as when a scenario is checked; else it is left out: in wall-clock time
+        agents meet one after the other, and may have died.
 
     Raises
     ------
@@ -179,7 +182,7 @@ def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[s
     >>> members = {f"inv{i}": Plate(kind="GFL") for i in (1, 2, 3)}
     >>> neighbours_by(lambda members: {name: {"inv1"} - {name} for name in members}, members, "star")["inv3"]
     ('inv1',)
-    >>> neighbours_by(lambda members: {"inv3": ["inv33"]}, members, "star")
+    >>> neighbours_by(lambda members: {"inv3": ["inv33"]}, members, "star", strict=True)
     Traceback (most recent call last):
         ...
     agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents are inv1, ...
@@ -191,7 +194,7 @@ def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[s
     except Exception as error:  # a rule is anybody's code
         text = printable(f"{type(error).__name__}: {error}", 200)
         raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {text}") from error
-    for one, heard in told.items():
+    for one, heard in told.items() if strict else ():
         if one not in members:
             raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")
         for other in sorted(heard, key=str):
@@ -199,7 +202,7 @@ def neighbours_by(rule: Graph, members: Members, name: str) -> dict[str, tuple[s
                 raise GraphError(f"graph {name} lets {one} listen to {_shown(other)}, {_unknown(other, members)}")
             if other == one:
                 raise GraphError(f"graph {name} lets {one} listen to itself; leave it out of its own neighbours")
-    return {one: tuple(other for other in members if other in told.get(one, ())) for one in members}
+    return {one: tuple(other for other in members if other != one and other in told.get(one, ())) for one in members}
 
 
 def make_graph(plugin: Plugin) -> Graph:

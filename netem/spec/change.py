@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import msgspec
 
@@ -12,6 +13,7 @@ from netem.schedule import Schedule
 from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link, links_among, parse
+from wire.plugin import Plugin
 
 
 class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -66,12 +68,19 @@ def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, s
                 on=on,
                 from_s=span.from_s,
                 to_s=None if math.isinf(span.to_s) else span.to_s,
-                **{"cut" if span.kind == "partition" else span.kind: span.model},
+                **_entry(span),
             )
             for span in _cuts_joined(spans)
         ]
     islands = tuple(part for part in netem.partitions if part.by == "island")
     return msgspec.structs.replace(netem, links=tuple(faults), partitions=islands)
+
+
+def _entry(span: Span) -> dict[str, Any]:
+    """What an entry says of one fault."""
+    if isinstance(span.model, Plugin):
+        return {"own": (span.model,)}
+    return {"cut" if span.kind == "partition" else span.kind: span.model}
 
 
 def _cuts_joined(spans: Iterable[Span]) -> list[Span]:

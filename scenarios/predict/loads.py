@@ -65,7 +65,7 @@ def load_steps(scenario: Scenario, feeder: Feeder) -> tuple[IslandStep, ...]:
 
 def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) -> tuple[IslandStep, ...]:
     plant, T = build_plant(config), scenario.time.T_c_s
-    on = set(config.agents)
+    on = set(plant.inverters) - set(config.settings.spares)
     ends = [event.t_s for event in scenario.events[1:]] + [scenario.time.end_s]
     before, found = _carried(plant, rating, on), []
     for event, end in zip(scenario.events, ends, strict=True):

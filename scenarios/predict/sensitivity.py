@@ -44,10 +44,10 @@ def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
     LoadError
         If the plant has no solution there.
     """
-    config, agents = configs(scenario, feeder, next(iter(scenario.cases)))
-    rated = {agent.name: agent.P_rated for agent in agents}
-    nominal = {agent.name: agent.V_nom for agent in agents}
-    names = config.agents
+    config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    rated = {row.name: row.P_rated for row in feeder.inverters}
+    nominal = {row.name: row.V_nom for row in feeder.inverters}
+    names = tuple(row.name for row in feeder.inverters)
     try:
         plant = plant_in_first_window(scenario, config)
         columns = []

@@ -55,9 +55,9 @@ def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
     LoadError
         If the plant has no solution there.
     """
-    config, agents = configs(scenario, feeder, next(iter(scenario.cases)))
-    names, count = config.agents, round(LENGTH / config.T_c)
-    scale = {agent.name: (agent.P_rated, agent.V_nom) for agent in agents}
+    config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    names, count = tuple(row.name for row in feeder.inverters), round(LENGTH / config.T_c)
+    scale = {row.name: (row.P_rated, row.V_nom) for row in feeder.inverters}
     steps = np.zeros((count + 1, 2, len(names), len(names)))
     try:
         plant = plant_in_first_window(scenario, config)

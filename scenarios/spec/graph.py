@@ -51,7 +51,7 @@ def check_graphs(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) 
         try:
             rule = make_graph(plugin)
             for roster in _rosters(scenario, feeder, name):
-                neighbours_by(rule, roster, plugin.name)
+                neighbours_by(rule, roster, plugin.name, strict=True)
         except ValueError as error:  # a `GraphError`, or a `PluginError` of one that cannot be called
             mistakes.add(path, str(error))
 

@@ -14,6 +14,7 @@ from netem.check.verify import verify
 from netem.ledger import LinkTrace
 from netem.models.own import FAULTS, LinkFault
 from netem.receiver import Receiver
+from netem.spec.change import replayed
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
@@ -150,6 +151,14 @@ def test_every_mistake_of_an_entry_is_told_at_its_key(folder: str) -> None:
     assert read_netem({"link": [{"on": "* <-> *", "my_faults:Jam": 3}]}, seed=1)[1][0].text.startswith(
         "must be true or"
     )
+
+
+def test_a_run_with_one_can_be_replayed(folder: str) -> None:
+    """The file of a run by hand names it again, with its parameters and its folder."""
+    entry = fault(folder, "Jam", parameters=(("share", 0.5),), from_s=1.0)
+    (again,) = replayed(Netem(links=(entry,)), (), {"inv1": "MG1", "inv2": "MG1"}).links
+
+    assert (again.on, again.own, again.from_s) == (entry.on, entry.own, 1.0)
 
 
 def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:

@@ -114,14 +114,24 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
 def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
     """Whom it concerns, and what was returned or raised."""
     with pytest.raises(GraphError) as caught:
-        neighbours_by(rule, plates(2), "mine")  # type: ignore[arg-type]
+        neighbours_by(rule, plates(2), "mine", strict=True)  # type: ignore[arg-type]
 
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
+def test_who_has_not_been_met_yet_is_left_out(folder: str) -> None:
+    """In wall-clock time agents meet one after the other: a rule that names inv1 works before inv1 is there."""
+    agent = Agent(agent_config("inv3", control("my_graphs:star", folder)))
+    agent.meet(Agent(agent_config("inv2")).nameplate)
+
+    assert agent.in_neighbours(("inv3", "inv2")) == ()
+    agent.meet(Agent(agent_config("inv1")).nameplate)
+    assert agent.in_neighbours(("inv3", "inv1", "inv2")) == ("inv1",)
+
+
 def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str) -> None:
-    """The run goes on: its state tells the fault once, and that it is idle from then on."""
+    """The run goes on: its state tells the fault once, and is idle until the rule works with the roster again."""
     agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
     for name in ("inv2", "inv3"):
         agent.meet(Agent(agent_config(name)).nameplate)
@@ -132,10 +142,13 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
     assert agent.tick(now).fault == ""
     assert agent.in_neighbours(("inv1", "inv3")) == ()
     first, second = agent.tick(now), agent.tick(now)
+    agent.in_neighbours(("inv1", "inv2", "inv3"))
+    third = agent.tick(now)
 
     assert first.fault == "graph my_graphs:of_three of inv1, inv3 failed: KeyError: 'nobody'"
     assert (first.idle, first.P_set) == (True, 3e4)
     assert (second.idle, second.fault) == (True, "")
+    assert (third.idle, third.fault) == (False, "")
 
 
 def test_a_decorators_name_is_a_rule_and_never_taken_over() -> None:
