@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("wire", "agents", "plant", "netem", "scenarios")
+PACKAGES = ("wire", "agents", "plant", "netem", "scenarios", "papers")
 """Top-level packages of gridpeers beside this one."""
 
 HOME = Path(__file__).resolve().parents[1]
