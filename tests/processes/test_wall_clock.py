@@ -263,6 +263,19 @@ def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: 
     assert [note.split(" after")[0] for note in outcome.notes] == ["inv3 was killed by SIGKILL"]
 
 
+def test_an_inverter_without_agent_stays_on_droop_while_the_others_share(tmp_path: Path) -> None:
+    """Nobody waits for its agent or misses it; its set-point never moves, and the frequency comes back without it."""
+    plant, agents = toy_configs(4, end=3.0)
+    present = [replace(agent, clock="wall", speed=4.0) for agent in agents if agent.name != "inv2"]
+    run = FleetRun(replace(plant, clock="wall", speed=4.0, agents=OTHERS), present, tmp_path)
+    outcome = run()
+
+    assert outcome.broke == ""
+    assert {event.subject for event in outcome.events if event.kind == "roster"} == set(OTHERS)
+    assert {P_sets(row)[1] for row in run.rows} == {P_sets(run.rows[0])[1]}
+    assert P_sets(run.rows[-1])[0] > P_sets(run.rows[0])[0]
+
+
 def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
     """At a speed that nothing can keep the plant ends with status 3, says how late it was and what to do."""
     plant, agents = toy_configs(2, end=400.0)

@@ -1,0 +1,40 @@
+"""What is plugged in by an installed distribution: found by its entry point, like anybody's own."""
+
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from agents.graphs import GRAPHS, ring
+from wire import registry
+from wire.plugin import Plugin, made, problems
+
+
+@pytest.fixture
+def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Two entry points in the group of graphs, one of which leads nowhere."""
+    points = (
+        EntryPoint("round", "agents.graphs:ring", "gridpeers.graphs"),
+        EntryPoint("broken", "agents.graphs:nowhere", "gridpeers.graphs"),
+    )
+    monkeypatch.setattr(registry.metadata, "entry_points", lambda group: points if group == GRAPHS.group else ())
+    registry._entry_points.cache_clear()
+    yield
+    registry._entry_points.cache_clear()
+
+
+def test_an_entry_point_adds_to_a_registry(entry_points: None) -> None:
+    """Its name stands behind ours, and leads to the object."""
+    assert GRAPHS.names[:6] == ("full", "none", "GFM-only", "clustered", "ring", "links")
+    assert GRAPHS.names[-2:] == ("round", "broken")
+    assert made(GRAPHS, Plugin(use="round")) is ring
+
+
+def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(entry_points: None) -> None:
+    """One line; the page of what there is still prints."""
+    from scenarios.results.reference import page
+
+    ((_, said),) = problems(GRAPHS, Plugin(use="broken"))
+
+    assert said.startswith('agents.graphs:nowhere: module agents.graphs has no "nowhere"')
+    assert "Cannot be used: agents.graphs:nowhere" in page("graphs")
