@@ -22,6 +22,9 @@ from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
 
+MOST_FAILURES = 8
+"""Faults of somebody's own that failed and are told of in one report, which must not become too long."""
+
 NANO = 1e9
 """Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
 
@@ -239,7 +242,8 @@ class Receiver:
         found = [text for _, inbound in sorted(self._links.items()) for text in inbound.channel.failures]
         for inbound in self._links.values():
             inbound.channel.failures.clear()
-        return tuple(found)
+        more = len(found) - MOST_FAILURES
+        return (*found[:MOST_FAILURES], *([f"{more} more faults of links into {self.name} failed"] if more > 0 else []))
 
     @property
     def trace_sha256(self) -> str:

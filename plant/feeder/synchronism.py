@@ -96,6 +96,8 @@ def window_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Window
     Window(angle=15.0, f=0.2, V=0.05)
     >>> str(window_for(3.9e6, SyncCheck(angle=5.0)))
     'at most 5 deg, 0.1 Hz and 3 %'
+    >>> round(window_for(3.9e6, SyncCheck(), 50.0).f, 4), window_for(3.9e6, SyncCheck(f=0.2), 50.0).f
+    (0.0833, 0.2)
     """
     f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
     return Window(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)

@@ -10,6 +10,7 @@ from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from scenarios.spec.multiples import divides, multiple
 from wire.nearest import suggestion
+from wire.plugin import plugin_of
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
@@ -164,10 +165,11 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistak
         path = f"case.{name}.links"
         if mistakes.touch(path, f"case.{name}.graph"):
             continue
-        if case.graph == "links" and not case.links:
+        graph = plugin_of(case.graph).use
+        if graph == "links" and not case.links:
             mistakes.add(f"case.{name}.graph", 'graph "links" needs the key links, e.g. links = [["inv1", "inv4"]]')
-        if case.graph != "links" and case.links:
-            mistakes.add(path, f'links are listed, but the graph is "{case.graph}"; write graph = "links"')
+        if graph != "links" and case.links:
+            mistakes.add(path, f'links are listed, but the graph is "{graph}"; write graph = "links"')
         if inverters:
             _check_links(path, case.links, inverters, mistakes)
 

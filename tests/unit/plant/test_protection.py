@@ -51,6 +51,16 @@ def test_each_function_trips_after_its_clearing_time_and_not_a_step_before(categ
     assert steps_until_trip(relays, **beyond(name, threshold), most=round(400.0 / h)) == round(time / h)
 
 
+def test_a_setting_of_a_scenario_in_hertz_is_taken_as_it_stands() -> None:
+    """At 50 Hz the standard's defaults are in proportion; what somebody writes is meant in Hz."""
+    relays = Relays(Protection(trips={"OF2": (51.5, 0.1)}), 1, H, 50.0)
+    at = dict(zip(relays.names, relays.thresholds.tolist(), strict=True))
+
+    assert at["OF2"] == 51.5
+    assert at["OF1"] == pytest.approx(51.0)
+    assert at["UV1"] == 0.88
+
+
 @pytest.mark.parametrize(("category", "name"), SETTINGS)
 def test_at_its_threshold_no_function_trips(category: str, name: str) -> None:
     """The threshold itself is not beyond it, however long it lasts; the other functions are out of the way."""
