@@ -10,7 +10,8 @@ import gridpeers as gp
 DELAYS = [0.0, 0.02, 0.05, 0.1, 0.2]  # s
 
 
-def swing_pu(window: gp.WindowData) -> float:
+@gp.metric("swing_pu")
+def swing(window: gp.WindowData) -> float:
     """Return by how much a set-point of P still moves in the last second of a window, at worst (pu of its rating)."""
     late = window.t > window.end - 1.0
     return float((np.ptp(window.P_set[late], axis=0) / window.plates.s).max())
@@ -21,7 +22,7 @@ table = gp.sweep(
     gp.load("islanding").replace(every_link),
     {"case.IV.link[0].delay": DELAYS},
     cases="IV",
-    metrics=["t_restore_s", swing_pu],
+    metrics=["t_restore_s", swing],
 )
 print(table.drop(columns=["case", "seed", "status", "why", "metric_warnings"]).round(4).to_string(index=False))
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.sweeping import sweep
     from netem.models.own import FAULTS, LinkFault
+    from plant.equipment import Feeder
     from scenarios.results.claims.claim import Claim
     from scenarios.results.folder import FolderError
     from scenarios.results.own.claim_registry import CLAIMS
@@ -48,6 +49,7 @@ _HOME = {
     "BrokenRunError": "scenarios.run",
     "Claim": "scenarios.results.claims.claim",
     "Comparison": "gridpeers.studies.comparison",
+    "Feeder": "plant.equipment",
     "FolderError": "scenarios.results.folder",
     "Law": "agents.laws.law",
     "LinkFault": "netem.models.own",
@@ -80,6 +82,7 @@ __all__ = [
     "BrokenRunError",
     "Claim",
     "Comparison",
+    "Feeder",
     "FolderError",
     "Law",
     "LinkFault",

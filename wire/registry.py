@@ -129,6 +129,10 @@ class Registry(Generic[T]):
         """Return `module:Name` of what a decorator has added in this process; every other text as it is."""
         return ":".join(_home(self._added[name])) if name in self._added else name
 
+    def name_of(self, it: object) -> str:
+        """Return the name under which a decorator has added an object in this process; "" if none has."""
+        return next((name for name, known in self._added.items() if known is it), "")
+
     def portable(self, reference: str) -> str:
         """Return the text by which another process finds the same object: `module:Name` for what a decorator added.
 

@@ -118,7 +118,8 @@ def check_how(driver: str, clock: str, speed: float, *, strict: bool, dash: str 
     elif driver == "inprocess":
         wrong = f"{dash}clock wall: needs a process per agent; use {dash}driver processes"
     elif not (isinstance(speed, int | float) and low <= speed <= high):
-        wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {speed}"
+        got = f"{speed:g}" if isinstance(speed, int | float) else repr(speed)
+        wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {got}"
     if wrong:
         raise ScenarioError([wrong])
 

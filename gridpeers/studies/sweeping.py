@@ -109,7 +109,8 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
     """Return the scenario with metrics of one's own beside its own, and the names of all that were asked for."""
     if metrics is None:
         return scenario, None
-    asked: list[Any] = [metrics] if isinstance(metrics, str) or callable(metrics) else list(metrics)
+    given: list[Any] = [metrics] if isinstance(metrics, str) or callable(metrics) else list(metrics)
+    asked = [METRICS.name_of(it) or it for it in given]
     own = [it for it in asked if not isinstance(it, str) or ":" in METRICS.reference(it)]
     if own:
         before = len(scenario.spec.metrics)
