@@ -47,7 +47,7 @@ def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     """The scenario with the cases and the seed of the command line."""
     import msgspec
 
-    from gridpeers.runs.running import with_cases
+    from gridpeers.runs.choices import with_cases
     from scenarios.spec import ScenarioError
 
     if case is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from gridpeers.runs.running import with_cases
+from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
 from scenarios.predict.closed_form import Kind, delay_limit_closed, modes

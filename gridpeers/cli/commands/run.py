@@ -63,7 +63,7 @@ def run(
     """
     from datetime import datetime
 
-    from gridpeers.runs.running import check_how
+    from gridpeers.runs.choices import check_how
     from scenarios.spec import ScenarioError
 
     spec, feeder = load(scenario)
