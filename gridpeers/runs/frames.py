@@ -63,6 +63,23 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     return frame
 
 
+def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Return the metrics of each island, a row per (window, island), of the windows in which there are several.
+
+    Examples
+    --------
+    >>> islands = {"inv1": {"MPSI": 0.1, "reasons": {}}, "inv4": {"MPSI": 0.2}}
+    >>> islands_frame({"event1": {"MPSI": None, "islands": islands}, "event2": {"MPSI": 0.3}})["MPSI"].to_dict()
+    {('event1', 'inv1'): 0.1, ('event1', 'inv4'): 0.2}
+    """
+    frames = {label: metrics_frame(window["islands"]) for label, window in windows.items() if "islands" in window}
+    if not frames:
+        return pd.DataFrame(index=pd.MultiIndex.from_arrays([[], []], names=["window", "island"]))
+    frame = pd.concat(frames, names=["window", "island"])
+    frame.attrs["units"] = next(iter(frames.values())).attrs["units"]
+    return frame
+
+
 def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the windows among what metrics.json holds of a case."""
     return {label: value for label, value in case.items() if isinstance(value, dict) and "f_error_Hz" in value}

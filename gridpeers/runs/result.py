@@ -231,6 +231,14 @@ class Result:
         return frames.metrics_frame(frames.windows_of(self._whole))
 
     @cached_property
+    def islands(self) -> pd.DataFrame:
+        """Metrics of each island, a row per (window, island); empty where there never are several.
+
+        An island is known by its first inverter. What is shared has no value over several islands together.
+        """
+        return frames.islands_frame(frames.windows_of(self._whole))
+
+    @cached_property
     def events(self) -> pd.DataFrame:
         """What happened in the plant and to the agents: time t (s), kind, subject, text."""
         return frames.events_frame(self.folder / self.case / "events.csv")
