@@ -183,7 +183,7 @@ class Registry(Generic[T]):
             return _as_it_is_now(found)
         except PluginError:
             raise
-        except Exception as error:  # whatever a user's module does while it is imported
+        except (Exception, SystemExit) as error:  # whatever a user's module does while it is imported
             from wire.printable import printable  # it brings msgspec, and the command line's help waits for this module
 
             text = printable(f"{type(error).__name__}: {error}", 300)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from agents.carriers.registry import LAWS
 from agents.carriers.time_limit import TimeLimited
 from agents.config import Control, LawChoice
+from agents.laws.call import ANYTHING
 from agents.laws.in_force import law_in_force
 from agents.laws.law import Law
 
@@ -33,5 +34,5 @@ def make_law(control: Control) -> Law:
         return TimeLimited(law(**choice.parameters), choice.time_limit)
     except ValueError as error:
         raise ValueError(f"law {choice.use}: {error}") from error
-    except Exception as error:  # its __init__ is anybody's code
+    except ANYTHING as error:  # its __init__ is anybody's code
         raise ValueError(f"law {choice.use} cannot be made: {type(error).__name__}: {error}") from error

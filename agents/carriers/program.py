@@ -79,6 +79,8 @@ class ProgramLaw(Law):
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=choice.folder or None, bufsize=0
             )
+            assert self._process.stdin is not None
+            os.set_blocking(self._process.stdin.fileno(), False)
         except OSError as error:
             text = f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run"
             raise ValueError(f"law program {text}") from None
@@ -126,8 +128,7 @@ class ProgramLaw(Law):
         if self._process is None:
             raise LawError(f"{self._name} has ended before the {what}")
         try:
-            assert self._process.stdin is not None
-            self._process.stdin.write(msgspec.json.encode(line) + b"\n")
+            self._put(msgspec.json.encode(line) + b"\n", what)
             reply = self._line(what)
         except BrokenPipeError:
             raise LawError(self._ended(what)) from None
@@ -141,14 +142,31 @@ class ProgramLaw(Law):
         self._patience = self._choice.time_limit
         return decoded
 
+    def _put(self, line: bytes, what: str) -> None:
+        """Write a line to the program; one that does not read fills the pipe, and then would block."""
+        assert self._process is not None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        end, file, out = monotonic() + self._patience, self._process.stdin.fileno(), self._process.stdout.fileno()
+        if self._rest or _ready(out, select.POLLIN, 0.0):
+            if self._rest or (piece := os.read(out, 65_536)):
+                shown = printable((self._rest or piece).decode(errors="replace"), 100)
+                self._process.kill()
+                raise LawError(f"{self._name} printed {shown!r} before the {what}; print one line for each that comes")
+            raise LawError(self._ended(what))
+        while line:
+            if not _ready(file, select.POLLOUT, end - monotonic()):
+                self._process.kill()
+                raise LawError(f"{self._name} did not read the {what} within {self._patience:g} s")
+            line = line[os.write(file, line) :]
+
     def _line(self, what: str) -> bytes:
         """Return the next line of the program."""
         assert self._process is not None
         assert self._process.stdout is not None
         end, file = monotonic() + self._patience, self._process.stdout.fileno()
         while b"\n" not in self._rest:
-            ready, _, _ = select.select([file], [], [], max(0.0, end - monotonic()))
-            if not ready:
+            if not _ready(file, select.POLLIN, end - monotonic()):
                 self._process.kill()  # it is of no use any more, and may not hear that its input has ended
                 raise LawError(f"{self._name} did not answer the {what} within {self._patience:g} s")
             piece = os.read(file, 65_536)
@@ -166,5 +184,12 @@ class ProgramLaw(Law):
         try:
             code = self._process.wait(CLOSING)
         except subprocess.TimeoutExpired:
-            return f"{self._name} closed its output at the {what}"
+            return f"{self._name} closed its input or its output at the {what}"
         return f"{self._name} ended at the {what} with " + (f"exit code {code}" if code >= 0 else f"signal {-code}")
+
+
+def _ready(file: int, event: int, within: float) -> bool:
+    """Wait until a file is ready, or has been closed; poll knows files beyond the 1024th, as select does not."""
+    poll = select.poll()
+    poll.register(file, event)
+    return bool(poll.poll(max(0.0, 1000.0 * within)))

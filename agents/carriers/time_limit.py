@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-from agents.laws.call import LawError
+from agents.laws.call import ANYTHING, LawError
 from agents.laws.law import Law, Neighbour, Own, SetPoints
+
+
+class _OverError(BaseException):
+    """The time is over; no Exception, so that a law that suppresses all of these is interrupted all the same."""
 
 
 class TimeLimited(Law):
@@ -41,23 +46,37 @@ class TimeLimited(Law):
             return self._law.step(own, neighbours, T)
 
     def close(self) -> None:
-        """End the law."""
-        self._law.close()
+        """End the law; the run is over, so that one that fails in it is but named in the log."""
+        try:
+            with self._limited("close", None):
+                self._law.close()
+        except ANYTHING as error:
+            logging.getLogger(__name__).warning("law %s: close failed: %r", type(self._law).__name__, error)
 
     @contextmanager
-    def _limited(self, what: str, t: float) -> Iterator[None]:
+    def _limited(self, what: str, t: float | None) -> Iterator[None]:
         if threading.current_thread() is not threading.main_thread():
             yield
             return
+        over = False
 
         def interrupt(number: int, frame: FrameType | None) -> None:
-            longer = f"took longer than time_limit_s = {self._time_limit:g} s"
-            raise LawError(f"{what} at t = {t:.6g} s {longer}")
+            nonlocal over
+            over = True
+            raise _OverError
 
         before = signal.signal(signal.SIGALRM, interrupt)
-        signal.setitimer(signal.ITIMER_REAL, self._time_limit)
         try:
-            yield
+            signal.setitimer(signal.ITIMER_REAL, self._time_limit)
+            try:
+                yield
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+        except BaseException:
+            if not over:
+                raise
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
+        if over:  # also where the law caught the interruption and returned
+            when = "" if t is None else f" at t = {t:.6g} s"
+            raise LawError(f"{what}{when} took longer than time_limit_s = {self._time_limit:g} s")

@@ -7,11 +7,17 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
 from wire.bounds import MOST_SHARED, SHARED_LIMIT
 from wire.printable import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
+
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+"""Place of an object in memory: another one in every run, and of no use to anybody."""
+
+ANYTHING = (Exception, SystemExit, GeneratorExit)
+"""What a law may raise, as it is anybody's code; only who presses Ctrl+C ends the run."""
 
 
 class LawError(RuntimeError):
@@ -30,7 +36,7 @@ def begun(law: Law, own: Own) -> None:
         law.start(own)
     except LawError:
         raise
-    except Exception as error:  # a law is anybody's code
+    except ANYTHING as error:
         raise LawError(f"start at t = {own.t:.6g} s raised {_named(error)}") from error
 
 
@@ -55,24 +61,36 @@ def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Se
         result = law.step(own, neighbours, T)
     except LawError:
         raise
-    except Exception as error:  # a law is anybody's code
+    except ANYTHING as error:
         raise LawError(f"step at t = {own.t:.6g} s raised {_named(error)}") from error
+    try:
+        return _within_limits(law, result, own)
+    except LawError:
+        raise
+    except ANYTHING as error:  # what a law returns is anybody's code too: its bool(), float() or items() may raise
+        raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {_named(error)}") from error
+
+
+def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
+    """Return what a law returned, if it is a decision, within its limits."""
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
     P_set, V_set = (_number(name, getattr(result, name), own.t) for name in ("P_set", "V_set"))
     return SetPoints(
         P_set=min(max(P_set, law.P_set_min), law.P_set_max),
         V_set=min(max(V_set, law.V_set_min), law.V_set_max),
-        shared=_checked(result.shared, own.t) if result.shared else result.shared,
+        shared=NOTHING if result.shared is NOTHING else _checked(result.shared, own.t),
         send=bool(result.send),
     )
 
 
 def _number(name: str, value: Any, t: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+    if type(value) is not float or not isfinite(value):
+        if isinstance(value, (str, bytes)):
+            raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number")
         try:
-            value = float(value)  # a number of numpy's
-        except (TypeError, ValueError):
+            value = float(value)  # a whole number, or one of numpy's
+        except (TypeError, ValueError, OverflowError):
             raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number") from None
         if not isfinite(value):
             raise LawError(f"step at t = {t:.6g} s returned {name} = {value}; it must be a finite number (pu)")
@@ -93,9 +111,16 @@ def _checked(shared: Any, t: float) -> Mapping[str, float]:
     return found
 
 
-def _named(error: Exception) -> str:
-    return printable(f"{type(error).__name__}: {error}", 200)
+def _named(error: BaseException) -> str:
+    try:
+        text = str(error)
+    except ANYTHING:
+        text = "its text cannot be had"
+    return printable(f"{type(error).__name__}: {text}", 200)
 
 
 def _shown(value: Any) -> str:
-    return printable(repr(value), 100)
+    try:
+        return printable(_ADDRESS.sub("", repr(value)), 100)
+    except ANYTHING:
+        return f"a {type(value).__name__} that cannot be shown"

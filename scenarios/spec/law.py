@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from agents.carriers.registry import LAWS
 from agents.config import Gains, LawChoice
+from agents.laws.call import ANYTHING
 from agents.laws.law import Law
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
@@ -139,7 +140,7 @@ def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> lis
     if not wrong:
         try:
             law(**parameters).close()
-        except Exception as error:  # its __init__ is anybody's code
+        except ANYTHING as error:  # its __init__ is anybody's code
             wrong = [("use", f"{use} cannot be made: {type(error).__name__}: {error}")]
     return wrong
 

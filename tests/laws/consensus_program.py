@@ -14,6 +14,7 @@ FAILURES = {
     "partial": '{"P_set": 0.5}',
     "nan": '{"P_set": NaN, "V_set": 1.0}',
     "error": '{"error": "no idea"}',
+    "twice": '{"P_set": 0.5, "V_set": 1.0}\n{"P_set": 0.6, "V_set": 1.0}',
 }
 """What is answered instead of a decision."""
 
@@ -33,6 +34,9 @@ def main(failure: str) -> None:
                 sys.exit(7)
             if failure == "hangs":
                 sleep(600.0)
+            if failure == "babbles":  # answers without end to lines that it does not read
+                while True:
+                    print('{"P_set": 0.5, "V_set": 1.0}')
             print(FAILURES[failure], flush=True)
             continue
         around = [Neighbour(**other) for other in asked["neighbours"]]
