@@ -26,7 +26,8 @@ from scenarios.emulation.links import links_of
 from scenarios.live.asking import configuration
 from scenarios.live.book import Book
 from scenarios.live.chronicle import Chronicle
-from scenarios.live.place import Place, near, return_path
+from scenarios.live.own_code import own_code
+from scenarios.live.place import Place, UsageError, is_near, near, return_path
 from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
 from scenarios.results.record import Recorded
@@ -127,7 +128,7 @@ def plant_here(config: PlantConfig, folder: Path | None, book: Book, on_whole: O
     return Ended(broke=broke or chronicle.lost)
 
 
-def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: float) -> Ended:
+def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: float, *, trusts: bool = False) -> Ended:
     """Run an agent in this process, as the plant tells it to, until it leaves.
 
     Parameters
@@ -140,11 +141,15 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: fl
         Where other agents can connect; None is for any free port, of all addresses if others can reach the plant.
     wait : float
         Longest wait (s) for a plant.
+    trusts : bool, optional
+        Whether code that only the plant names is run, though the plant may be on another host.
 
     Raises
     ------
     NobodyError
         If there is no plant, no such inverter, or another agent of its name.
+    UsageError
+        If the plant names code of somebody's own, and is not trusted.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -153,6 +158,11 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: fl
         with Visit(where) as visit:
             visit.find_plant(wait, lambda line: say(f"{name}: {line}"))
             config = configuration(visit, name)
+        if not (trusts or is_near(where.connect)) and (named := own_code(config)):
+            raise UsageError(
+                f"{name}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
+                "the plant; if you trust it, say --own-code"
+            )
         listen = listen or return_path((*where.connect, *config.connect))
         config = msgspec.structs.replace(config, connect=where.connect, listen=listen)
         return Ended(broke=run_agent(config, links_of))

@@ -209,12 +209,26 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
     >>> return_path(("tcp/127.0.0.1:7447",)), return_path(("tcp/192.168.1.10:7447",))
     (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
     """
-    for text in connect:
-        match = _FORM.fullmatch(text)
-        assert match is not None
-        if not match["host"].startswith(_LOOPBACKS):
-            return ("tcp/[::]:0",) if match["host"].startswith("[") else ("tcp/0.0.0.0:0",)
-    return ("tcp/127.0.0.1:0",)
+    far = [host for host in _hosts(connect) if not host.startswith(_LOOPBACKS)]
+    if not far:
+        return ("tcp/127.0.0.1:0",)
+    return ("tcp/[::]:0",) if far[0].startswith("[") else ("tcp/0.0.0.0:0",)
+
+
+def is_near(connect: tuple[str, ...]) -> bool:
+    """Whether all endpoints are on this machine's loopback.
+
+    Examples
+    --------
+    >>> is_near(("tcp/127.0.0.1:7447",)), is_near(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
+    (True, False)
+    """
+    return all(host.startswith(_LOOPBACKS) for host in _hosts(connect))
+
+
+def _hosts(connect: tuple[str, ...]) -> list[str]:
+    matches = [_FORM.fullmatch(text) for text in connect]
+    return [match["host"] for match in matches if match is not None]
 
 
 def near(listen: str) -> str:

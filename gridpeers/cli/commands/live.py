@@ -106,6 +106,10 @@ def agent(
         typer.Option("--listen", metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
     ] = None,
     wait: Wait = 60.0,
+    own_code: Annotated[
+        bool,
+        typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
+    ] = False,
 ) -> None:
     """Run the agent of one inverter in this terminal. Ctrl-C leaves properly: the inverter is switched off.
 
@@ -123,7 +127,7 @@ def agent(
         check_wait(wait)
         watch_readers(quits=False)
         listening = tuple(claim("--listen", text) for text in listen) if listen else None
-        _finish(agent_here(where, inverter, listening, wait))
+        _finish(agent_here(where, inverter, listening, wait, trusts=own_code))
 
 
 def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:

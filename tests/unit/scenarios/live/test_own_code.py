@@ -1,0 +1,54 @@
+"""An agent runs what only the plant names if the plant is near, or trusted."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import pytest
+from msgspec.structs import replace
+
+from agents.config import Control, LawChoice
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from scenarios.emulation.setup import Setup
+from scenarios.live import hand
+from scenarios.live.own_code import own_code
+from scenarios.live.place import Place, UsageError
+from tests.toy.toy_configs import agent_config
+from wire.plugin import Plugin
+
+SETUP = Setup(netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"})
+CONTROL = Control(secondary="all", graph="mine:star", own_graph=Plugin(use="mine:star"), law=LawChoice(use="mine:Mine"))
+CONFIG = replace(agent_config("inv1"), control=CONTROL, links=SETUP.to_text())
+
+
+def test_what_is_not_gridpeers_own_is_named() -> None:
+    """Law, graph and faults by module:Name; what is registered or installed is on this host anyway."""
+    calm = replace(CONTROL, own_graph=None, law=LawChoice(use="dapi"))
+
+    assert own_code(CONFIG) == ("the law mine:Mine", "the graph mine:star", "the link fault mine:Jammer")
+    assert own_code(replace(CONFIG, control=calm, links="")) == ()
+
+
+@pytest.mark.parametrize(("endpoint", "trusts", "runs"), [
+    ("tcp/127.0.0.1:7447", False, True),
+    ("tcp/192.168.1.10:7447", False, False),
+    ("tcp/192.168.1.10:7447", True, True),
+])  # fmt: skip
+def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
+    endpoint: str, trusts: bool, runs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever can pose as a plant would else have any program run on every host that joins."""
+    ran: list[str] = []
+    where = Place(run="demo", connect=(endpoint,))
+    monkeypatch.setattr(hand, "Visit", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})()))
+    monkeypatch.setattr(hand, "configuration", lambda visit, name: CONFIG)
+    monkeypatch.setattr(hand, "run_agent", lambda config, links: ran.append(config.name) or "")
+    monkeypatch.setattr(hand.signal, "signal", lambda *_: None)
+
+    if runs:
+        hand.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+    else:
+        with pytest.raises(UsageError, match=r"inv1: the plant of run demo .* run the law mine:Mine and .*--own-code"):
+            hand.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+    assert ran == (["inv1"] if runs else [])
