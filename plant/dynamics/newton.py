@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics.reduction import Complex, Real, Reduction, one_thread, tangent
+from plant.dynamics.blas import one_thread
+from plant.dynamics.reduction import Complex, Real, Reduction, tangent
 
 ITERATIONS = 40
 """Of Newton's method; it takes 4 to 10."""
@@ -72,7 +73,7 @@ class Island:
     def __init__(self, Z: Complex, S: Complex, I0: Complex, nominal: Complex) -> None:
         self._Z, self._S, self._I0, self._V_nom = Z, S, I0, np.abs(nominal)
 
-    @one_thread
+    @one_thread()
     def solve(self, E: Complex, guess: Complex) -> Complex | None:
         """Branch voltages (V) for the voltages without load E (V), or None if there are none.
 

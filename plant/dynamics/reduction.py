@@ -17,32 +17,18 @@ solved in a frame that turns with its first GFM, and the tangent stays good for 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, ParamSpec, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
-from threadpoolctl import ThreadpoolController
 
+from plant.dynamics.blas import one_thread
 from plant.dynamics.circuit import Circuit
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-
-_BLAS = ThreadpoolController()
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
-
-
-def one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Have linear algebra done by one thread: with more its sums come in another order.
-
-    Another number of cores would give other last digits, and the same run other bytes.
-    """
-    return cast("Callable[_P, _R]", _BLAS.wrap(limits=1)(function))
 
 
 class Reduced(NamedTuple):
@@ -95,7 +81,7 @@ class Reduction:
         Which inverters are connected; the others neither inject nor load the network.
     """
 
-    @one_thread
+    @one_thread()
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
         self.circuit = circuit
         n_inv = circuit.terminals.shape[0]
@@ -190,7 +176,7 @@ class Reduction:
         """What the ideal sources alone give at the branches and at the terminals (V)."""
         return self._b_S @ source_voltage, self._G_S @ source_voltage
 
-    @one_thread
+    @one_thread()
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
@@ -228,7 +214,7 @@ class Reduction:
             theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
         )
 
-    @one_thread
+    @one_thread()
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         """Voltage of every node (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)

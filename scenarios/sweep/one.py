@@ -36,7 +36,6 @@ from scenarios.spec.agentless import without_agent
 from scenarios.spec.changes import as_in
 from scenarios.spec.configs import configs
 from scenarios.spec.moves import inverters_of
-from scenarios.sweep.blas import one_thread
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
@@ -79,8 +78,7 @@ def run_one(number: int, scenario: Scenario, case: str) -> Done:
 def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[Done, History | None]:
     """Run one case in this thread and measure it; its history is None if it broke."""
     try:
-        with one_thread():
-            return _run(number, scenario, case)
+        return _run(number, scenario, case)
     except Exception as error:
         text = str(error)
         known = type(error).__name__ in ("PlantError", "RecordError")
