@@ -40,7 +40,7 @@ def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] 
     'the buses are 1, 2, 3, ..., 24 and 110 more'
     """
     names = list(known)
-    near = _nearest(wrong, [*names, *also])
+    near = _nearest(str(wrong), [*names, *also])
     beyond = len(names) - LONGEST_LIST
     if near and beyond > 0:
         return f'did you mean "{near}"?'

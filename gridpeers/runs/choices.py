@@ -34,6 +34,8 @@ def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str
     """
     if names is None:
         return spec
+    if not isinstance(names, Iterable):
+        raise ScenarioError([f"{option}cases: needs a name, a list of names, or None for all, got {names!r:.60}"])
     chosen = list(names)
     unknown = [name for name in chosen if name not in spec.cases] if chosen else [""]
     if unknown:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gridpeers.runs.result import Result, Results
-from gridpeers.runs.run_folder import RunFolder
+from gridpeers.runs.run_folder import RunFolder, as_folder
 from plant.tables import read_feeder
 from scenarios.results.folder import FolderError
 from scenarios.spec.changes import as_in
@@ -27,10 +27,10 @@ def read(folder: str | Path) -> Result | Results:
     FolderError
         If it is no folder of a run, or of one that did not come to its end.
     """
-    path = Path(folder)
+    path = as_folder(folder)
     if not (path / "status.txt").is_file():
         raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt")
-    status = (path / "status.txt").read_text(encoding="utf-8").strip()
+    status = (path / "status.txt").read_text(encoding="utf-8", errors="replace").strip()
     if status != "complete":
         raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
     try:

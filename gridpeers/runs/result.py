@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import pandas as pd
@@ -34,9 +34,12 @@ from scenarios.spec.moves import inverters_of
 from scenarios.spec.own import claims_of
 from wire.messages import PlantEvent
 from wire.nearest import suggestion
+from wire.printable import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+T = TypeVar("T")
 
 
 class Results(Mapping[str, "Result"]):
@@ -80,7 +83,7 @@ class Results(Mapping[str, "Result"]):
     @property
     def report(self) -> str:
         """What the command `gridpeers run` prints at the end."""
-        return (self.folder / "report.txt").read_text(encoding="utf-8")
+        return _read(self.folder / "report.txt", lambda file: file.read_text(encoding="utf-8"))
 
     @property
     def metrics(self) -> pd.DataFrame:
@@ -130,7 +133,7 @@ class Results(Mapping[str, "Result"]):
         """
         from scenarios.results.plots import draw_all
 
-        folder = empty_folder(Path(folder))
+        folder = empty_folder(folder)
         try:
             shutil.copytree(self.folder, folder, dirs_exist_ok=True)
             text = self.report.replace(f"Results: {shown(self.folder)}/\n", f"Results: {shown(folder)}/\n")
@@ -218,7 +221,7 @@ class Result:
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return read_history(self.folder / self.case / "history.csv")
+        return _read(self.folder / self.case / "history.csv", read_history)
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -241,17 +244,17 @@ class Result:
     @cached_property
     def events(self) -> pd.DataFrame:
         """What happened in the plant and to the agents: time t (s), kind, subject, text."""
-        return frames.events_frame(self.folder / self.case / "events.csv")
+        return _read(self.folder / self.case / "events.csv", frames.events_frame)
 
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return frames.links_frame(self.folder / self.case / "links.csv")
+        return _read(self.folder / self.case / "links.csv", frames.links_frame)
 
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the bytes of the history: equal runs have equal ones."""
-        return hashlib.sha256((self.folder / self.case / "history.csv").read_bytes()).hexdigest()
+        return hashlib.sha256(_read(self.folder / self.case / "history.csv", Path.read_bytes)).hexdigest()
 
     @property
     def links_sha256(self) -> str:
@@ -303,6 +306,21 @@ class Result:
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
+
+
+def _read(file: Path, reader: Callable[[Path], T]) -> T:
+    """Read a file of a run, which somebody may have removed or changed since.
+
+    Raises
+    ------
+    FolderError
+        If it cannot be read.
+    """
+    try:
+        return reader(file)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise FolderError(f"{file}: cannot be read: {printable(why, 200)}; run the scenario again") from error
 
 
 def _plant_events(result: Result) -> list[PlantEvent]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 import weakref
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from scenarios.results.folder import FolderError, refusal
 
@@ -30,7 +32,20 @@ class RunFolder:
             self._removal.detach()
 
 
-def empty_folder(folder: Path) -> Path:
+def as_folder(it: Any) -> Path:
+    """Return the path of a folder that somebody has named.
+
+    Raises
+    ------
+    FolderError
+        If it is no path.
+    """
+    if not isinstance(it, str | PathLike) or "\0" in str(it) or not str(it):
+        raise FolderError(f"needs the path of a folder, got {it!r:.60}")
+    return Path(it)
+
+
+def empty_folder(it: str | Path) -> Path:
     """Make a folder for results.
 
     Raises
@@ -38,6 +53,7 @@ def empty_folder(folder: Path) -> Path:
     FolderError
         If there is something in it, or it cannot be made.
     """
+    folder = as_folder(it)
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             kind = "is not empty" if folder.is_dir() else "is a file"

@@ -49,7 +49,7 @@ def run(
     if folder is None:
         home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
     else:
-        home = RunFolder(empty_folder(Path(folder)))
+        home = RunFolder(empty_folder(folder))
     request = Request(
         scenario=spec,
         feeder=scenario.feeder,

@@ -121,6 +121,10 @@ def _wrong_types(table: Mapping[str, Any]) -> dict[str, str]:
         wrong["command"] = 'must be a list of texts, the program first, e.g. ["./mylaw", "--fast"]'
     if text := range_objection(table.get("time_limit_s", 1.0), TIME_LIMIT, "s"):
         wrong["time_limit_s"] = text
+    for low, high in (("P_set_min", "P_set_max"), ("V_set_min", "V_set_max")):
+        least, most = (table.get(key, getattr(Law, key)) for key in (low, high))
+        if isinstance(least, int | float) and isinstance(most, int | float) and least > most:
+            wrong[low if low in table else high] = f"{low} = {least:g} pu is above {high} = {most:g} pu"
     for key, value in table.items():
         if key not in OWN_KEYS and not isinstance(value, str | int | float):
             wrong[key] = f"a parameter is a number, a text, or true or false; got {value!r}"
@@ -146,9 +150,13 @@ def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> lis
 
 
 def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
-    program = table["command"][0]
-    place = Path(table.get("folder", "")) / program
-    if shutil.which(str(place)) or shutil.which(program):
+    program, folder = table["command"][0], Path(table.get("folder", ""))
+    if any("\0" in word for word in table["command"]):
+        return [("command", "has the character 0 in it, which no command can have")]
+    if not folder.is_dir():
+        return [("folder", f"there is no folder {folder}")]
+    place = folder / program
+    if shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
         return objections(Law, {key: value for key, value in parameters.items() if key in vars(Law)})
     if place.is_file():
         return [("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]

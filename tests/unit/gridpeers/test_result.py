@@ -126,3 +126,30 @@ def test_a_run_into_a_folder_is_the_commands_folder_and_is_judged(scenario: gp.S
     assert all(f"{verdict.status:7}  {verdict.claim.text}" in runs.report for verdict in runs.verdicts)
     with pytest.raises(gp.FolderError, match="not empty"):
         scenario.run("I", folder=tmp_path / "mine")
+
+
+def test_what_is_no_folder_or_case_is_told_in_one_line(scenario: gp.Scenario, run: gp.Result) -> None:
+    """A number, nothing, or a text that no path can be: an error of the library's own, and nothing is run."""
+    for wrong in (5, None, "", "a\0b"):
+        with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):
+            gp.read(wrong)  # type: ignore[arg-type]
+        with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):
+            run.save(wrong)  # type: ignore[arg-type]
+    with pytest.raises(gp.ScenarioError, match="cases: needs a name, a list of names, or None for all, got 5"):
+        scenario.run(5)  # type: ignore[call-overload]
+    with pytest.raises(gp.ScenarioError, match=r'no case "5"; the cases are'):
+        scenario.run([5])  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize("name", ["IV/history.csv", "IV/events.csv", "report.txt"])
+def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path, name: str) -> None:
+    """Removed, or bytes that are no text: one line with the file, whenever it is asked for."""
+    folder = run.save(tmp_path / "run")
+    for spoilt in (b"\xff\x00\n", None):
+        (folder / name).unlink()
+        if spoilt is not None:
+            (folder / name).write_bytes(spoilt)
+        opened = gp.read(folder)
+        assert isinstance(opened, gp.Result)
+        with pytest.raises(gp.FolderError, match=f"{name}: cannot be read: .*; run the scenario again"):
+            _ = (opened.history, opened.events, opened.report)
