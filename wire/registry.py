@@ -85,8 +85,12 @@ class Registry(Generic[T]):
         Raises
         ------
         PluginError
-            If gridpeers, or another module, has an object of this name.
+            If gridpeers, or another module, has an object of this name, or it is no name.
         """
+        if not isinstance(name, str) or not name.strip() or ":" in name:
+            raise PluginError(
+                f'{name!r:.60} is no name of a {self.kind}; give the decorator a text without ":", e.g. "mine"'
+            )
 
         def add(it: T) -> T:
             before = self._added.get(name)

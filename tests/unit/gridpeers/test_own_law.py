@@ -123,3 +123,10 @@ def test_mistakes_in_an_own_law_are_told_with_its_key(tmp_path: Path) -> None:
             scenario.replace({"case.IV.law": law})
         assert str(caught.value).startswith("replace: case.IV.law")
         assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["", " ", "a:b", 5, None, gp.Law])
+def test_a_decorator_without_a_name_is_refused(name: object) -> None:
+    """`@gp.law` without brackets would put a function in the place of the class, and nobody would know."""
+    with pytest.raises(ValueError, match=r'is no name of a law; give the decorator a text without ":"'):
+        gp.law(name)  # type: ignore[arg-type]
