@@ -84,7 +84,6 @@ def _text(path: Path) -> str:
     (f"{BAD}:no_class", r"no_class is no law: derive a class from gridpeers.Law"),
     (f"{BAD}:NoStep", r"NoStep is no law: it has no method step\(self, own, neighbours, T\)"),
     (f"{BAD}:WrongStep", r"WrongStep is no law: write its method step\(self, own, neighbours, T\): too many"),
-    ("tests.laws.leaving_module:Mine", r"importing tests.laws.leaving_module failed: SystemExit: 3"),
     (f"{BAD}:Unmakeable", r"Unmakeable cannot be made: RuntimeError: no licence"),
     ({"use": f"{BAD}:Failing", "gain": 500}, r"case.IV.law.gain: must be from 0 to 100 1/s, got 500"),
     ({"use": f"{BAD}:Failing", "gian": 5}, r'case.IV.law.gian: unknown parameter; did you mean "gain"\?'),
@@ -133,6 +132,14 @@ def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:
     scenario = gp.load(file)
 
     assert scenario.run("IV").sha256 == scenario.run("IV", driver="processes").sha256
+
+
+def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Path) -> None:
+    """A script without the guard of its main part; it stands outside of the tests, which pytest imports."""
+    (tmp_path / "leaving_law.py").write_text("import sys\nsys.exit(3)\n")
+
+    with pytest.raises(gp.ScenarioError, match="importing leaving_law failed: SystemExit: 3"):
+        written({"use": "leaving_law:Mine", "folder": str(tmp_path)})
 
 
 def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
