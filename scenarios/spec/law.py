@@ -63,7 +63,7 @@ def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
     _check("law", scenario.law, mistakes)
     for name, case in scenario.cases.items():
         path = f"case.{name}.law"
-        if case.law:
+        if case.law != "":  # an empty table is no law, and not the scenario's either
             _check(path, case.law, mistakes)
         if mistakes.touch(path, "law"):
             continue
@@ -103,9 +103,9 @@ def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
     wrong = _wrong_types(table)
     for key, text in wrong.items():
         mistakes.add(f"{path}.{key}", text)
-    if wrong:
+    if wrong.keys() & {*CARRIERS, "folder"}:  # there is no law to ask
         return
-    parameters = {key: value for key, value in table.items() if key not in OWN_KEYS}
+    parameters = {key: value for key, value in table.items() if key not in (*OWN_KEYS, *wrong)}
     checks = {"use": _check_class, "command": _check_program, "fmu": _check_fmu}
     for key, text in checks[given[0]](table, parameters):
         mistakes.add(f"{path}.{key}" if isinstance(law, Mapping) else path, text)

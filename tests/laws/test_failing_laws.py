@@ -90,6 +90,7 @@ def _text(path: Path) -> str:
     ({"use": "dapi", "k": "fast"}, r'case.IV.law.k: must be a number, got "fast"'),
     ({"use": "dapi", "time_limit_s": 0}, r"case.IV.law.time_limit_s: must be from 0.001 to 60 s, got 0"),
     ({"use": "consensus", "k_p": 1.0}, r"case.IV.law.k_p: the parameters of .consensus. are those of \[gains\]"),
+    ({}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
     ({"gain": 1.0}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
     ({"use": "dapi", "fmu": "x.fmu"}, r"case.IV.law: needs one of use, command, fmu; got use and fmu"),
     ({"command": ["./nothing"]}, r"case.IV.law.command: there is no program ./nothing, neither beside"),
@@ -108,6 +109,17 @@ def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said
 
     assert len(refused.value.mistakes) == 1
     assert re.search(said, refused.value.mistakes[0]), refused.value.mistakes
+
+
+def test_all_mistakes_of_a_law_come_at_once() -> None:
+    """A key of the table itself hides none of the law's parameters."""
+    law = {"use": "dapi", "time_limit_s": 0, "kk": 1, "k": -1.0}
+    with pytest.raises(gp.ScenarioError) as refused:
+        gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
+
+    assert [line.split(": ")[-2].split()[-1] for line in refused.value.mistakes] == [
+        f"case.IV.law.{key}" for key in ("time_limit_s", "kk", "k")
+    ]
 
 
 def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
