@@ -54,7 +54,7 @@ def run(
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
     ] = None,
 ) -> None:
-    """Run a scenario and show its results, beside the paper's where the scenario is one of the paper's.
+    """Run a scenario and show its results, beside published ones.
 
     Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
     2 bad usage or a bad file, 3 the run broke.
