@@ -3,8 +3,6 @@
 from math import isfinite
 from pathlib import Path
 
-import pytest
-
 from tests.schedules.carry_out import carry_out
 from tests.schedules.schedule import HEAL, draw
 
@@ -23,13 +21,12 @@ def test_a_seed_gives_one_schedule_and_every_fault_of_a_process_ends() -> None:
         assert max(action.t for action in actions) == HEAL
 
 
-@pytest.mark.parametrize("seed", [3, 6])
-def test_a_run_survives_a_schedule(tmp_path: Path, seed: int) -> None:
+def test_a_run_survives_a_schedule(tmp_path: Path) -> None:
     """Kills, freezes, link faults, switchings: the run goes on, no agent outlives it, islands with a leader come back.
 
-    With these seeds the plant found no solution after a switching and ended the run, before it could give up an island.
+    With this seed the plant found no solution after a switching and ended the run, before it could give up an island.
     """
-    verdict = carry_out(seed, tmp_path)
+    verdict = carry_out(6, tmp_path)
 
     assert verdict.broke == ""
     assert verdict.outlived == ()
