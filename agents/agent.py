@@ -95,10 +95,10 @@ class Agent:
     def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
         self.config = config
         self.fault = ""
-        """What the law did that it must not; then the agent stands still, and the inverter is on primary droop."""
+        """Error of the law; empty if none. After one the agent stands still, and the inverter is on primary droop."""
         self._no_graph = self._no_graph_told = ""
-        """What the rule of the graph did with the present roster that it must not, and what of it was told last; the
-        agent stands still as long as it does."""
+        """Error of the graph's rule with the present roster, and the last that was reported. Meanwhile the agent stands
+        still."""
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
@@ -278,7 +278,7 @@ class Agent:
         return frozenset(name for name in neighbours if slips.apart(name, t))
 
     def _own(self, m: Measurement) -> Own:
-        """What the law knows of the own inverter."""
+        """Return the own inverter as the law sees it."""
         config, e = self.config, (m.f - self.config.f_nom) / self.config.f_nom
         assert self._P_set is not None
         assert self._V_set is not None
@@ -304,7 +304,7 @@ class Agent:
         )
 
     def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
-        """What the law knows of the neighbours that count."""
+        """Return the neighbours that count as the law sees them."""
         heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
         aged = {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
         return [

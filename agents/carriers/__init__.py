@@ -1,1 +1,1 @@
-"""What carries a law: a Python class, a program on standard input and output, an FMU. Not pure."""
+"""Carriers of laws: Python classes, programs on standard input and output, FMUs. Not pure."""

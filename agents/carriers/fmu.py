@@ -95,7 +95,8 @@ class FmuLaw(Law):
         path = Path(choice.folder) / choice.fmu
         if wrong := fmu_problems(path, choice.parameters):
             raise ValueError("law " + "; ".join(text for _, text in wrong))
-        super().__init__(**{name: value for name, value in choice.parameters.items() if name in parameters_of(Law)})
+        limits = parameters_of(Law)
+        super().__init__(**{name: value for name, value in choice.parameters.items() if name in limits})
         import fmpy
 
         self._name, self._parameters = path.name, choice.parameters
@@ -105,7 +106,6 @@ class FmuLaw(Law):
         self._settable = _named(description, "parameter")
         self._room = max((int(match[1]) for name in self._inputs if (match := _NEIGHBOUR.fullmatch(name))), default=0)
         self._shared = [name.removeprefix("shared_") for name in self._outputs if name.startswith("shared_")]
-
         self._fmi3 = str(description.fmiVersion).startswith("3")
         if self._fmi3:
             from fmpy.fmi3 import FMU3Slave as Slave

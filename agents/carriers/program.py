@@ -66,8 +66,8 @@ class ProgramLaw(Law):
     """
 
     def __init__(self, choice: LawChoice) -> None:
-        limits = {name: value for name, value in choice.parameters.items() if name in parameters_of(Law)}
-        super().__init__(**limits)
+        limits = parameters_of(Law)
+        super().__init__(**{name: value for name, value in choice.parameters.items() if name in limits})
         self._choice = choice
         self._name = Path(choice.command[0]).name
         self._process: subprocess.Popen[bytes] | None = None

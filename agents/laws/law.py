@@ -17,11 +17,11 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from wire.parameters import Range, Unit, values_of
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
-"""What most laws share beside their set-points."""
+"""Default of `shared`: no further values."""
 
 
 class Own(NamedTuple):
-    """What a law knows of its own inverter. Per unit: powers of P_rated, voltages of V_nom, frequencies of f_nom."""
+    """Own inverter, as a law sees it. Per unit: powers of P_rated, voltages of V_nom, frequencies of f_nom."""
 
     name: str
     """Name of the inverter."""
@@ -60,7 +60,7 @@ class Own(NamedTuple):
 
 
 class Neighbour(NamedTuple):
-    """What a law knows of a neighbour whose last state counts. Per unit of the neighbour's own rating."""
+    """Last state of a neighbour, as a law sees it. Per unit of the neighbour's own rating."""
 
     name: str
     """Name of the inverter."""
