@@ -18,8 +18,7 @@ import msgspec
 
 from agents.config import LawChoice
 from agents.laws.call import LawError
-from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
-from wire.parameters import parameters_of
+from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints, limits_in
 from wire.printable import printable
 
 LONGEST_LINE = 100_000
@@ -66,8 +65,7 @@ class ProgramLaw(Law):
     """
 
     def __init__(self, choice: LawChoice) -> None:
-        limits = parameters_of(Law)
-        super().__init__(**{name: value for name, value in choice.parameters.items() if name in limits})
+        super().__init__(**limits_in(choice.parameters))
         self._choice = choice
         self._name = Path(choice.command[0]).name
         self._process: subprocess.Popen[bytes] | None = None

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 from agents.laws.call import ANYTHING, LawError
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints
 
 
 class _OverError(BaseException):
@@ -30,9 +30,7 @@ class TimeLimited(Law):
     """
 
     def __init__(self, law: Law, time_limit: float) -> None:
-        super().__init__(
-            P_set_min=law.P_set_min, P_set_max=law.P_set_max, V_set_min=law.V_set_min, V_set_max=law.V_set_max
-        )
+        super().__init__(**{name: getattr(law, name) for name in LIMITS})
         self._law, self._time_limit = law, time_limit
 
     def start(self, own: Own) -> None:

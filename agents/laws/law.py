@@ -158,3 +158,18 @@ class Law:
 
     def close(self) -> None:
         """End: give back what was opened."""
+
+
+LIMITS = ("P_set_min", "P_set_max", "V_set_min", "V_set_max")
+"""Parameters of every law, whatever carries it: the agent limits to them what `step` returns."""
+
+
+def limits_in(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the limits among the parameters of a law.
+
+    Examples
+    --------
+    >>> limits_in({"k_p": 0.001, "P_set_max": 0.9})
+    {'P_set_max': 0.9}
+    """
+    return {name: value for name, value in parameters.items() if name in LIMITS}

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from agents.carriers.registry import LAWS
 from agents.config import Gains, LawChoice
 from agents.laws.call import ANYTHING
-from agents.laws.law import Law
+from agents.laws.law import Law, limits_in
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
 from wire.module_folder import folder_of
@@ -100,7 +100,7 @@ def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
         text = f"needs one of use, command, fmu; got {' and '.join(given) or 'none'}"
         mistakes.add(path, f'{text}; e.g. law = "mine:Mine" or law = {{ command = ["./mylaw"] }}')
         return
-    wrong = _wrong_types(table)
+    wrong = _wrong_values(table)
     for key, text in wrong.items():
         mistakes.add(f"{path}.{key}", text)
     if wrong.keys() & {*CARRIERS, "folder"}:  # there is no law to ask
@@ -111,8 +111,8 @@ def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
         mistakes.add(f"{path}.{key}" if isinstance(law, Mapping) else path, text)
 
 
-def _wrong_types(table: Mapping[str, Any]) -> dict[str, str]:
-    """What is wrong with the keys that are no parameters, by key."""
+def _wrong_values(table: Mapping[str, Any]) -> dict[str, str]:
+    """Return what is wrong whatever carries the law, by key."""
     wrong = {
         key: "must be a text in quotes" for key in ("use", "fmu", "folder") if not isinstance(table.get(key, ""), str)
     }
@@ -157,13 +157,20 @@ def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> l
         return [("folder", f"there is no folder {folder}")]
     place = folder / program
     if shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
-        return objections(Law, {key: value for key, value in parameters.items() if key in vars(Law)})
+        return objections(Law, limits_in(parameters))
     if place.is_file():
         return [("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
     return [("command", f"there is no program {program}, neither beside the scenario nor on the PATH")]
 
 
 def _check_fmu(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
-    from agents.carriers.fmu import fmu_problems
+    from agents.carriers.fmu import FmuLaw
+    from agents.carriers.fmu_interface import fmu_problems
 
-    return fmu_problems(Path(table.get("folder", "")) / table["fmu"], parameters)
+    wrong = fmu_problems(Path(table.get("folder", "")) / table["fmu"], parameters)
+    if not wrong:
+        try:
+            FmuLaw(LawChoice(fmu=table["fmu"], folder=table.get("folder", ""), parameters=dict(parameters))).close()
+        except ValueError as error:
+            wrong = [("fmu", str(error))]
+    return wrong

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 import gridpeers as gp
+from tests.laws.consensus_fmi3 import NAME, build, described
 from tests.laws.runs import SHORT, Driver, islanding, written
 
 HERE = Path(__file__).parent
@@ -27,12 +29,24 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"fmu": "ConsensusFmu.fmu", "folder": str(folder)}
 
 
+@pytest.fixture(scope="module")
+def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The paper's law in C, as an FMU of FMI 3."""
+    cc = shutil.which("cc")
+    if cc is None:
+        pytest.skip("no C compiler is here")
+    folder = tmp_path_factory.mktemp("fmi3")
+    return {"fmu": build(cc, folder), "folder": str(folder)}
+
+
 @pytest.mark.parametrize("driver", ["inprocess", "processes"])
-@pytest.mark.parametrize("carrier", ["class", "program", "fmu"])
-def test_every_carrier_of_a_law_gives_the_same_history(carrier: str, driver: Driver, fmu: dict[str, str]) -> None:
-    """The paper's law built in, as anybody's class, as a program and as an FMU: one hash, in one process and in ten."""
-    laws: dict[str, Any] = {"class": "agents.laws.consensus:Consensus", "program": PROGRAM, "fmu": fmu}
-    result = written(laws[carrier], driver=driver)
+@pytest.mark.parametrize("carrier", ["class", "program", "fmu", "fmi3"])
+def test_every_carrier_of_a_law_gives_the_same_history(
+    carrier: str, driver: Driver, request: pytest.FixtureRequest
+) -> None:
+    """The paper's law built in, as a class, a program, an FMU of FMI 2 and of FMI 3: one hash, in one process or 10."""
+    laws: dict[str, Any] = {"class": "agents.laws.consensus:Consensus", "program": PROGRAM}
+    result = written(laws[carrier] if carrier in laws else request.getfixturevalue(carrier), driver=driver)
 
     assert result.sha256 == islanding(short=True).sha256
     assert not list(result.events[result.events["kind"] == "law"]["text"])
@@ -58,3 +72,35 @@ def test_an_fmu_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None
     assert slower.sha256 == gp.load("islanding").replace({"gains.k_p": 0.0014, **SHORT}).run("IV").sha256
     with pytest.raises(gp.ScenarioError, match=re.escape('case.IV.law.k_pp: unknown parameter; did you mean "k_p"?')):
         written({**fmu, "k_pp": 1.0})
+
+
+def test_an_fmu_of_fmi_3_has_its_parameters_and_begins_anew(fmi3: dict[str, str]) -> None:
+    """A parameter reaches it, also after the reset that a second time on the grid brings."""
+    k_p = {"gains.k_p": 0.0014}
+    twice = [("event1", 1.0, "open"), ("back", 1.2, "close"), ("event2", 1.4, "open")]
+    events = [{"label": label, "t_s": t, action: ["13-152"]} for label, t, action in twice]
+    scenario = gp.load("islanding").replace({**SHORT, "time.end_s": 1.8, "event": events})
+
+    carried = scenario.replace({"case.IV.law": {**fmi3, "k_p": 0.0014}}).run("IV")
+    assert carried.sha256 == scenario.replace(k_p).run("IV").sha256 != scenario.run("IV").sha256
+
+
+@pytest.mark.parametrize(
+    ("kind", "library", "said"),
+    [
+        ("Boolean", b"", f"{NAME}.fmu has own_leader as Boolean; declare it as a scalar Float64"),
+        ("Float64", b"no library", f"law {NAME}.fmu cannot be instantiated: "),
+    ],
+)
+def test_an_fmu_that_cannot_be_a_law_is_told_before_the_run(
+    kind: str, library: bytes, said: str, tmp_path: Path
+) -> None:
+    """A variable of another type, and a library that cannot be loaded: one line at its key, and no traceback."""
+    fmpy, here = pytest.importorskip("fmpy"), Path.cwd()
+    with zipfile.ZipFile(tmp_path / f"{NAME}.fmu", "w") as packed:
+        packed.writestr("modelDescription.xml", described(kind))
+        packed.writestr(f"binaries/{fmpy.platform_tuple}/{NAME}{fmpy.sharedLibraryExtension}", library)
+
+    with pytest.raises(gp.ScenarioError, match=re.escape(f"case.IV.law.fmu: {said}")):
+        written({"fmu": f"{NAME}.fmu", "folder": str(tmp_path)})
+    assert Path.cwd() == here

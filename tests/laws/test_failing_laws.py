@@ -97,6 +97,7 @@ def _text(path: Path) -> str:
     ({"command": ["ls", "a\0"]}, r"case.IV.law.command: has the character 0 in it"),
     ({"command": ["ls"], "folder": "/nowhere"}, r"case.IV.law.folder: there is no folder /nowhere"),
     ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: P_set_min = 1 pu is above P_set_max = 0.5"),
+    ({"command": ["ls"], "P_set_max": "much"}, r'case.IV.law.P_set_max: must be a number, got "much"'),
     ({"command": "./nothing"}, r"case.IV.law.command: must be a list of texts, the program first"),
     ({"fmu": "x.fmu"}, r"case.IV.law.fmu: there is no file x.fmu; write its path, seen from the scenario"),
     ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
@@ -109,6 +110,11 @@ def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said
 
     assert len(refused.value.mistakes) == 1
     assert re.search(said, refused.value.mistakes[0]), refused.value.mistakes
+
+
+def test_a_program_may_have_any_parameter() -> None:
+    """Also one that is called as something else of the class Law."""
+    gp.load("islanding").replace({"case.IV.law": {"command": ["ls"], "source": 1, "step": 2, "k": 3}, **SHORT})
 
 
 def test_all_mistakes_of_a_law_come_at_once() -> None:

@@ -1,0 +1,89 @@
+"""The variables by which an FMU carries a law, and what is wrong with those that a file declares.
+
+All are scalar, Real (FMI 2) or Float64 (FMI 3), by these names; an FMU declares those that it uses:
+
+- inputs: own_P, own_e and so on (`Own`); neighbours, how many there are; neighbour_1_P_set and so on (`Neighbour`),
+  neighbour_1_shared_NAME for what a neighbour shares, for as many neighbours as the FMU has room for;
+- outputs: P_set, V_set, and send (1 or 0), shared_NAME;
+- parameters: those of the law, as a scenario gives them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from wire.nearest import suggestion
+from wire.parameters import objections
+from wire.printable import printable
+
+OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
+"""Inputs of the own inverter."""
+
+OF_NEIGHBOUR = tuple(name for name in Neighbour._fields if name not in ("name", "shared"))
+"""Inputs of each neighbour, without their prefix."""
+
+NEIGHBOUR = re.compile(r"neighbour_([1-9][0-9]{0,3})_(?:shared_)?(\w+)")
+"""Name of an input of a neighbour: its place, and what it is."""
+
+
+def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what keeps an FMU from carrying a law, each with the key of the scenario that it concerns."""
+    if not path.is_file():
+        return [("fmu", f"there is no file {path.name}; write its path, seen from the scenario")]
+    try:
+        import fmpy
+    except ModuleNotFoundError:
+        return [("fmu", "an FMU needs the package fmpy; install it: pip install 'gridpeers[fmu]'")]
+    try:
+        description = fmpy.read_model_description(str(path))
+        platforms = fmpy.supported_platforms(str(path))
+    except Exception as error:  # a file may be anything
+        return [("fmu", f"{path.name} is no FMU: {printable(f'{type(error).__name__}: {error}', 200)}")]
+    wrong = []
+    if description.coSimulation is None:
+        wrong.append(f"{path.name} is for model exchange; export it for co-simulation")
+    own = {fmpy.platform, fmpy.platform_tuple}
+    if not own & set(platforms):
+        wrong.append(f"{path.name} is for {', '.join(platforms) or 'no platform'}, and this is {fmpy.platform}")
+    inputs, outputs = named(description, "input"), named(description, "output")
+    for name in inputs:
+        if name not in (*OWN, "T", "neighbours") and not _is_of_neighbour(name):
+            known = (*OWN, "T", "neighbours", *(f"neighbour_1_{field}" for field in OF_NEIGHBOUR))
+            wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
+    wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
+    settable = named(description, "parameter")
+    real = "Float64" if is_fmi3(description) else "Real"
+    used = inputs | outputs | {name: variable for name, variable in settable.items() if name in parameters}
+    for name, variable in used.items():
+        if variable.type != real or variable.dimensions:
+            array = "an array of " if variable.dimensions else ""
+            wrong.append(f"{path.name} has {name} as {array}{variable.type}; declare it as a scalar {real}")
+    unknown = [name for name in parameters if name not in (*settable, *LIMITS)]
+    found = [("fmu", text) for text in wrong]
+    found += [(name, f"unknown parameter; {suggestion(name, [*settable, *LIMITS], 'parameters')}") for name in unknown]
+    found += [
+        (name, f"must be a number, got {value!r}")
+        for name, value in parameters.items()
+        if name in settable and (isinstance(value, bool) or not isinstance(value, int | float))
+    ]
+    found += objections(Law, limits_in(parameters))
+    return found
+
+
+def is_fmi3(description: Any) -> bool:
+    """Whether an FMU is one of FMI 3, which has other names for types and functions than FMI 2."""
+    return str(description.fmiVersion).startswith("3")
+
+
+def _is_of_neighbour(name: str) -> bool:
+    match = NEIGHBOUR.fullmatch(name)
+    return match is not None and ("_shared_" in name or match[2] in OF_NEIGHBOUR)
+
+
+def named(description: Any, causality: str) -> dict[str, Any]:
+    """Return the variables of a causality, e.g. the inputs, by name."""
+    return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
