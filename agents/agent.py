@@ -226,10 +226,11 @@ class Agent:
             self._follows_P.begin()
             self._follows_V.begin()
             self._law_runs = False
-        around = self._around(measurement.t, neighbours, ages)
+        counted = self._counted(measurement.t, neighbours, ages)  # on hold too: what is usual of a link is learnt there
         shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
+            around = [neighbour_of(self._known[name], self._heard[name], *of) for name, of in counted.items()]
             try:
                 if not self._law_runs:
                     begun(self._law, own)
@@ -303,14 +304,13 @@ class Agent:
             V_saturated=V_saturated,
         )
 
-    def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
-        """Return the neighbours that count as the law sees them."""
+    def _counted(
+        self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None
+    ) -> dict[str, tuple[float, float]]:
+        """Return age (s) and weight of the last state of each neighbour that counts."""
         heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
         aged = {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
-        return [
-            neighbour_of(self._known[name], heard[name], aged[name], weight)
-            for name, weight in self._worth.at_tick(aged).items()
-        ]
+        return {name: (aged[name], weight) for name, weight in self._worth.at_tick(aged).items()}
 
     def _in_vain(self, measurement: Measurement, e: float) -> tuple[int, int]:
         """Sides on which P and V have long been off (3), (7) and (4), (8) with the set-points that the plant holds."""
