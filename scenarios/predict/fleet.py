@@ -41,6 +41,8 @@ class Fleet:
     """Adjacency c_ij (1), row = receiver, as `agents.topology.adjacency` gives it."""
     acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which run the secondary law; the others keep their set-points. All, if left out."""
+    shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """Which have an agent: the sharing index is theirs, as in a run (`Plates.shares`). All, if left out."""
     s: Floats = field(default_factory=lambda: np.zeros(0))
     """Ratings (W); all alike, if left out."""
     m_p: Floats = field(default_factory=lambda: np.zeros(0))
@@ -60,11 +62,10 @@ class Fleet:
 
     def __post_init__(self) -> None:
         n = len(self.names)
-        for name, value in (("acts", np.ones(n, bool)), ("s", np.ones(n)), ("m_p", np.full(n, 0.01))):
+        defaults = {"acts": True, "shares": True, "s": 1.0, "m_p": 0.01, "m_q": 0.05}
+        for name, value in defaults.items():
             if not getattr(self, name).size:
-                object.__setattr__(self, name, value)
-        if not self.m_q.size:
-            object.__setattr__(self, "m_q", np.full(n, 0.05))
+                object.__setattr__(self, name, np.full(n, value))
         if self.A.shape != (n, n):
             raise ValueError(f"A must be {n} x {n}, one row per name, got {self.A.shape}")
 
@@ -103,7 +104,7 @@ class Fleet:
     def part(self, which: NDArray[np.bool_]) -> Fleet:
         """The fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
         at = np.flatnonzero(which)
-        arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "s", "m_p", "m_q")}
+        arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
         return Fleet(
             names=tuple(self.names[i] for i in at.tolist()),
             A=self.A[np.ix_(at, at)],
@@ -165,6 +166,7 @@ def fleet_of(
         GFM=GFM,
         A=_adjacency(control, rows, without),
         acts=np.array([control.acts(name, row.kind) and name not in without for name, row in rows.items()], bool),
+        shares=np.array([name not in without for name in rows], bool),
         s=np.array([row.P_rated for row in rows.values()]),
         m_p=np.array([row.m_p for row in rows.values()]),
         m_q=np.array([row.m_q for row in rows.values()]),

@@ -67,8 +67,10 @@ def _words(fleet: Fleet, found: Modes) -> str:
     if len(apart) > 1:
         text += f"The graph is not connected; its {len(apart)} parts ({' | '.join(' '.join(part) for part in apart)}) "
         text += "agree on power within themselves only, so sharing among all never comes. "
-    if acting < fleet.n:
-        text += f"The other {fleet.n - acting} keep their set-points and take no part in sharing. "
+    if idle := int((fleet.shares & ~fleet.acts).sum()):
+        text += f"The other {idle} with an agent keep their set-points and take no part in sharing. "
+    if agentless := [name for name, shares in zip(fleet.names, fleet.shares, strict=True) if not shares]:
+        text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
     return text.rstrip()
 
 

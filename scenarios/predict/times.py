@@ -150,22 +150,24 @@ def predicted_times(
     slowest = max(loop.spectral_radius, 1e-3)
     count = math.ceil(math.log(1e-5) / math.log(slowest)) + sum(loop.matrix.shape) // max(case.n, 1)
     count = min(max(count, round(2.0 / case.T_c)), round(HORIZON / case.T_c))
-    weight = case.weight
-    nominal = step.load_pu * float(weight @ case.m_p)
+    nominal = step.load_pu * float(case.weight @ case.m_p)
     start = np.where([name in step.joining for name in case.names], 0.0, step.start_pu * case.m_p)
     path = loop.run(count, start, nominal, islanding=step.islanding)
     restore = _for_good(path.t, np.abs(path.e) * case.f_nom < F_BAND)
-    share = _for_good(path.t, sharing_index(path, weight) < MPSI_BAND)
+    share = _for_good(path.t, sharing_index(path, case) < MPSI_BAND)
     short = _beyond_limits(case, path)
     if short:
         return Times(restore_s=None, share_s=None, stable=True, note=short)
     return Times(restore_s=restore, share_s=share, stable=True, note=_note(case, restore, share))
 
 
-def sharing_index(path: Path, weight: Floats) -> Floats:
-    """MPSI of each tick, (16)."""
-    eta = path.power @ weight
-    return np.asarray(np.mean(np.abs(path.power / eta[:, None] - 1.0), axis=1))
+def sharing_index(path: Path, case: Fleet) -> Floats:
+    """MPSI of each tick, (16), over the inverters that have an agent; nan where nobody has one."""
+    if not case.shares.any():
+        return np.full(path.t.shape, np.nan)
+    power, weight = path.power[:, case.shares], case.weight[case.shares]
+    eta = power @ (weight / weight.sum())
+    return np.asarray(np.mean(np.abs(power / eta[:, None] - 1.0), axis=1))
 
 
 def _each(value: float | Mapping[Key, float], rule: Callable[[float], int]) -> int | dict[Key, int]:
@@ -198,8 +200,9 @@ def _note(case: Fleet, restore: float | None, share: float | None) -> str:
         return "no secondary control: droop alone keeps its error"
     if restore is None and not case.leads.any():
         return "no leader: nobody corrects the frequency"
-    if share is None and not case.acts.all():
-        return f"{int((~case.acts).sum())} of {case.n} run no secondary law: their power stays"
+    idle = case.shares & ~case.acts
+    if share is None and idle.any():
+        return f"{int(idle.sum())} of {int(case.shares.sum())} with an agent run no secondary law: their power stays"
     if share is None and len(groups(case)) > 1:
         return f"the graph falls into {len(groups(case))} groups, which do not agree on a share"
     return f"not within {HORIZON:g} s"

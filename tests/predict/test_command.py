@@ -35,7 +35,7 @@ def test_every_case_is_told_within_a_hundred_columns_and_without_nan(elsewhere: 
     assert not re.search(r"\b(nan|inf)\b", text)
     assert "No secondary control" in blocks["I"]
     assert "their limit is 1.00 pu" in blocks["II"]
-    assert "The other 6" in " ".join(blocks["III"].split())
+    assert "The other 6 with an agent" in " ".join(blocks["III"].split())
     assert "restored in 0.64 s" in blocks["IV"]
     assert "its 4 parts (inv1 inv2 inv3 | inv4 inv5 inv6 | inv7 | inv8 inv9)" in " ".join(blocks["apart"].split())
     assert re.search(r"sharing 2 % +never", blocks["apart"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import gridpeers as gp
 from scenarios.predict.limits import delay_limit
 from scenarios.predict.loads import load_steps
 from scenarios.predict.sensitivity import Sensitivity, sensitivity
@@ -14,6 +15,7 @@ from scenarios.spec import load_scenario
 from tests.predict.graphs import fleet, on_the_plant, scenario_of
 
 T_C = 0.02
+ALL_BUT_9 = [f"inv{i}" for i in range(1, 9)]
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +109,17 @@ def test_a_sensitivity_is_a_law_of_the_network(answers: Sensitivity) -> None:
     assert (answers.S[own] > 0.0).all()
     assert (answers.S[~own] < 0.0).all()
     assert (answers.H > 0.0).all()
+
+
+def test_an_inverter_without_agent_counts_neither_in_the_run_nor_in_its_prediction() -> None:
+    """It stays on droop: the others restore the frequency and share alike, and both come when predicted."""
+    scenario = gp.load("islanding").replace({"case.IV.without_agent": ["inv9"], "paper": ""})
+    prediction = gp.predict(scenario, "IV", voltage=False)
+    measured = scenario.replace({"gains.alpha": 0.0, "gains.beta_GFM": 0.0, "gains.beta_GFL": 0.0}).run("IV").metrics
+
+    assert prediction.times["t_restore_s"].tolist() == pytest.approx(measured["t_restore_s"].tolist(), abs=2.0 * T_C + 1e-9)
+    assert "8 of 9 inverters run the law" in str(prediction)
+    assert "inv9 without an agent" in " ".join(str(prediction).split())
+    all_agents = scenario.replace({"case.IV.without_agent": None, "case.IV.secondary": ALL_BUT_9})
+    listed = gp.predict(all_agents, "IV", voltage=False)
+    assert set(listed.times["note"]) == {"1 of 9 with an agent run no secondary law: their power stays"}

@@ -78,7 +78,7 @@ def predicted(told: Told, case: str, length: float) -> tuple[Floats, tuple[Float
     loop = Loop(fleet=without(fleet, cut) if expires else fleet, ticks=ticks)
     nominal = load.load_pu * float(fleet.weight @ fleet.m_p)
     path = loop.run(round(length / fleet.T_c), load.start_pu * fleet.m_p, nominal, islanding=load.islanding)
-    return path.t, (told.feeder.f_nom * (1.0 + path.e), sharing_index(path, fleet.weight))
+    return path.t, (told.feeder.f_nom * (1.0 + path.e), sharing_index(path, fleet))
 
 
 def groups_of(told: Told, case: str) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -89,9 +89,7 @@ def _said(swept: Swept, row: Row) -> tuple[float, float]:
 def fleet_on(swept: Swept, edges: str) -> Fleet:
     """The inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
     case = next(iter(swept.base.cases))
-    whole: Any = swept.fleet(case)
     first, rest = zip(*(edge.split("-") for edge in edges.split()), strict=True)
     control = Control(secondary="all", graph="links", links=tuple(zip(first, rest, strict=True)))
     rows = {inverter.name: inverter for inverter in swept.feeder.inverters}
-    fields = {name: getattr(whole, name) for name in ("GFM", "s", "m_p", "m_q", "gains", "T_c", "gfm", "gfl")}
-    return Fleet(names=whole.names, A=np.array(adjacency(control, rows)), **fields)
+    return replace(swept.fleet(case), A=np.array(adjacency(control, rows)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -91,7 +91,4 @@ def without(fleet: Fleet, links: set[tuple[str, str]]) -> Fleet:
     A = np.array(fleet.A)
     for src, dst in links:
         A[fleet.names.index(dst), fleet.names.index(src)] = 0.0
-    fields = {
-        name: getattr(fleet, name) for name in ("GFM", "acts", "s", "m_p", "m_q", "gains", "f_nom", "T_c", "gfm", "gfl")
-    }
-    return Fleet(names=fleet.names, A=A, **fields)
+    return replace(fleet, A=A)
