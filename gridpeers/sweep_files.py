@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.spec.catalogue import SWEEPS
+from scenarios.catalogue_files import SWEEPS
 from scenarios.spec.loading import read_toml
 from scenarios.sweep.file import Plan, read_sweep
 

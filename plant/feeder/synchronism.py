@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from plant.config import SyncCheck
 from plant.dynamics import Dynamics
-from plant.feeder.protection import F_BASE
 from plant.network import Network
+from plant.trip_settings import F_BASE
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
 """Up to which rating (VA): frequency (Hz), voltage (pu), angle (deg)."""

@@ -1,28 +1,12 @@
-"""The files that come with gridpeers, and how one of them, or one of the user's own, is found."""
+"""How a file of the catalogue, or one of the user's own, is found."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from scenarios.catalogue_files import names_in
 from scenarios.spec.mistakes import ScenarioError
 from wire.nearest import suggestion
-
-CATALOGUE = Path(__file__).parents[1] / "catalogue"
-"""Folder of the scenarios that come with gridpeers."""
-
-SWEEPS = CATALOGUE / "sweeps"
-"""Folder of the sweeps that come with gridpeers."""
-
-
-def names_in(folder: Path) -> tuple[str, ...]:
-    """Names of the files of a catalogue.
-
-    Examples
-    --------
-    >>> names_in(SWEEPS)[:2]
-    ('communication-delay', 'delay')
-    """
-    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
 def find_file(name: str, folder: Path, what: str) -> Path:
@@ -44,6 +28,7 @@ def find_file(name: str, folder: Path, what: str) -> Path:
 
     Examples
     --------
+    >>> from scenarios.catalogue_files import CATALOGUE, SWEEPS
     >>> find_file("islanding", CATALOGUE, "scenario").name
     'islanding.toml'
     >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS

@@ -12,9 +12,10 @@ import msgspec
 
 from plant.equipment import F_NOM, Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
+from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.spec.agentless import check_agentless
 from scenarios.spec.benchmark import check_benchmark, with_benchmark_folder
-from scenarios.spec.catalogue import CATALOGUE, find_file, names_in
+from scenarios.spec.catalogue import find_file
 from scenarios.spec.changes import as_in, check_changes
 from scenarios.spec.checks import (
     check_cases,

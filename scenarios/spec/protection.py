@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plant.feeder.protection import DEFAULTS, defaults
+from plant.trip_settings import DEFAULTS, defaults
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import Scenario
 from wire.nearest import suggestion

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from agents.config import Control
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
@@ -13,7 +14,6 @@ from scenarios.results.numbers import Ran as RanScenario
 from scenarios.results.numbers import metrics_json
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.loading import CATALOGUE
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
 from tests.toy.runs import FleetRun, first_difference

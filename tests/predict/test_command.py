@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.spec.loading import CATALOGUE
+from scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

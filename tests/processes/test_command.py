@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.spec.loading import CATALOGUE
+from scenarios.catalogue_files import CATALOGUE
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 HEAD = ISLANDING.replace('paper = "islanding"', "").partition('[[event]]\nlabel = "event2"')[0]

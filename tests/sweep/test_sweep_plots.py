@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.spec.loading import CATALOGUE
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.sweep.choice import choose, values
 from scenarios.sweep.columns import FATE
 from scenarios.sweep.plots import _curves, _heat_maps, draw_all

@@ -28,13 +28,12 @@ def list_() -> None:
 
     Example:  gridpeers list
     """
-    from scenarios.spec import catalogue
+    from scenarios.catalogue_files import summaries
 
-    names = catalogue()
-    width = max(map(len, names), default=0)
-    for name in names:
-        spec, _ = load(name)
-        typer.echo(f"{name:{width}}  {spec.title}. Cases: {', '.join(spec.cases)}")
+    found = summaries()
+    width = max(map(len, found), default=0)
+    for name, (title, cases) in found.items():
+        typer.echo(f"{name:{width}}  {title}. Cases: {', '.join(cases)}")
 
 
 def check(

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import msgspec
 
 from plant.equipment import Feeder
+from scenarios.catalogue_files import SWEEPS, names_in
 from scenarios.duration import duration
 from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario
-from scenarios.spec.catalogue import SWEEPS, find_file, names_in
+from scenarios.spec.catalogue import find_file
 from scenarios.spec.loading import read_toml
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.ports import endpoint
 from scenarios.results.record import Tape
 from scenarios.spec import load_scenario
-from scenarios.spec.catalogue import CATALOGUE, names_in
 from scenarios.spec.configs import configs
 
 FILE = Path(__file__).parent / "hashes.toml"

@@ -13,8 +13,8 @@ import pytest
 import typer
 
 from gridpeers.cli.app import app
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
-from scenarios.spec.loading import CATALOGUE
 from tests.command_line import invoke
 
 README = Path(__file__).parents[3] / "README.md"

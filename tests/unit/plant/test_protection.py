@@ -8,7 +8,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from plant.config import Protection
-from plant.feeder.protection import ATTEMPTS, DEFAULTS, Recovery, Relays, Tripped
+from plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
+from plant.trip_settings import DEFAULTS
 
 H = 0.002
 ON = np.array([True])

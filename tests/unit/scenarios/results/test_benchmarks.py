@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.results.benchmarks import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
 from scenarios.results.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import Report, plain
 from scenarios.spec import ScenarioError, load_scenario
-from scenarios.spec.loading import CATALOGUE, check_tables
+from scenarios.spec.loading import check_tables
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.writing import to_toml
 

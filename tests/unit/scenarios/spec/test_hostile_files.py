@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gridpeers.cli.usage import fail
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
-from scenarios.spec.catalogue import CATALOGUE
 from tests.scenario_files import mistakes, written
 
 BASE = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from agents.config import Gains, Handling
 from plant.config import GfmParameters, SwitchEvent, SyncCheck
 from plant.tables.read import DATA
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import catalogue, load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.writing import to_toml
 from tests.scenario_files import written
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.writing import to_toml
 from tests.scenario_files import mistakes, written
 

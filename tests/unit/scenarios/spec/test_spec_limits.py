@@ -10,9 +10,9 @@ from plant.config import PlantSettings, PowerLimit, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
 from plant.tables import read_feeder
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
 from scenarios.spec.limits import limits_of
-from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.writing import to_toml
 from tests.scenario_files import mistakes, written
 

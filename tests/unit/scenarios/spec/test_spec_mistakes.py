@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from plant.tables.read import DATA
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import ScenarioError, load_scenario
-from scenarios.spec.loading import CATALOGUE
 from tests.scenario_files import mistakes
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

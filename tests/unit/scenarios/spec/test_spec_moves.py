@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from plant.config import Move
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.live.setup import Wishes, set_up
 from scenarios.results.moves import as_they_came, late_moves
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.moves import inverters_of
 from scenarios.spec.writing import to_toml
 from tests.scenario_files import mistakes, written

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from plant.tables.read import DATA
+from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
-from scenarios.spec.loading import CATALOGUE
 from scenarios.spec.supply import supply_notes
 from tests.command_line import invoke
 from tests.scenario_files import mistakes, written

@@ -1,0 +1,28 @@
+"""Default trip settings of IEEE 1547-2018. Pure, and without numpy: a scenario is checked against them."""
+
+from __future__ import annotations
+
+F_BASE = 60.0
+"""Nominal frequency (Hz) for which the standard gives its settings; the defaults go in proportion to another one."""
+
+_FREQUENCY = {"OF2": (62.0, 0.16), "OF1": (61.2, 300.0), "UF1": (58.5, 300.0), "UF2": (56.5, 0.16)}
+
+DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
+    "II": {"OV2": (1.20, 0.16), "OV1": (1.10, 2.0), "UV1": (0.70, 10.0), "UV2": (0.45, 0.16)} | _FREQUENCY,
+    "III": {"OV2": (1.20, 0.16), "OV1": (1.10, 13.0), "UV1": (0.88, 21.0), "UV2": (0.50, 2.0)} | _FREQUENCY,
+}
+"""Default trip settings, threshold (pu, or Hz at 60 Hz) and clearing time (s): IEEE 1547-2018, Tables 12, 13 and 18."""
+
+
+def defaults(category: str, f_nom: float) -> dict[str, tuple[float, float]]:
+    """Default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
+
+    Examples
+    --------
+    >>> defaults("III", 60.0)["OF2"], defaults("III", 50.0)["UF1"]
+    ((62.0, 0.16), (48.75, 300.0))
+    """
+    scale = f_nom / F_BASE
+    return {
+        name: (value * scale if name[1] == "F" else value, time) for name, (value, time) in DEFAULTS[category].items()
+    }

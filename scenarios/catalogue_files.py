@@ -1,0 +1,35 @@
+"""The files that come with gridpeers, and a line on each scenario. It imports nothing, so that `list` comes at once."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+CATALOGUE = Path(__file__).parent / "catalogue"
+"""Folder of the scenarios that come with gridpeers."""
+
+SWEEPS = CATALOGUE / "sweeps"
+"""Folder of the sweeps that come with gridpeers."""
+
+
+def names_in(folder: Path) -> tuple[str, ...]:
+    """Names of the files of a catalogue.
+
+    Examples
+    --------
+    >>> names_in(SWEEPS)[:2]
+    ('communication-delay', 'delay')
+    """
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
+
+
+def summaries() -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Title and cases of every scenario of the catalogue, read without a check, which takes longer.
+
+    Examples
+    --------
+    >>> summaries()["plug-n-play"]
+    ('Inverter 2 leaves at 2 s and returns at 3 s', ('I', 'IV'))
+    """
+    tables = {name: tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) for name in names_in(CATALOGUE)}
+    return {name: (table["title"], tuple(table["case"])) for name, table in tables.items()}
