@@ -15,7 +15,6 @@ from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.spec.agentless import check_agentless
 from scenarios.spec.benchmark import check_benchmark, with_benchmark_folder
-from scenarios.spec.catalogue import find_file
 from scenarios.spec.changes import as_in, check_changes
 from scenarios.spec.checks import (
     check_cases,
@@ -26,6 +25,7 @@ from scenarios.spec.checks import (
     check_switches,
     check_times,
 )
+from scenarios.spec.file_lookup import find_file
 from scenarios.spec.graph import check_graphs, with_graph_folders
 from scenarios.spec.law import check_laws, with_law_folders
 from scenarios.spec.limits import check_limits

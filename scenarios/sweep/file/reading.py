@@ -13,7 +13,7 @@ from plant.equipment import Feeder
 from scenarios.catalogue_files import SWEEPS, names_in
 from scenarios.duration import duration
 from scenarios.spec import Scenario, ScenarioError, find_scenario, load_scenario
-from scenarios.spec.catalogue import find_file
+from scenarios.spec.file_lookup import find_file
 from scenarios.spec.loading import read_toml
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.moves import inverters_of
