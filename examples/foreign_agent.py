@@ -1,8 +1,8 @@
 """An agent that is not ours: it joins a run with `eclipse-zenoh` and `msgpack` alone, as docs/protocol.md says.
 
-Real time: `python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (endpoint, run, inverter); the plant tells the rest.
-Either kind of time: `python foreign_agent.py < inv2.json`, which holds what the plant would tell. It runs the paper's
-law in the arithmetic of that page: in simulated time the history is ours to the byte. `[handling]` must be the default.
+`python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (real time: endpoint, run, inverter; the plant tells the rest), or
+`python foreign_agent.py < inv2.json`, which holds what the plant would tell. It runs the paper's law, in simulated time
+to the byte, with the default `[handling]`. It sends no AgentStatus: `gridpeers watch` knows of it what the plant knows.
 """
 
 import json
