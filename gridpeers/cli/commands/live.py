@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from gridpeers.cli.commands.link import link
 from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, chosen, fail, load, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
     from scenarios.live.hand import Ended
 
-_Scenario = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
-]
 _Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
 _Listen = Annotated[
     str,
@@ -49,8 +48,8 @@ def register(app: typer.Typer) -> None:
     app.add_typer(link, name="link")
 
 
-def plant(
-    scenario: _Scenario,
+def _start(
+    scenario: ScenarioName,
     case: _Case = "",
     run: Run = RUN,
     listen: _Listen = ENDPOINT,
@@ -61,29 +60,73 @@ def plant(
     strict: _Strict = False,
     out: _Out = None,
     record: _Record = None,
+    *,
+    agents: bool,
 ) -> None:
+    """Run the plant, with its agents or without; its arguments are the options of both commands."""
+    spec, feeder = load(scenario)
+    require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
+    with told():
+        from scenarios.live.book import Book, check_new
+        from scenarios.live.folders import BY_HAND, folders
+        from scenarios.live.hand import all_here, plant_here, say
+        from scenarios.live.numbers.account import Account
+        from scenarios.live.numbers.ending import conclude
+        from scenarios.live.place import check_endpoint, check_run, claim
+        from scenarios.live.setup import Wishes, chosen_case, real_nodes, set_up
+        from scenarios.live.visit import check_alone
+        from scenarios.results.numbers import Ran
+
+        check_run(run)
+        check_new("--record", record)
+        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
+        spec = chosen(spec, chosen_case(spec, case), None)
+        wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
+        endpoint = claim("--listen", listen)
+        check_alone(run, beyond)
+        config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
+        watch_readers(quits=False)
+        with folders(out, spec) as kept:
+            say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
+            book = Book(spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml")
+            account = None
+            if kept.whole is not None:
+                ran = Ran(scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed)
+                account = Account(ran, book)
+            if left := real_nodes(spec) if not agents else "":
+                say(left)
+            if agents:
+                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
+                ended = all_here(config, everyone, kept.logs, kept.record, book, account)
+            else:
+                ended = plant_here(config, kept.record, book, account)
+            if account is not None:
+                ended = conclude(ended, account, kept)
+        _finish(ended)
+
+
+def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `_start` that a person chooses, as typer reads them."""
+    signature = inspect.signature(_start, eval_str=True)
+    chosen_by_people = [one for one in signature.parameters.values() if one.name != "agents"]
+    command.__signature__ = signature.replace(parameters=chosen_by_people)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in chosen_by_people}
+    return command
+
+
+@_takes_options_of_start
+def plant(**options: Any) -> None:
     """Run the plant of a scenario in this terminal, in real time. Agents come from others.
 
     Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
     Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
     """
-    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, record, agents=False)
+    _start(**options, agents=False)
 
 
-def up(
-    scenario: _Scenario,
-    case: _Case = "",
-    run: Run = RUN,
-    listen: _Listen = ENDPOINT,
-    connect: _Beyond = None,
-    speed: _Speed = 1.0,
-    wait: _WaitForAgents = 30.0,
-    duration: _For = None,
-    strict: _Strict = False,
-    out: _Out = None,
-    record: _Record = None,
-) -> None:
+@_takes_options_of_start
+def up(**options: Any) -> None:
     """Run the plant and all its agents at once, in real time.
 
     It runs until `gridpeers down` or Ctrl-C.
@@ -92,7 +135,7 @@ def up(
 
     Example:  gridpeers up islanding --speed 0.5
     """
-    _start(scenario, case, run, listen, connect, speed, wait, duration, strict, out, record, agents=True)
+    _start(**options, agents=True)
 
 
 def agent(
@@ -228,62 +271,6 @@ def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
         typer.echo(ask(visit, "down"))
         if not has_ended(visit):
             fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)
-
-
-def _start(
-    scenario: str,
-    case: str,
-    run: str,
-    listen: str,
-    connect: list[str] | None,
-    speed: float,
-    wait: float,
-    duration: float | None,
-    strict: bool,
-    out: Path | None,
-    record: Path | None,
-    *,
-    agents: bool,
-) -> None:
-    spec, feeder = load(scenario)
-    require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
-    with told():
-        from scenarios.live.book import Book, check_new
-        from scenarios.live.folders import BY_HAND, folders
-        from scenarios.live.hand import all_here, plant_here, say
-        from scenarios.live.numbers.account import Account
-        from scenarios.live.numbers.ending import conclude
-        from scenarios.live.place import check_endpoint, check_run, claim
-        from scenarios.live.setup import Wishes, chosen_case, real_nodes, set_up
-        from scenarios.live.visit import check_alone
-        from scenarios.results.numbers import Ran
-
-        check_run(run)
-        check_new("--record", record)
-        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
-        spec = chosen(spec, chosen_case(spec, case), None)
-        wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
-        endpoint = claim("--listen", listen)
-        check_alone(run, beyond)
-        config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
-        watch_readers(quits=False)
-        with folders(out, spec) as kept:
-            say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
-            book = Book(spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml")
-            account = None
-            if kept.whole is not None:
-                ran = Ran(scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed)
-                account = Account(ran, book)
-            if left := real_nodes(spec) if not agents else "":
-                say(left)
-            if agents:
-                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
-                ended = all_here(config, everyone, kept.logs, kept.record, book, account)
-            else:
-                ended = plant_here(config, kept.record, book, account)
-            if account is not None:
-                ended = conclude(ended, account, kept)
-        _finish(ended)
 
 
 def _finish(ended: Ended) -> None:

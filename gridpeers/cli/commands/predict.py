@@ -6,13 +6,11 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, chosen, fail, load, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, ScenarioName, chosen, fail, load, refuse, require
 
 
 def predict(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
-    ],
+    scenario: ScenarioName,
     case: Annotated[
         str | None, typer.Option(metavar="NAMES", help="Cases to predict, e.g. III,IV; all when left out.")
     ] = None,

@@ -8,7 +8,18 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, chosen, fail, load, refuse, require
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    PASSED,
+    ScenarioName,
+    chosen,
+    fail,
+    load,
+    refuse,
+    require,
+)
 
 
 class DriverName(StrEnum):
@@ -26,9 +37,7 @@ class ClockName(StrEnum):
 
 
 def run(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
-    ],
+    scenario: ScenarioName,
     driver: Annotated[
         DriverName,
         typer.Option(help="processes: a plant process and one process per agent, over Zenoh; inprocess: all in one."),
