@@ -165,6 +165,8 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     control: Control
     deadline: float
     """Longest wait for any message (s). Wall-clock: for the plant's first sign of life; 0 is for ever."""
+    plant_wait: float = 0.0
+    """Simulated time: longest wait (s) for the first sign of life of the plant, which may have to compile."""
     connect: tuple[str, ...]
     """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)

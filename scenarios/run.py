@@ -73,8 +73,8 @@ class Request(Ran):
     driver: Driver
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
-    figures: bool = True
-    """Whether the figures are drawn."""
+    lasting: bool = True
+    """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
 
 
 def run(request: Request, progress: Progress) -> Report:
@@ -172,7 +172,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     own = own_measures(scenario, request.feeder, plates, histories, opened, saved)
     found = dataclasses.replace(found, own=own)
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
-    if request.figures:
+    if request.lasting:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
     report = Report(
@@ -182,7 +182,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         verdicts=(*judge(found, benchmark.claims), *(() if disturbed else judged(found, claims_of(scenario)))),
         benchmark=benchmark,
         notes=[*notes, *_notes(recorded, request.clock)],
-        folder=shown(folder) + "/",
+        folder=shown(folder) + "/" if request.lasting else "",
     )
     write_whole(folder / "report.txt", plain(report))
     set_status(folder, "complete")

@@ -101,8 +101,9 @@ class AgentSide(Side):
         return self._patience.until
 
     def start(self, now: float) -> None:
-        """Begin to wait for the plant."""
+        """Begin to wait for the plant, which is built first."""
         self._patience.renew(now)
+        self._patience.until = max(self._patience.until or 0.0, now + self._config.plant_wait)
 
     def missing(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""

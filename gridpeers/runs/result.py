@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -82,7 +83,7 @@ class Results(Mapping[str, "Result"]):
 
     @property
     def report(self) -> str:
-        """What the command `gridpeers run` prints at the end."""
+        """What the command `gridpeers run` prints at the end; it names the folder if that stays."""
         return _read(self.folder / "report.txt", lambda file: file.read_text(encoding="utf-8"))
 
     @property
@@ -103,8 +104,8 @@ class Results(Mapping[str, "Result"]):
         Parameters
         ----------
         figure : str
-            Name of a figure of the run folder: "overview", "frequency", "MPSI", "voltage", "MQSI", "power_GFM",
-            "power_GFL", and those that belong to what happens in this scenario.
+            Name of a figure of the run folder: "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage",
+            "power_GFM", "power_GFL", and those that belong to what happens in this scenario.
 
         Raises
         ------
@@ -136,8 +137,8 @@ class Results(Mapping[str, "Result"]):
         folder = empty_folder(folder)
         try:
             shutil.copytree(self.folder, folder, dirs_exist_ok=True)
-            text = self.report.replace(f"Results: {shown(self.folder)}/\n", f"Results: {shown(folder)}/\n")
-            write_whole(folder / "report.txt", text)
+            text = re.sub(r"\nResults: [^\n]*/\n\Z", "", self.report)
+            write_whole(folder / "report.txt", f"{text}\nResults: {shown(folder)}/\n")
             if not (folder / "plots").exists():
                 draw_all(self.drawing(self._results), folder / "plots")
         except OSError as error:

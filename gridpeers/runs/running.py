@@ -58,7 +58,7 @@ def run(
         clock=clock,
         speed=speed,
         strict=strict,
-        figures=folder is not None,
+        lasting=folder is not None,
     )
     try:
         run_request(request, progress or _silent)

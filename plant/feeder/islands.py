@@ -26,6 +26,8 @@ class Islands:
         self._network = network
         self._inverters = tuple(unit.name for unit in network.inverters)
         self._dead: list[str] = []
+        self._told: dict[str, str] = {}
+        """What was told last of each island."""
 
     def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
         """Each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
@@ -37,9 +39,12 @@ class Islands:
         return [first[k] for k in label], fed
 
     def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
-        """Tell at t (s) which inverters feed which island, and what is newly dead, with these switches closed."""
+        """Tell at t (s) which inverters feed which island, and what is newly dead, with these switches closed.
+
+        An island that is as it was told last is not told again.
+        """
         names, _ = self.names(reduction)
-        events = []
+        told = {}
         for name in dict.fromkeys(names):
             members = [
                 unit
@@ -47,8 +52,13 @@ class Islands:
                 if of == name and online
             ]
             if members:
-                text = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
-                events.append(PlantEvent(t=t, kind="island", subject=name, text=text))
+                told[name] = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
+        events = [
+            PlantEvent(t=t, kind="island", subject=name, text=text)
+            for name, text in told.items()
+            if self._told.get(name) != text
+        ]
+        self._told = told
         return events + self.report_dead(t, closed, reduction)
 
     def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:

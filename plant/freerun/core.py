@@ -206,7 +206,8 @@ class FreePlant(Side):
                     self._refuse(name, instance, f"{name}: no inverter of this name; inverters are {inverters}")
                 elif self.instances.get(name, instance) != instance:
                     reason = f"{name}: another agent of this name takes part in run {self.config.run} already; stop it"
-                    self._refuse(name, instance, f"{reason} first (gridpeers stop {name}), or give this one another")
+                    way_out = f"first (gridpeers stop {name}), or give this one another name"
+                    self._refuse(name, instance, f"{reason} {way_out}")
                 else:
                     self.instances[name] = instance
                     self._ask(name, now)

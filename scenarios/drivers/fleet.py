@@ -89,8 +89,8 @@ def run_processes(
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"
-    if wall:  # who waits for the plant waits for its compiler too
-        agents = {name: msgspec.structs.replace(config, deadline=BUILD_DEADLINE) for name, config in agents.items()}
+    patience = "deadline" if wall else "plant_wait"  # who waits for the plant waits for its compiler too
+    agents = {name: msgspec.structs.replace(config, **{patience: BUILD_DEADLINE}) for name, config in agents.items()}
     endpoint = rendezvous(plant_config.listen)
     plant_config = msgspec.structs.replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
     first = [name for name in agents if name in plant_config.agents]

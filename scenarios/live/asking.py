@@ -10,9 +10,10 @@ import msgspec
 from agents.agent import check_nameplate
 from agents.config import AgentConfig
 from agents.freerun.hearing import Hearing
-from scenarios.live.show.look import Look, in_order
+from scenarios.live.show.look import Look
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
+from scenarios.short_names import in_order
 from wire.codec import encode
 from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
 
@@ -95,6 +96,18 @@ def configurations(visit: Visit, name: str = "") -> dict[str, AgentConfig]:
             if config is not None:
                 known[config.name] = config
     return known
+
+
+def check_free(visit: Visit, name: str) -> None:
+    """Raise NobodyError if an agent of this name takes part already, before a second one says anything in the run.
+
+    Of two that come at the same moment the plant refuses one.
+    """
+    if name in standing(visit).agents:
+        raise NobodyError(
+            f"{name}: another agent of this name takes part in run {visit.where.run} already; stop it first "
+            f"(gridpeers stop {name}), or start the agent of another inverter"
+        )
 
 
 def look(visit: Visit) -> Look:

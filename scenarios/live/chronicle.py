@@ -150,6 +150,9 @@ class Chronicle:
                 line = self._limit.admit(line_of(event), monotonic())
                 if line is not None:
                     self._tell(line)
+        if self.ended:  # before anybody says that the run has ended
+            for line in self._limit.left_out():
+                self._tell(line)
         recorder = self._recorder
         if recorder is None:
             return

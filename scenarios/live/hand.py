@@ -23,14 +23,14 @@ from plant.runtime import COMPILING, READY, run_plant
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.misfortunes import Misfortunes
 from scenarios.emulation.links import links_of
-from scenarios.live.asking import configuration
+from scenarios.live.asking import check_free, configuration
 from scenarios.live.book import Book
 from scenarios.live.chronicle import Chronicle
 from scenarios.live.own_code import own_code
 from scenarios.live.place import Place, UsageError, is_near, near, return_path
-from scenarios.live.show.look import short
 from scenarios.live.visit import Visit
 from scenarios.results.record import Recorded
+from scenarios.short_names import short
 from wire.driver.drive import StoppedError
 from wire.messages import PLANT, Pacing
 
@@ -158,6 +158,7 @@ def agent_here(where: Place, name: str, listen: tuple[str, ...] | None, wait: fl
         with Visit(where) as visit:
             visit.find_plant(wait, lambda line: say(f"{name}: {line}"))
             config = configuration(visit, name)
+            check_free(visit, name)
         if not (trusts or is_near(where.connect)) and (named := own_code(config)):
             raise UsageError(
                 f"{name}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "

@@ -33,6 +33,10 @@ class UsageError(ValueError):
     """Something that was typed cannot be used; the message says what would be right."""
 
 
+class InUseError(UsageError):
+    """Something listens at an endpoint already."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Place:
     """A run and where to find it."""
@@ -163,7 +167,8 @@ def claim(option: str, text: str) -> str:
         port = probe(host, port)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
+        kind = InUseError if error.errno == errno.EADDRINUSE else UsageError
+        raise kind(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
     return f"{match['protocol']}/{host}:{port}{match['rest'] or ''}"
 
 
@@ -240,3 +245,17 @@ def near(listen: str) -> str:
     ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/10.0.0.1:7447')
     """
     return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+
+
+def next_port(listen: str) -> str:
+    """Return the same endpoint at the port beside.
+
+    Examples
+    --------
+    >>> next_port("tcp/127.0.0.1:7447"), next_port("tcp/[::1]:65535")
+    ('tcp/127.0.0.1:7448', 'tcp/[::1]:65534')
+    """
+    match = _FORM.fullmatch(listen)
+    assert match is not None
+    port = int(match["port"])
+    return f"{match['protocol']}/{match['host']}:{port + 1 if port < 65535 else port - 1}"

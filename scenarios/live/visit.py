@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.live.place import Place, UsageError, accepting
+from scenarios.live.place import ENDPOINT, RUN, InUseError, Place, UsageError, accepting, claim, near, next_port
 from wire.codec import RejectedError, decode
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
@@ -76,6 +76,11 @@ class Visit:
     def plant(self) -> bool:
         """Whether the plant's token is there."""
         return bool(self.epochs)
+
+    @property
+    def runs(self) -> set[str]:
+        """Names of the runs whose plants are there."""
+        return self._runs
 
     def read(self, key: str, payload: bytes) -> AnyMessage | None:
         """Message of the bytes that came on a key, if it is one, and of whom the key says.
@@ -211,6 +216,37 @@ class Visit:
             f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
             f"start one (gridpeers plant SCENARIO --run {self.where.run}), or give another name by --run"
         )
+
+
+def claim_for_run(listen: str) -> str:
+    """Return the endpoint where a plant will be able to listen, a free port for port 0.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be listened on. If another run is there, the message names it.
+    """
+    try:
+        return claim("--listen", listen)
+    except InUseError:
+        where = near(listen)
+        there = runs_at(where) if accepting((where,)) else []
+        if not there:
+            raise
+        first = "" if (there[0], where) == (RUN, ENDPOINT) else f" --run {there[0]} --connect {where}"
+        beside = next_port(listen)
+        raise UsageError(
+            f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
+            f"gridpeers status{first} shows it, gridpeers down{first} ends it; to have both, give this one a name and "
+            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {near(beside)})"
+        ) from None
+
+
+def runs_at(endpoint: str) -> list[str]:
+    """Names of the runs whose plants are at an endpoint; none if nobody says so within `LOOKING` seconds."""
+    with Visit(Place(run=RUN, connect=(endpoint,))) as visit:
+        visit.until(lambda: bool(visit.runs), LOOKING)
+        return sorted(visit.runs)
 
 
 def check_alone(run: str, beyond: tuple[str, ...]) -> None:

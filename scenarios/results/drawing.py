@@ -4,14 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from plant.equipment import Feeder
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import Spell, islands_of, spells_of
+from scenarios.short_names import in_order, short
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
 from scenarios.spec.limits import limits_of
+from scenarios.spec.model import Event
 from scenarios.spec.moves import inverters_of
+
+
+class Mark(NamedTuple):
+    """An event in a figure."""
+
+    label: str
+    """Name of its window; "" for none."""
+    t: float
+    """When it came (s)."""
+    what: str = ""
+    """What happens in it, in a few words: "13-152 opens"."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +38,8 @@ class Drawing:
     """A few words on each case."""
     plates: Plates
     """Nameplates, in the order of the histories' columns."""
-    events: Sequence[tuple[str, float]]
-    """Label and time (s) of each event."""
+    events: Sequence[Mark]
+    """What is marked at its time."""
     f_nom: float
     """Nominal frequency (Hz)."""
     without_agent: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -54,6 +68,7 @@ def drawing_of(
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
     """What to draw of a run: the figures of all experiments, and those that belong to what happens in this one."""
+    what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
     most = max(islands_of(scenario, feeder).values(), key=len, default={})
     microgrid = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
@@ -62,7 +77,7 @@ def drawing_of(
         histories=histories,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         plates=plates,
-        events=events,
+        events=[Mark(label, t, what.get(label, "")) for label, t in events],
         f_nom=feeder.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
         moves=any(event.leave or event.join for event in scenario.events),
@@ -71,3 +86,30 @@ def drawing_of(
         island_titles={name: f"microgrid {of.pop().removeprefix('MG')}" for name, of in whole.items() if len(of) == 1},
         spells=spells_of(scenario, feeder),
     )
+
+
+def happening(event: Event, scenario: Scenario) -> str:
+    """What happens at an event, in a few words.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> scenario, _ = load_scenario("microgrid-switching")
+    >>> [happening(event, scenario) for event in scenario.events]
+    ['13-152 opens', 'sw1_2, sw2_3 open']
+    """
+    said = [
+        f"{', '.join(names)} {verb}{'s' if len(names) == 1 else ''}"
+        for names, verb in ((event.open, "open"), (event.close, "close"))
+        if names
+    ]
+    said += [
+        f"{short(in_order(names))} {verb}{'s' if len(names) == 1 else ''}"
+        for names, verb in ((event.leave, "leave"), (event.join, "join"))
+        if names
+    ]
+    limits = [limit for case in scenario.cases for limit in limits_of(scenario, case) if limit.t == event.t_s]
+    if limits:
+        names, powers = short(in_order({limit.inverter for limit in limits})), {limit.P_max for limit in limits}
+        said += [f"{names}: {powers.pop() / 1e3:g} kW" if len(powers) == 1 else f"{names}: P_max by case"]
+    return ", ".join(said)

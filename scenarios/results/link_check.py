@@ -81,9 +81,10 @@ class LinkCheck:
             dropped.update(book.dropped)
         of = ", ".join(f"{reason} {_share(count, sent)}" for reason, count in dropped.most_common()) or "none"
         tested = [row for row in self.rows if row.ok is not None]
+        failed = f"{len(tested)} tests, {len(self.warnings) or 'none'} failed" if tested else "nothing that it can test"
         yield (
-            f"emulated links: {sent} messages over {len(books)} links, dropped: {of}; self-check: {len(tested)} tests, "
-            f"{'none' if not self.warnings else len(self.warnings)} failed (links.json, links.csv)"
+            f"emulated links: {sent} messages over {len(books)} links, dropped: {of}; self-check: {failed} "
+            "(links.json, links.csv)"
         )
         yield from (f"WARNING: {warning}" for warning in self.warnings)
         if self.failures:

@@ -37,7 +37,7 @@ class Report:
     notes: Sequence[str]
     """What a reader must know besides, e.g. that an agent died."""
     folder: str
-    """Where the results lie."""
+    """Where the results lie; "" for a folder that goes with them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +77,7 @@ def plain(report: Report) -> str:
             lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
         blocks.append("\n".join([*lines, *_summary(report)]))
     blocks += [f"NOTE  {note}" for note in _all_notes(report)]
-    blocks.append(f"Results: {report.folder}")
+    blocks += [f"Results: {report.folder}"] if report.folder else []
     return "\n\n".join(blocks) + "\n"
 
 
@@ -107,7 +107,8 @@ def show(report: Report, console: Console) -> None:
         console.print(escape("\n".join(_summary(report))), "\n", highlight=False)
     for note in _all_notes(report):
         console.print(f"[yellow]NOTE[/yellow]  {escape(note)}", highlight=False)
-    console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
+    if report.folder:
+        console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
 
 
 def _all_notes(report: Report) -> list[str]:

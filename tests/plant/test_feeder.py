@@ -108,7 +108,7 @@ def test_an_island_without_gfm_is_dead_and_said() -> None:
     run(p, 1.0)
     events = p.take_events()
 
-    assert [event.kind for event in events] == ["switch", "island", "switch", "island", "dead"]
+    assert [event.kind for event in events] == ["switch", "island", "switch", "dead"]
     assert "1252 kW" in events[-1].text
     assert all(reading.P > 0.0 for reading in p.measure().values())
 

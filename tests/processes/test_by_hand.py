@@ -208,7 +208,7 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
         assert "Traceback" not in text
     second = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", endpoint)
     assert second.end() == 2
-    assert f"--listen: {endpoint} cannot be listened on: address already in use" in second.text
+    assert f"--listen: run lab is there already, at {endpoint}; gridpeers status --run lab " in second.text
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")

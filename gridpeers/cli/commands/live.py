@@ -64,26 +64,29 @@ def _start(
     agents: bool,
 ) -> None:
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
-    spec, feeder = load(scenario)
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
+    with told():
+        from scenarios.live.place import check_endpoint, check_run
+        from scenarios.live.visit import check_alone, claim_for_run
+
+        # first of all: to read a scenario takes seconds, and who has forgotten a run hears of it at once
+        check_run(run)
+        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
+        endpoint = claim_for_run(listen)
+        check_alone(run, beyond)
+    spec, feeder = load(scenario)
     with told():
         from scenarios.live.book import Book, check_new
         from scenarios.live.folders import BY_HAND, folders
         from scenarios.live.hand import all_here, plant_here, say
         from scenarios.live.numbers.account import Account
         from scenarios.live.numbers.ending import conclude
-        from scenarios.live.place import check_endpoint, check_run, claim
         from scenarios.live.setup import Wishes, chosen_case, real_nodes, set_up
-        from scenarios.live.visit import check_alone
         from scenarios.results.numbers import Ran
 
-        check_run(run)
         check_new("--record", record)
-        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         spec = chosen(spec, chosen_case(spec, case), None)
         wishes = Wishes(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
-        endpoint = claim("--listen", listen)
-        check_alone(run, beyond)
         config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
         watch_readers(quits=False)
         with folders(out, spec) as kept:

@@ -50,8 +50,13 @@ PARTS: tuple[Part, ...] = (
             Picture(
                 key="islanding",
                 file="overview.png",
-                title="Frequency, power sharing, mean voltage and var sharing in the four cases "
-                "(the paper's figures of f, MPSI, V and MQSI)",
+                title="Frequency, power sharing, voltage error and var sharing in the four cases "
+                "(the paper's figures of f, MPSI and MQSI, and V_error of Table II over time)",
+            ),
+            Picture(
+                key="islanding-voltage",
+                file="voltage.png",
+                title="Mean voltage in the four cases (the paper's figure of V)",
             ),
             Picture(
                 key="islanding-power_GFL",

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import msgspec
 
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import Compared
-from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.drawing import Drawing, Mark, drawing_of
 from scenarios.results.history import History
 from scenarios.results.islands import taken_part
 from scenarios.results.moves import as_they_came
@@ -36,9 +37,18 @@ def drawing_by_hand(
         What the plant told.
     """
     reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
-    marks = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    marks += [("by hand" if event.kind == "switch" else "", event.t) for event in compared.departures if event.t > 0.0]
-    marks = list(dict.fromkeys(marks))
+    came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
     taken, plates = taken_part(scenario, feeder, history)
-    drawing = drawing_of(compared.happened, feeder, plates, {case: taken}, marks)
-    return replace(drawing, moves=any(event.kind == "inverter" for event in events))
+    drawing = drawing_of(compared.happened, feeder, plates, {case: taken}, came)
+    marks = [*drawing.events, *_by_hand(compared.departures)]
+    return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
+
+
+def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
+    """Marks of what people did: the switches of one moment have one, with words; what else there is, a line alone."""
+    by_time: dict[float, list[str]] = {}
+    for event in departures:
+        if event.t > 0.0:
+            switched = re.fullmatch(r"switch (\S+)(?: \(.*\))? (open|close)d", event.text)
+            by_time.setdefault(event.t, []).extend([f"{switched[1]} {switched[2]}s"] if switched else [])
+    yield from (Mark("by hand" if what else "", t, ", ".join(what)) for t, what in by_time.items())

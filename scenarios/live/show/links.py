@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from scenarios.emulation.report import LinkStand
-from scenarios.live.show.look import in_order
+from scenarios.short_names import in_order
 from wire.messages import PLANT
 
 _HEAD = ("link", "sent", "delivered", "dropped", "now")

@@ -12,7 +12,8 @@ import msgspec
 
 from agents.config import AgentConfig
 from scenarios.live.show.events import line_of
-from scenarios.live.show.look import Line, Look, in_order, short
+from scenarios.live.show.look import Line, Look
+from scenarios.short_names import in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 SILENT = 1.5

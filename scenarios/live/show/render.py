@@ -9,7 +9,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.live.show.look import Line, Look, short
+from scenarios.live.show.look import Line, Look
+from scenarios.short_names import short
 
 EVENTS = 6
 """So many of the latest events are shown."""

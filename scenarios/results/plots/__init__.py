@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.available import available_power
-from scenarios.results.plots.cases import MPSI, MQSI, frequency, overview, single, voltage
+from scenarios.results.plots.cases import MPSI, MQSI, V_error, frequency, overview, single, voltage
 from scenarios.results.plots.inverters import plug_and_play, powers
 from scenarios.results.plots.islands import microgrids
 from scenarios.results.plots.saving import save
@@ -39,6 +39,7 @@ def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
     figures: dict[str, Callable[[], Figure]] = {
         "frequency": lambda: single(drawing, frequency),
         "MPSI": lambda: single(drawing, MPSI),
+        "V_error": lambda: single(drawing, V_error),
         "voltage": lambda: single(drawing, voltage),
         "MQSI": lambda: single(drawing, MQSI),
         "power_GFM": lambda: powers(drawing, GFM=True),

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.cases import frequency
-from scenarios.results.plots.style import PAGE, case_styles, columns, mark_events, note_above, time_axis
+from scenarios.results.plots.marks import mark_events, note_above
+from scenarios.results.plots.style import PAGE, case_styles, columns, time_axis
 
 LOST = 0.3
 """Distance from nominal (Hz) at which a frequency that does not come back leaves the frame."""

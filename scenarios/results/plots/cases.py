@@ -1,4 +1,4 @@
-"""The paper's curves of all cases: f, MPSI, mean V and MQSI, alone and on one page."""
+"""Curves of all cases: f, MPSI, V_error and MQSI, which judge runs, on one page; and each alone, and mean V."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import Quantity, worst
-from scenarios.results.plots.style import PAGE, case_styles, columns, from_zero, mark_events, time_axis, words
+from scenarios.results.plots.marks import mark_events
+from scenarios.results.plots.style import PAGE, case_styles, columns, from_zero, time_axis, words
 
 
 def overview(drawing: Drawing) -> Figure:
@@ -19,7 +20,7 @@ def overview(drawing: Drawing) -> Figure:
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
-        for panel, draw in zip(axes.flat, (frequency, MPSI, voltage, MQSI), strict=True):
+        for panel, draw in zip(axes.flat, (frequency, MPSI, V_error, MQSI), strict=True):
             draw(panel, drawing)
             mark_events(panel, drawing, labelled=draw in (frequency, MPSI))
         for panel in axes[0]:
@@ -58,11 +59,20 @@ def MPSI(axes: Axes, drawing: Drawing) -> None:
     from_zero(axes, drawing, quantity)
 
 
+def V_error(axes: Axes, drawing: Drawing) -> None:
+    """Mean of abs(V - 1) over time: what the voltages are judged by."""
+    quantity = worst(metrics.V_error, 0.0, drawing.spells)
+    curves(axes, drawing, quantity)
+    axes.set_title("Voltage error, V_error", loc="left")
+    axes.set_ylabel(_of(drawing, "mean of abs(V - 1) (pu)", "V_error (pu)"))
+    from_zero(axes, drawing, quantity, least=0.01, shown=0.98)
+
+
 def voltage(axes: Axes, drawing: Drawing) -> None:
-    """Mean voltage over time."""
+    """Mean voltage over time, as in the paper's figure; terminals that are too high and too low cancel in it."""
     curves(axes, drawing, worst(metrics.mean_voltage, 1.0, drawing.spells))
     axes.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
-    axes.set_title("Voltage", loc="left")
+    axes.set_title("Mean voltage", loc="left")
     axes.set_ylabel(_of(drawing, "mean of all inverters, V (pu)", "mean V (pu)"))
     axes.ticklabel_format(axis="y", useOffset=False)
 

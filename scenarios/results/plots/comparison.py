@@ -11,15 +11,19 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import Quantity, worst
-from scenarios.results.plots.style import PAGE, Style, columns, mark_events, time_axis
+from scenarios.results.plots.marks import mark_events
+from scenarios.results.plots.style import PAGE, Style, columns, time_axis
 
 WIDTH, HEIGHT = 7.4, 2.3
 """Size of a figure, and of each row of panels in it (inches)."""
 
+COLUMNS = 2
+"""Panels beside each other."""
+
 _PANELS: tuple[tuple[str, str, Quantity, float | None], ...] = (
     ("Frequency", "f (Hz)", metrics.mean_frequency, None),
     ("Mean power sharing index, MPSI", "MPSI", metrics.MPSI, 0.0),
-    ("Voltage", "mean V (pu)", metrics.mean_voltage, 1.0),
+    ("Voltage error, V_error", "mean of abs(V - 1) (pu)", metrics.V_error, 0.0),
     ("Mean var sharing index, MQSI", "MQSI", metrics.MQSI, 0.0),
 )
 """Title, axis, quantity and its nominal value; None: the nominal frequency."""
@@ -38,20 +42,22 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
     """
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(WIDTH, 0.4 + 2 * HEIGHT * len(pairs)), layout="constrained")
-        grid = figure.subplots(2 * len(pairs), 2, squeeze=False)
+        grid = figure.subplots(2 * len(pairs), COLUMNS, squeeze=False)
         for number, (words, drawings) in enumerate(pairs):
             panels = grid[2 * number : 2 * number + 2].flat
-            for panel, (title, label, quantity, nominal) in zip(panels, _PANELS, strict=True):
-                _draw(panel, drawings, quantity, nominal)
+            for place, (panel, (title, label, quantity, nominal)) in enumerate(zip(panels, _PANELS, strict=True)):
                 panel.set_title(f"{words}: {title}" if words else title, loc="left")
                 panel.set_ylabel(label)
                 panel.ticklabel_format(axis="y", useOffset=False)
+                _draw(panel, drawings, quantity, nominal, labelled=place < COLUMNS)
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, WIDTH))
     return figure
 
 
-def _draw(axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, nominal: float | None) -> None:
+def _draw(
+    axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, nominal: float | None, *, labelled: bool
+) -> None:
     """Draw a quantity of both runs."""
     for (name, drawing), (colour, dashes, width) in zip(drawings.items(), _STYLES, strict=True):
         ((case, history),) = drawing.histories.items()
@@ -60,4 +66,4 @@ def _draw(axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, nomin
         axes.plot(history.t, y, color=colour, linestyle=dashes, linewidth=width, label=name)
     longer = max(drawings.values(), key=lambda drawing: max(history.t[-1] for history in drawing.histories.values()))
     time_axis(axes, longer)
-    mark_events(axes, longer, labelled=False)
+    mark_events(axes, longer, labelled=labelled)

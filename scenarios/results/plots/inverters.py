@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.cases import curves
-from scenarios.results.plots.style import MOVER, OTHER_STYLES, PAGE, STAYERS, mark_events, time_axis, words
+from scenarios.results.plots.marks import mark_events
+from scenarios.results.plots.style import MOVER, OTHER_STYLES, PAGE, STAYERS, time_axis, words
 
 
 def plug_and_play(drawing: Drawing) -> Figure:
@@ -32,8 +33,8 @@ def plug_and_play(drawing: Drawing) -> Figure:
             middle.ticklabel_format(axis="y", useOffset=False)
             curves(bottom, alone, metrics.mean_voltage)
             for panel in (top, middle, bottom):
-                mark_events(panel, drawing, labelled=panel is top)
                 time_axis(panel, alone)
+                mark_events(panel, drawing, labelled=panel is top)
         for panel in grid[:-1].flat:
             panel.set_xlabel("")
         for panel, label in zip(

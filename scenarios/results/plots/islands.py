@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import part_of
-from scenarios.results.plots.style import OTHER_STYLES, PAGE, mark_events, time_axis, widths
+from scenarios.results.plots.marks import mark_events
+from scenarios.results.plots.style import OTHER_STYLES, PAGE, time_axis, widths
 
 
 def microgrids(drawing: Drawing, case: str) -> Figure:

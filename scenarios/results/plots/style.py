@@ -1,4 +1,4 @@
-"""What all figures have in common: one style per case, the page, axes of time, marks of events.
+"""What all figures have in common: one style per case, the page, axes of time.
 
 One colour and one dash pattern per case, the same in every figure, after Okabe and Ito's palette, which stays apart
 for colour-blind readers; with the patterns the curves can be told in a black-and-white print too.
@@ -7,7 +7,7 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -113,13 +113,23 @@ def widths(count: int) -> list[float]:
     return [1.5 + step * above for above in reversed(range(count))]
 
 
-def from_zero(axes: Axes, drawing: Drawing, quantity: Callable[[History, Plates], Floats]) -> None:
-    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
+def from_zero(
+    axes: Axes,
+    drawing: Drawing,
+    quantity: Callable[[History, Plates], Floats],
+    *,
+    least: float = 0.05,
+    shown: float = 0.995,
+) -> None:
+    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
+
+    It ends at `least` or above, so that what is next to nothing looks like it, and has that part of all values.
+    """
     values = np.concatenate([quantity(history, drawing.plates_in(case)) for case, history in drawing.histories.items()])
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    top, peak = max(float(np.quantile(values, 0.995)) * 1.15, 0.05), float(values.max())
+    top, peak = max(float(np.quantile(values, shown)) * 1.15, least), float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
         axes.annotate(
@@ -138,28 +148,6 @@ def time_axis(axes: Axes, drawing: Drawing) -> None:
     """Name the axis of time, from 0 to the end of the run."""
     axes.set_xlabel("time (s)")
     axes.set_xlim(0.0, max(float(history.t[-1]) for history in drawing.histories.values()))
-
-
-def mark_events(axes: Axes, drawing: Drawing, *, labelled: bool) -> None:
-    """Draw a fine line at each event, with its label above the frame, clear of the curves."""
-    for label, t in drawing.events:
-        axes.axvline(t, color="#000000", linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
-        if labelled:
-            note_above(axes, label, t, "data", "center")
-
-
-def note_above(axes: Axes, text: str, x: float, of: str, side: Literal["center", "right"]) -> None:
-    """Write small words above the frame, at x of the data or of the frame."""
-    axes.annotate(
-        text,
-        (x, 1.0),
-        xycoords=(of, "axes fraction"),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha=side,
-        fontsize=7,
-        color="#444444",
-    )
 
 
 def words(drawing: Drawing, case: str) -> str:

@@ -42,6 +42,18 @@ def test_who_delivers_is_told(network: Network) -> None:
     ]
 
 
+def test_an_island_that_stays_as_it_is_is_told_once(network: Network) -> None:
+    """A switch that only drops load changes no island; one that parts another leaves the third untold."""
+    whole, parts = opened(network, "13-152"), opened(network, "13-152", "sw1_2")
+    islands = Islands(network)
+
+    first, again, then = (islands.report(1.0, closed, reduced(network, closed)) for closed in (whole, whole, parts))
+
+    assert [event.subject for event in first] == ["inv1"]
+    assert again == []
+    assert [event.subject for event in then] == ["inv1", "inv4"]
+
+
 def test_an_island_without_gfm_is_dead_and_told_once(network: Network) -> None:
     """Buses that lose their last GFM are told with load and idle inverters, once until they have been fed again."""
     closed = opened(network, *PAPER_ISLANDS)

@@ -64,6 +64,17 @@ def test_an_agent_without_a_plant_says_so() -> None:
     assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
 
 
+def test_a_plant_that_is_built_slowly_is_waited_for() -> None:
+    """On a slow computer the first compilation takes longer than any message may: only the first wait is longer."""
+    agent = AgentSide(msgspec.structs.replace(agent_config("inv1"), plant_wait=600.0), "a")
+    agent.start(0.0)
+    agent.expire(599.9)
+
+    assert not agent.over
+    agent.expire(600.0)
+    assert agent.failed.startswith("inv1: no sign of life from plant within ")
+
+
 def test_a_plant_that_still_compiles_is_waited_for() -> None:
     """Once its token is seen there is no deadline until it calls; its death ends the wait."""
     agent = AgentSide(agent_config("inv1"), "a")

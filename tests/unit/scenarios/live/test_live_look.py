@@ -7,9 +7,10 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from agents.config import AgentConfig, Control
-from scenarios.live.show.look import Line, Look, short
+from scenarios.live.show.look import Line, Look
 from scenarios.live.show.picture import Picture
 from scenarios.live.show.render import plain, table
+from scenarios.short_names import short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 

@@ -259,7 +259,7 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     }
     assert "ours | paper's Table I\n" in report
     assert "NOTE  case IV: measured up to 7 s, where the scenario ends; the history goes on to 8.00 s\n" in report
-    assert len(list((tmp_path / "plots").glob("*.png"))) == 7
+    assert len(list((tmp_path / "plots").glob("*.png"))) == 8
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,7 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     where = Place(run="demo", connect=(endpoint,))
     monkeypatch.setattr(hand, "Visit", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})()))
     monkeypatch.setattr(hand, "configuration", lambda visit, name: CONFIG)
+    monkeypatch.setattr(hand, "check_free", lambda visit, name: None)
     monkeypatch.setattr(hand, "run_agent", lambda config, links: ran.append(config.name) or "")
     monkeypatch.setattr(hand.signal, "signal", lambda *_: None)
 

@@ -9,10 +9,12 @@ import pytest
 from matplotlib.image import imread
 
 from plant.tables import read_feeder
+from scenarios.results.drawing import Mark
 from scenarios.results.history import History, Plates
 from scenarios.results.islands import Spell
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
 from scenarios.results.plots.inverters import powers
+from scenarios.results.plots.marks import GAP, LETTER, placed
 from scenarios.results.plots.saving import Format, save
 from scenarios.spec import catalogue, load_scenario
 
@@ -39,7 +41,7 @@ def drawing(*cases: str) -> Drawing:
         histories=histories,
         titles=dict.fromkeys(cases, "made up"),
         plates=plates,
-        events=[("event1", 1.0), ("event2", 4.0)],
+        events=[Mark("event1", 1.0, "13-152 opens"), Mark("event2", 4.0, "60-160 opens")],
         f_nom=60.0,
     )
 
@@ -108,17 +110,54 @@ def test_a_figure_has_the_same_bytes_each_time_it_is_written(
 
 
 def test_every_axis_says_its_quantity_and_events_are_marked() -> None:
-    """Frequencies are in Hz, voltages in pu, time in s; both events have their line and label."""
+    """Frequencies are in Hz, voltages in pu, time in s; both events have their line, their label, and what happens."""
     page = overview(drawing("I"))
 
     assert [axes.get_ylabel() for axes in page.axes] == [
         "mean of the GFM, f (Hz)",
         "MPSI",
-        "mean of all inverters, V (pu)",
+        "mean of abs(V - 1) (pu)",
         "MQSI",
     ]
     assert [axes.get_xlabel() for axes in page.axes] == ["", "", "time (s)", "time (s)"]
-    assert {text.get_text() for text in page.axes[0].texts} == {"event1", "event2"}
+    above = {text.get_text() for text in page.axes[0].texts}
+    assert above == {"event1\n13-152 opens", "event2\n60-160 opens"}
+
+
+def test_the_voltage_panel_shows_what_is_judged() -> None:
+    """Terminals that are 2 % too high and 2 % too low have a good mean and a bad V_error, and the page shows that."""
+    it = drawing("IV")
+    history = it.histories["IV"]
+    history.V[:, ::2] *= 1.02
+    history.V[:, 1::2] *= 0.98
+    page = overview(it)
+
+    line = next(line for line in page.axes[2].get_lines() if line.get_label() == "IV: made up")
+    assert np.asarray(line.get_ydata()) == pytest.approx(0.02)
+
+
+def edges(text: str, t: float, side: str, inches_per_s: float) -> tuple[float, float]:
+    """Where a text above the frame begins and ends (inches)."""
+    width = LETTER * max(map(len, text.split("\n")))
+    start = t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
+    return start, start + width
+
+
+@pytest.mark.parametrize("inches_per_s", [0.05, 0.3, 0.6, 2.0])
+def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
+    """However near events are: texts stand beside their lines, then without what happens, and at last not at all."""
+    marks = [
+        Mark("islanding", 1.0, "13-152 opens"),
+        Mark("leave", 2.0, "inv2 leaves"),
+        Mark("return", 3.0, "inv2 joins"),
+        Mark("", 3.2),
+        Mark("by hand", 3.3, "sw1_2 opens"),
+    ]
+    found = [edges(*one, inches_per_s) for one in placed(marks, inches_per_s)]
+
+    assert all(right[0] >= left[1] + GAP - 1e-9 for left, right in pairwise(found))
+    assert found
+    assert inches_per_s < 2.0 or len(found) == 4
 
 
 def test_values_that_are_no_numbers_do_not_stop_a_figure(tmp_path: Path) -> None:
@@ -149,7 +188,7 @@ def test_where_there_are_islands_the_worst_is_drawn() -> None:
     assert [axes.get_ylabel() for axes in page.axes] == [
         "f (Hz), worst island",
         "MPSI, worst island",
-        "mean V (pu), worst island",
+        "V_error (pu), worst island",
         "MQSI, worst island",
     ]
 

@@ -1,0 +1,103 @@
+"""Marks of events in a figure: a fine line each, and above the frame the event's label and what happens in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from typing import Literal, NamedTuple
+
+from matplotlib.axes import Axes
+
+from scenarios.results.drawing import Drawing, Mark
+
+Side = Literal["left", "center", "right"]
+"""Which part of a text stands at the line."""
+
+LETTER = 0.056
+"""Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt."""
+
+GAP = 0.06
+"""Least distance between two texts (inches)."""
+
+FRAME = 0.78
+"""Part of a column of panels that is the frame of one; the rest are its axis and margins."""
+
+
+class Placed(NamedTuple):
+    """A text above the frame."""
+
+    text: str
+    t: float
+    """Time of its event (s)."""
+    side: Side
+
+
+def mark_events(axes: Axes, drawing: Drawing, *, labelled: bool) -> None:
+    """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room."""
+    for mark in drawing.events:
+        axes.axvline(mark.t, color="#000000", linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
+    lines = 0
+    if labelled:
+        for text, t, side in placed(drawing.events, _inches_per_s(axes, drawing)):
+            note_above(axes, text, t, "data", side)
+            lines = max(lines, text.count("\n") + 1)
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=5.0 + 9.0 * lines)
+
+
+def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
+    r"""Place texts so that none covers another: beside its line where need be, shorter, and at last left out.
+
+    Examples
+    --------
+    >>> placed([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
+    [Placed(text='event1\n13-152 opens', t=1.0, side='right'), Placed(text='leave', t=1.1, side='left')]
+    """
+    best: dict[float, tuple[float, list[Placed]]] = {-inf: (0.0, [])}
+    """By the right edge of the last text (inches): the least cost of all texts so far, and where they stand."""
+    for mark in sorted(marks, key=lambda mark: mark.t):
+        found: dict[float, tuple[float, list[Placed]]] = {}
+        for edge, (cost, texts) in best.items():
+            for price, text, side in _choices(mark):
+                end = edge
+                if text:
+                    width = LETTER * max(map(len, text.split("\n")))
+                    start = mark.t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
+                    if start < edge + GAP:
+                        continue
+                    end = start + width
+                if cost + price < found.get(end, (inf, []))[0]:
+                    found[end] = cost + price, [*texts, *([Placed(text, mark.t, side)] if text else [])]
+        best = found
+    return min(best.values(), key=lambda one: one[0])[1]
+
+
+def _choices(mark: Mark) -> list[tuple[float, str, Side]]:
+    """What can be written at a mark, and how much it costs."""
+    both = "\n".join(text for text in (mark.label, mark.what) if text)
+    narrow = "\n".join(text for text in (mark.label, mark.what.replace(" ", "\n", 1)) if text)
+    texts = {both: 0.0, narrow: 5.0, mark.label: 10.0, "": 30.0}
+    sides: tuple[tuple[Side, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
+    return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
+
+
+def note_above(axes: Axes, text: str, x: float, of: str, side: Side) -> None:
+    """Write small words above the frame, at x of the data or of the frame."""
+    axes.annotate(
+        text,
+        (x, 1.0),
+        xycoords=(of, "axes fraction"),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha=side,
+        fontsize=7,
+        color="#444444",
+    )
+
+
+def _inches_per_s(axes: Axes, drawing: Drawing) -> float:
+    """Roughly how wide a second of a panel will be: the layout is made when the figure is drawn."""
+    place, figure = axes.get_subplotspec(), axes.get_figure(root=True)
+    assert figure is not None
+    columns = 1 if place is None else place.get_gridspec().ncols
+    end = max(float(history.t[-1]) for history in drawing.histories.values())
+    return float(figure.get_size_inches()[0]) / columns * FRAME / max(end, 1e-9)
