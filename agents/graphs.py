@@ -16,8 +16,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Protocol
 
+from wire.anybody import ANYTHING, named
 from wire.nearest import suggestion
-from wire.parameters import parameters_of
+from wire.parameters import parameter_objection
 from wire.plugin import Plugin, made
 from wire.printable import printable
 from wire.registry import PluginError, Registry
@@ -133,10 +134,7 @@ def _objection(it: Any) -> str:
     if isinstance(it, type):
         if not any("__call__" in vars(base) for base in it.__mro__):
             return "the class needs a method __call__(self, members)"
-        try:
-            parameters_of(it)
-        except TypeError as error:
-            return str(error)
+        return parameter_objection(it, ("use", "folder"))
     return ""
 
 
@@ -191,9 +189,8 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     try:
         found = rule(ordered)
         told = {one: frozenset(found[one]) for one in found}
-    except Exception as error:  # a rule is anybody's code
-        text = printable(f"{type(error).__name__}: {error}", 200)
-        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {text}") from error
+    except ANYTHING as error:  # a rule is anybody's code
+        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
     for one, heard in told.items() if strict else ():
         if one not in members:
             raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")

@@ -111,6 +111,38 @@ def parameters_of(cls: type) -> dict[str, Parameter]:
     return found
 
 
+def parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
+    """Return why a class cannot have the parameters that it has, "" if it can.
+
+    Parameters
+    ----------
+    cls : type
+        The class.
+    taken : tuple[str, ...]
+        Names that mean something else, in a scenario's table or in the class.
+
+    Examples
+    --------
+    >>> class Mine:
+    ...     folder: str = ""
+    >>> parameter_objection(Mine, ("use", "folder"))
+    'its parameter folder cannot be given, as a scenario has the key folder for something else; give it another name'
+    """
+    try:
+        found = parameters_of(cls)
+    except TypeError as error:
+        return str(error)
+    return next(
+        (
+            f"its parameter {name} cannot be given, as a scenario has the key {name} for something else; give it "
+            "another name"
+            for name in found
+            if name in taken
+        ),
+        "",
+    )
+
+
 def objections(cls: type, given: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return all that is wrong with values for the parameters of a class: for each the name and a sentence.
 

@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import msgspec
 
+from wire.anybody import ANYTHING, named
 from wire.parameters import objections, values_of
 from wire.printable import printable
 from wire.registry import PluginError, Registry
 
 Scalar = float | int | bool | str
 """Value of a parameter."""
+
+
+def scalar_objection(value: Any) -> str:
+    """Return why a value cannot be one of a parameter, whatever the parameter; "" if it can.
+
+    Examples
+    --------
+    >>> scalar_objection(10**30)
+    'a whole number has at most 64 bits; got 1000000000000000000000000000000'
+    """
+    shown = printable(repr(value), 60)
+    if not isinstance(value, str | int | float):
+        return f"a parameter is a number, a text, or true or false; got {shown}"
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        return f"a whole number has at most 64 bits; got {shown}"
+    if isinstance(value, float) and not isfinite(value):
+        return f"must be a finite number, got {shown}"
+    return ""
 
 
 class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -65,9 +85,9 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
         it = found()
         for name, value in values.items():
             setattr(it, name, value)
-    except Exception as error:  # its __init__ is anybody's code
-        text = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
-        raise PluginError(f"{plugin.name} cannot be made: {printable(text, 300)}") from error
+    except ANYTHING as error:  # its __init__ is anybody's code
+        text = printable(str(error), 300) if type(error) is ValueError else named(error)
+        raise PluginError(f"{plugin.name} cannot be made: {text}") from error
     return it
 
 

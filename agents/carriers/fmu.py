@@ -1,42 +1,29 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
-Its variables are those of `agents.carriers.fmu_interface`. A step of the law is a step of the FMU over one control
-period. `start` resets the FMU.
+Its variables are those of `agents.carriers.fmu_interface`. What is compiled cannot be interrupted, and may take its
+process with it: so an FMU runs in one of its own, `agents.carriers.fmu_host`, to which the lines of a law program go.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import chdir
+import sys
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from tempfile import mkdtemp
 
-from agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, fmu_problems, is_fmi3, named
+from msgspec.structs import replace
+
+from agents.carriers.program import ProgramLaw, Ready
 from agents.config import LawChoice
 from agents.laws.call import LawError
-from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints, limits_in
 from wire.printable import printable
 
-
-def _instance(description: Any, folder: str) -> Any:
-    """Return the instance of an FMU that is unpacked in a folder, by the version of FMI that it has."""
-    if is_fmi3(description):
-        from fmpy.fmi3 import FMU3Slave as Slave
-    else:
-        from fmpy.fmi2 import FMU2Slave as Slave
-    with chdir("."):  # fmpy goes to the library's folder, and stays there if the library cannot be loaded
-        fmu = Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="law",
-        )
-    fmu.instantiate()
-    return fmu
+LOADING = 10.0
+"""Least time (s) that an FMU has to be loaded."""
 
 
-class FmuLaw(Law):
+class FmuLaw(ProgramLaw):
     """A law carried by an FMU.
 
     Parameters
@@ -47,83 +34,58 @@ class FmuLaw(Law):
     Raises
     ------
     ValueError
-        If it cannot be loaded, or its variables are not those of a law.
+        If its process cannot be started.
     """
 
     def __init__(self, choice: LawChoice) -> None:
-        path = Path(choice.folder) / choice.fmu
-        if wrong := fmu_problems(path, choice.parameters):
-            raise ValueError("law " + "; ".join(text for _, text in wrong))
-        super().__init__(**limits_in(choice.parameters))
-        import fmpy
-
-        self._name, self._parameters = path.name, choice.parameters
-        description = fmpy.read_model_description(str(path))
-        self._inputs, self._outputs = named(description, "input"), named(description, "output")
-        self._settable = named(description, "parameter")
-        self._room = max((int(match[1]) for name in self._inputs if (match := NEIGHBOUR.fullmatch(name))), default=0)
-        self._shared = [name.removeprefix("shared_") for name in self._outputs if name.startswith("shared_")]
-        self._t = 0.0
-        self._begun = False
-        self._folder = fmpy.extract(str(path))
+        path = (Path(choice.folder) / choice.fmu).absolute()
         try:
-            self._fmu = _instance(description, self._folder)
-        except Exception as error:  # its library may be anything, and so may what it does when it is loaded
-            shutil.rmtree(self._folder, ignore_errors=True)
-            text = printable(f"{type(error).__name__}: {error}", 200)
-            raise ValueError(f"law {self._name} cannot be instantiated: {text}") from error
-        self._fmi3 = is_fmi3(description)
-        fmu = self._fmu
-        self._put, self._got = (fmu.setFloat64, fmu.getFloat64) if self._fmi3 else (fmu.setReal, fmu.getReal)
+            self._unpacked = mkdtemp(prefix="gridpeers-fmu-")
+        except OSError as error:
+            raise ValueError(f"law {path.name}: there is nowhere to unpack it: {error.strerror}; set TMPDIR") from None
+        command = (sys.executable, "-P", "-m", "agents.carriers.fmu_host", str(path), self._unpacked)
+        try:
+            super().__init__(replace(choice, command=command), path.name)
+        except ValueError:
+            shutil.rmtree(self._unpacked, ignore_errors=True)
+            raise
+        self._patience = max(LOADING, self._patience)
 
-    def start(self, own: Own) -> None:
-        """Reset the FMU, set its parameters, and initialise it with the own inverter."""
-        fmu = self._fmu
-        if self._begun:
-            fmu.terminate()
-            fmu.reset()
-        self._begun, self._t = True, 0.0
-        if not self._fmi3:
-            fmu.setupExperiment(startTime=0.0)
-        given = {name: float(value) for name, value in self._parameters.items() if name in self._settable}
-        self._set(self._settable, given)
-        fmu.enterInitializationMode()
-        self._set(self._inputs, self._values(own, (), 0.0))
-        fmu.exitInitializationMode()
+    def load(self) -> None:
+        """Wait until the FMU is loaded.
 
-    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Set the inputs, do one step, and get the outputs."""
-        if len(neighbours) > self._room and self._room:
-            raise LawError(f"{self._name} has room for {self._room} neighbours, and {own.name} hears {len(neighbours)}")
-        self._set(self._inputs, self._values(own, neighbours, T))
-        self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=T)
-        self._t += T
-        got = self._get()
-        shared = {name: got[f"shared_{name}"] for name in self._shared} or NOTHING
-        return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
+        Raises
+        ------
+        LawError
+            If it cannot be.
+        """
+        self._ask({"type": "load"}, Ready, 0.0)
 
     def close(self) -> None:
-        """Free the FMU and remove what was unpacked."""
-        try:
-            if self._begun:
-                self._fmu.terminate()
-            self._fmu.freeInstance()
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        """End its process, and remove what was unpacked."""
+        super().close()
+        shutil.rmtree(self._unpacked, ignore_errors=True)
 
-    def _values(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> dict[str, float]:
-        values = {f"own_{name}": float(value) for name, value in own._asdict().items() if name != "name"}
-        values |= {"T": T, "neighbours": float(len(neighbours))}
-        for i, other in enumerate(neighbours, start=1):
-            values |= {f"neighbour_{i}_{name}": float(getattr(other, name)) for name in OF_NEIGHBOUR}
-            values |= {f"neighbour_{i}_shared_{name}": value for name, value in other.shared.items()}
-        return values
+    def _says(self, error: str, what: str) -> str:
+        return printable(error, 300)
 
-    def _set(self, variables: Mapping[str, Any], values: Mapping[str, float]) -> None:
-        names = [name for name in variables if name in values]
-        if names:
-            self._put([variables[name].valueReference for name in names], [values[name] for name in names])
 
-    def _get(self) -> dict[str, float]:
-        got = self._got([variable.valueReference for variable in self._outputs.values()])
-        return dict(zip(self._outputs, map(float, got), strict=True))
+def load_problem(path: Path) -> str:
+    """Return why an FMU cannot be loaded, "" if it can; the answer is kept as long as the file is the same."""
+    about = path.stat()
+    return _load_problem(str(path.absolute()), about.st_mtime_ns, about.st_size)
+
+
+@lru_cache(maxsize=64)
+def _load_problem(path: str, changed: int, size: int) -> str:
+    try:
+        law = FmuLaw(LawChoice(fmu=path))
+    except ValueError as error:
+        return str(error)
+    try:
+        law.load()
+    except LawError as error:
+        return f"law {Path(path).name} cannot be instantiated: {error}"
+    finally:
+        law.close()
+    return ""

@@ -1,13 +1,24 @@
-"""From the choice of a law to the law itself."""
+"""From the choice of a law to the law itself, and its end."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Protocol, runtime_checkable
+
 from agents.carriers.registry import LAWS
-from agents.carriers.time_limit import TimeLimited
+from agents.carriers.time_limit import make_limited
 from agents.config import Control, LawChoice
-from agents.laws.call import ANYTHING
 from agents.laws.in_force import law_in_force
 from agents.laws.law import Law
+
+
+@runtime_checkable
+class Asked(Protocol):
+    """A law that is asked to end before it is waited for."""
+
+    def end_input(self) -> None:
+        """Ask it."""
+        ...
 
 
 def make_law(control: Control) -> Law:
@@ -31,8 +42,16 @@ def make_law(control: Control) -> Law:
         return law_in_force(control)
     law = LAWS.resolve(choice.use, choice.folder)
     try:
-        return TimeLimited(law(**choice.parameters), choice.time_limit)
+        return make_limited(law, choice.parameters, choice.time_limit)
     except ValueError as error:
-        raise ValueError(f"law {choice.use}: {error}") from error
-    except ANYTHING as error:  # its __init__ is anybody's code
-        raise ValueError(f"law {choice.use} cannot be made: {type(error).__name__}: {error}") from error
+        raise ValueError(f"law {choice.use} {error}") from error
+
+
+def close_laws(laws: Iterable[Law]) -> None:
+    """End some laws; programs are all asked before the first is waited for."""
+    ended = tuple(laws)
+    for law in ended:
+        if isinstance(law, Asked):
+            law.end_input()
+    for law in ended:
+        law.close()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import select
-import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
@@ -16,6 +15,8 @@ from typing import Any, Literal
 
 import msgspec
 
+from agents.carriers.process_group import LEAVING, ProcessGroup
+from agents.carriers.time_limit import FIRST
 from agents.config import LawChoice
 from agents.laws.call import LawError
 from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints, limits_in
@@ -23,12 +24,6 @@ from wire.printable import printable
 
 LONGEST_LINE = 100_000
 """Bytes of an answer beyond which it is none."""
-
-FIRST = 10.0
-"""Times the time limit that a program may take for its first answer: it may have to be loaded."""
-
-CLOSING = 1.0
-"""Time (s) that a program has to end once its input has."""
 
 EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 
@@ -57,6 +52,8 @@ class ProgramLaw(Law):
     ----------
     choice : LawChoice
         The command, its parameters and the folder to run it in.
+    name : str, optional
+        What people call it; the name of the program if left out.
 
     Raises
     ------
@@ -64,24 +61,23 @@ class ProgramLaw(Law):
         If the program cannot be started, or a limit among the parameters is wrong.
     """
 
-    def __init__(self, choice: LawChoice) -> None:
+    def __init__(self, choice: LawChoice, name: str = "") -> None:
         super().__init__(**limits_in(choice.parameters))
         self._choice = choice
-        self._name = Path(choice.command[0]).name
-        self._process: subprocess.Popen[bytes] | None = None
+        self._name = name or Path(choice.command[0]).name
+        self._group: ProcessGroup | None = None
+        self._input_ended = 0.0
         self._rest = b""
         command = list(choice.command)
         if choice.folder and (Path(choice.folder) / command[0]).exists():  # else it is on the PATH, or nowhere
             command[0] = str(Path(choice.folder) / command[0])
         try:
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=choice.folder or None, bufsize=0
-            )
-            assert self._process.stdin is not None
-            os.set_blocking(self._process.stdin.fileno(), False)
+            self._group = ProcessGroup(command, choice.folder)
         except OSError as error:
             text = f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run"
             raise ValueError(f"law program {text}") from None
+        assert self._group.program.stdin is not None
+        os.set_blocking(self._group.program.stdin.fileno(), False)
         self._patience = FIRST * choice.time_limit
 
     def start(self, own: Own) -> None:
@@ -99,20 +95,22 @@ class ProgramLaw(Law):
         shared: Mapping[str, float] = decision.shared or NOTHING
         return SetPoints(decision.P_set, decision.V_set, shared, decision.send)
 
+    def end_input(self) -> None:
+        """Ask the program to end; `close` waits for it."""
+        if self._group is not None and not self._input_ended:
+            self._input_ended = monotonic()
+            self._group.end_input()
+
     def close(self) -> None:
-        """End the program: its input ends, and if it stays, it is killed."""
-        process, self._process = self._process, None
-        if process is None:
+        """End the program: its input ends, and what stays of it, or of what it started, is killed."""
+        if self._group is None:
             return
-        assert process.stdin is not None
-        assert process.stdout is not None
-        process.stdin.close()
-        try:
-            process.wait(CLOSING)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        process.stdout.close()
+        self.end_input()
+        self._group.wait(max(0.0, self._input_ended + LEAVING - monotonic()))
+        self._group.kill()
+        assert self._group.program.stdout is not None
+        self._group.program.stdout.close()
+        self._group = None
 
     def _ask(self, line: dict[str, Any], answer: type[Any], t: float) -> Any:
         """Send a line and return the answer.
@@ -123,7 +121,7 @@ class ProgramLaw(Law):
             If the program is dead, does not answer in time, or answers something else.
         """
         what = f"{line['type']} at t = {t:.6g} s"
-        if self._process is None:
+        if self._group is None:
             raise LawError(f"{self._name} has ended before the {what}")
         try:
             self._put(msgspec.json.encode(line) + b"\n", what)
@@ -136,36 +134,43 @@ class ProgramLaw(Law):
             shown = printable(reply.decode(errors="replace"), 100)
             raise LawError(f"{self._name} answered the {what} with {shown!r}, which is none; e.g. {EXAMPLE}") from None
         if decoded.error:
-            raise LawError(f"{self._name} says: {printable(decoded.error, 200)} ({what})")
+            raise LawError(self._says(decoded.error, what))
         self._patience = self._choice.time_limit
         return decoded
 
+    def _says(self, error: str, what: str) -> str:
+        """Return what an error of the program's own is told as."""
+        return f"{self._name} says: {printable(error, 200)} ({what})"
+
     def _put(self, line: bytes, what: str) -> None:
         """Write a line to the program; one that does not read fills the pipe, and then would block."""
-        assert self._process is not None
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        end, file, out = monotonic() + self._patience, self._process.stdin.fileno(), self._process.stdout.fileno()
+        assert self._group is not None
+        program = self._group.program
+        assert program.stdin is not None
+        assert program.stdout is not None
+        end, file, out = monotonic() + self._patience, program.stdin.fileno(), program.stdout.fileno()
         if self._rest or _ready(out, select.POLLIN, 0.0):
             if self._rest or (piece := os.read(out, 65_536)):
                 shown = printable((self._rest or piece).decode(errors="replace"), 100)
-                self._process.kill()
+                self._group.kill()
                 raise LawError(f"{self._name} printed {shown!r} before the {what}; print one line for each that comes")
             raise LawError(self._ended(what))
         while line:
             if not _ready(file, select.POLLOUT, end - monotonic()):
-                self._process.kill()
+                self._group.kill()
                 raise LawError(f"{self._name} did not read the {what} within {self._patience:g} s")
             line = line[os.write(file, line) :]
 
     def _line(self, what: str) -> bytes:
         """Return the next line of the program."""
-        assert self._process is not None
-        assert self._process.stdout is not None
-        end, file = monotonic() + self._patience, self._process.stdout.fileno()
+        assert self._group is not None
+        assert self._group.program.stdout is not None
+        end, file = monotonic() + self._patience, self._group.program.stdout.fileno()
         while b"\n" not in self._rest:
             if not _ready(file, select.POLLIN, end - monotonic()):
-                self._process.kill()  # it is of no use any more, and may not hear that its input has ended
+                if self._group.program.poll() is not None:  # what it has started may hold its output open
+                    raise LawError(self._ended(what))
+                self._group.kill()  # it is of no use any more, and may not hear that its input has ended
                 raise LawError(f"{self._name} did not answer the {what} within {self._patience:g} s")
             piece = os.read(file, 65_536)
             if not piece:
@@ -178,10 +183,10 @@ class ProgramLaw(Law):
 
     def _ended(self, what: str) -> str:
         """Say how the program ended."""
-        assert self._process is not None
-        try:
-            code = self._process.wait(CLOSING)
-        except subprocess.TimeoutExpired:
+        assert self._group is not None
+        code = self._group.wait(LEAVING)
+        self._group.kill()  # what it has started may still run
+        if code is None:
             return f"{self._name} closed its input or its output at the {what}"
         return f"{self._name} ended at the {what} with " + (f"exit code {code}" if code >= 0 else f"signal {-code}")
 

@@ -6,8 +6,17 @@ import inspect
 from typing import Any
 
 from agents.laws.law import Law
-from wire.parameters import parameters_of
+from wire.parameters import parameter_objection
 from wire.registry import Registry
+
+CARRIERS = ("use", "command", "fmu")
+"""Keys of a scenario's table `law`, one of which says what the law is."""
+
+KEYS = (*CARRIERS, "folder", "time_limit_s")
+"""Keys of the table `law` that are no parameters of the law."""
+
+METHODS = ("start", "close")
+"""What an agent calls of a law, beside `step`."""
 
 
 def _objection(it: Any) -> str:
@@ -19,11 +28,9 @@ def _objection(it: Any) -> str:
         inspect.signature(it.step).bind(None, None, (), 0.02)
     except TypeError as error:
         return f"write its method step(self, own, neighbours, T): {error}"
-    try:
-        parameters_of(it)
-    except TypeError as error:
-        return str(error)
-    return ""
+    if method := next((name for name in METHODS if not callable(getattr(it, name))), ""):
+        return f"its {method} is no method; give the parameter another name"
+    return parameter_objection(it, KEYS)
 
 
 LAWS: Registry[type[Law]] = Registry(

@@ -1,20 +1,90 @@
-"""A law of anybody's in Python that may hang: it is interrupted, and has failed."""
+"""Calls of anybody's code in Python that may hang: they are interrupted, and have failed."""
 
 from __future__ import annotations
 
 import logging
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
-from agents.laws.call import ANYTHING, LawError
+from agents.laws.call import LawError
 from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints
+from wire.anybody import ANYTHING, named
+
+FIRST = 10.0
+"""Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
 
 
 class _OverError(BaseException):
     """The time is over; no Exception, so that a law that suppresses all of these is interrupted all the same."""
+
+
+@contextmanager
+def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
+    """Interrupt what is inside when it lasts too long.
+
+    It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not return.
+
+    Parameters
+    ----------
+    what : str
+        What is inside, for the message.
+    seconds : float
+        Longest time (s of real time).
+    limit : str
+        How a scenario calls the limit.
+
+    Raises
+    ------
+    LawError
+        If it took longer.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over = False
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal over
+        over = True
+        raise _OverError
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    except BaseException:
+        if not over:
+            raise
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    if over:  # also where the law caught the interruption and returned
+        raise LawError(f"{what} took longer than {limit}")
+
+
+def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: float) -> TimeLimited:
+    """Return a law of a class, each call of which may last only so long.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be made.
+    """
+    seconds = FIRST * time_limit
+    try:
+        with limited("its __init__", seconds, f"{seconds:g} s, ten times time_limit_s"):
+            made = law(**parameters)
+        return TimeLimited(made, time_limit)
+    except LawError as error:
+        raise ValueError(f"cannot be made: {error}") from error
+    except ANYTHING as error:  # its __init__ is anybody's code
+        raise ValueError(f"cannot be made: {named(error)}") from error
 
 
 class TimeLimited(Law):
@@ -25,56 +95,36 @@ class TimeLimited(Law):
     law : Law
         The law.
     time_limit : float
-        Longest time (s of real time) of one call. It is enforced by SIGALRM: in the main thread of a process alone,
-        and not against a call of C code that does not return.
+        Longest time (s of real time) of one call; see `limited`.
     """
 
     def __init__(self, law: Law, time_limit: float) -> None:
         super().__init__(**{name: getattr(law, name) for name in LIMITS})
         self._law, self._time_limit = law, time_limit
+        self._limit = f"time_limit_s = {time_limit:g} s"
 
     def start(self, own: Own) -> None:
         """Begin as the law does."""
-        with self._limited("start", own.t):
+        with limited(f"start at t = {own.t:.6g} s", self._time_limit, self._limit):
             self._law.start(own)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Decide as the law does."""
-        with self._limited("step", own.t):
+        with limited(f"step at t = {own.t:.6g} s", self._time_limit, self._limit):
             return self._law.step(own, neighbours, T)
 
     def close(self) -> None:
         """End the law; the run is over, so that one that fails in it is but named in the log."""
+        if failed := self.close_failure():
+            logging.getLogger(__name__).warning("law %s: close failed: %s", type(self._law).__name__, failed)
+
+    def close_failure(self) -> str:
+        """End the law, and return why it failed in it; "" if it did not."""
         try:
-            with self._limited("close", None):
+            with limited("it", self._time_limit, self._limit):
                 self._law.close()
+        except LawError as error:
+            return str(error)
         except ANYTHING as error:
-            logging.getLogger(__name__).warning("law %s: close failed: %r", type(self._law).__name__, error)
-
-    @contextmanager
-    def _limited(self, what: str, t: float | None) -> Iterator[None]:
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        over = False
-
-        def interrupt(number: int, frame: FrameType | None) -> None:
-            nonlocal over
-            over = True
-            raise _OverError
-
-        before = signal.signal(signal.SIGALRM, interrupt)
-        try:
-            signal.setitimer(signal.ITIMER_REAL, self._time_limit)
-            try:
-                yield
-            finally:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-        except BaseException:
-            if not over:
-                raise
-        finally:
-            signal.signal(signal.SIGALRM, before)
-        if over:  # also where the law caught the interruption and returned
-            when = "" if t is None else f" at t = {t:.6g} s"
-            raise LawError(f"{what}{when} took longer than time_limit_s = {self._time_limit:g} s")
+            return named(error)
+        return ""

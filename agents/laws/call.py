@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
+from wire.anybody import ANYTHING, named
 from wire.bounds import MOST_SHARED, SHARED_LIMIT
 from wire.printable import printable
 
@@ -15,9 +16,6 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
 """Place of an object in memory: another one in every run, and of no use to anybody."""
-
-ANYTHING = (Exception, SystemExit, GeneratorExit)
-"""What a law may raise, as it is anybody's code; only who presses Ctrl+C ends the run."""
 
 
 class LawError(RuntimeError):
@@ -37,7 +35,7 @@ def begun(law: Law, own: Own) -> None:
     except LawError:
         raise
     except ANYTHING as error:
-        raise LawError(f"start at t = {own.t:.6g} s raised {_named(error)}") from error
+        raise LawError(f"start at t = {own.t:.6g} s raised {named(error)}") from error
 
 
 def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
@@ -62,13 +60,13 @@ def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Se
     except LawError:
         raise
     except ANYTHING as error:
-        raise LawError(f"step at t = {own.t:.6g} s raised {_named(error)}") from error
+        raise LawError(f"step at t = {own.t:.6g} s raised {named(error)}") from error
     try:
         return _within_limits(law, result, own)
     except LawError:
         raise
     except ANYTHING as error:  # what a law returns is anybody's code too: its bool(), float() or items() may raise
-        raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {_named(error)}") from error
+        raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {named(error)}") from error
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
@@ -109,14 +107,6 @@ def _checked(shared: Any, t: float) -> Mapping[str, float]:
         if abs(found[name]) > SHARED_LIMIT:
             raise LawError(f"step at t = {t:.6g} s shares {name} = {value:g}; at most {SHARED_LIMIT:g} may travel")
     return found
-
-
-def _named(error: BaseException) -> str:
-    try:
-        text = str(error)
-    except ANYTHING:
-        text = "its text cannot be had"
-    return printable(f"{type(error).__name__}: {text}", 200)
 
 
 def _shown(value: Any) -> str:

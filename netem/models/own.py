@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from netem.draws import Stream
-from wire.parameters import parameters_of, values_of
+from wire.anybody import ANYTHING, named
+from wire.parameters import parameter_objection, values_of
 from wire.plugin import Plugin, made
 from wire.printable import printable
 from wire.registry import Registry
@@ -108,11 +109,7 @@ def _objection(it: Any) -> str:
         inspect.signature(it.judge).bind(None, None, None)
     except TypeError as error:
         return f"write its method judge(self, message, draws): {error}"
-    try:
-        parameters_of(it)
-    except TypeError as error:
-        return str(error)
-    return ""
+    return parameter_objection(it, ("use", "folder"))
 
 
 FAULTS: Registry[Any] = Registry(
@@ -169,8 +166,8 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
             if not isinstance(added, bool) and isfinite(added) and 0.0 <= added <= LONGEST:
                 return float(added)
             why = f"returned {printable(repr(added), 60)}; return a delay from 0 to {LONGEST:g} s, or None to drop"
-        except Exception as error:  # a fault is anybody's code
-            why = f"raised {printable(f'{type(error).__name__}: {error}', 200)}"
+        except ANYTHING as error:  # a fault is anybody's code
+            why = f"raised {named(error)}"
         failed = True
         tell(f"link fault {plugin.name} on {src} -> {dst} {why} at t = {t:.6g} s, message {seq}; it does nothing since")
         return 0.0

@@ -18,7 +18,7 @@ from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from wire.nearest import suggestion
-from wire.plugin import Plugin, plugin_of
+from wire.plugin import Plugin, plugin_of, scalar_objection
 
 ENTRIES: dict[str, type[msgspec.Struct]] = {"link": Fault, "partition": Partition, "node": NodeFault}
 """The keys of a scenario file that are netem's, and what each entry of them is."""
@@ -102,9 +102,12 @@ def _own(path: str, name: str, raw: Any, found: list[Mistake]) -> list[Plugin]:
     if raw is False:
         return []
     table = {} if raw is True else raw
-    if not isinstance(table, Mapping) or not all(isinstance(value, str | int | float) for value in table.values()):
+    if not isinstance(table, Mapping):
         text = f"must be true or a table of its parameters such as {{ p = 0.1 }}, got {shown(raw)}"
         found.append(Mistake(path, text))
+        return []
+    if wrong := {key: text for key, value in table.items() if (text := scalar_objection(value))}:
+        found += [Mistake(f"{path}.{key}", text) for key, text in wrong.items()]
         return []
     if not isinstance(table.get("folder", ""), str):
         found.append(Mistake(f"{path}.folder", f"must be a text in quotes, got {shown(table['folder'])}"))

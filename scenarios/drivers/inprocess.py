@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from agents.carriers.make import make_law
+from agents.carriers.make import close_laws, make_law
 from agents.config import AgentConfig
+from agents.laws.law import Law
 from agents.lockstep import AgentSide
 from plant.config import PlantConfig
 from plant.interface import PlantLike
@@ -193,12 +194,13 @@ def run_inprocess(
         plant = build_plant(plant_config)
     side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links))
     known = {config.name: config for config in agent_configs}
+    laws: list[Law] = []
     with ExitStack() as stack:
+        stack.callback(close_laws, laws)
 
         def agent_of(config: AgentConfig, instance: str) -> AgentSide:
-            law = make_law(config.control)
-            stack.callback(law.close)
-            return AgentSide(config, instance, links_of(config.name, config.links), law)
+            laws.append(make_law(config.control))
+            return AgentSide(config, instance, links_of(config.name, config.links), laws[-1])
 
         agents = [
             agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents

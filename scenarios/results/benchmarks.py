@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scenarios.results.published import Published
+from wire.anybody import ANYTHING, named
 from wire.plugin import plugin_of
 from wire.printable import printable
 from wire.registry import Registry
@@ -39,8 +40,8 @@ class Benchmark:
         """Return the summary of a run; one that raises an exception is a line that says why."""
         try:
             return [printable(str(line), 1000) for line in self.summary(found)]
-        except Exception as error:  # a benchmark is anybody's code
-            return [printable(f"The benchmark's summary failed: {type(error).__name__}: {error}", 300)]
+        except ANYTHING as error:  # a benchmark is anybody's code
+            return [f"The benchmark's summary failed: {named(error)}"]
 
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
         """Return the published number at a place of our results, or None where there is none."""

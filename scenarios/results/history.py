@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,9 @@ class Plates:
         )
 
 
+T = TypeVar("T", "Plates", "History")
+
+
 @dataclass(frozen=True, kw_only=True)
 class History:
     """One case: T rows of N inverters, terminal quantities as the plant told them."""
@@ -100,6 +104,15 @@ class History:
         table = np.fromiter(_numbers(rows, width), np.float64, len(rows) * width).reshape(len(rows), width)
         f, P, Q, V, P_set, V_set = np.moveaxis(table[:, 1:].reshape(len(rows), len(inverters), len(QUANTITIES)), 2, 0)
         return cls(inverters=inverters, t=table[:, 0], f=f, P=P, Q=Q, V=V, P_set=P_set, V_set=V_set)
+
+
+def read_only(of: T) -> T:
+    """The same, with arrays that cannot be written to: anybody's metric must not spoil what is measured after it."""
+    arrays = {item.name: it for item in fields(of) if isinstance(it := getattr(of, item.name), np.ndarray)}
+    views: dict[str, Any] = {name: array.view() for name, array in arrays.items()}
+    for view in views.values():
+        view.setflags(write=False)
+    return replace(of, **views)
 
 
 def _numbers(rows: Rows, width: int) -> Iterator[float]:

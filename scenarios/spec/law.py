@@ -9,24 +9,20 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.carriers.registry import LAWS
+from agents.carriers.executable import executable_problem
+from agents.carriers.registry import CARRIERS, KEYS, LAWS
+from agents.carriers.time_limit import make_limited
 from agents.config import Gains, LawChoice
-from agents.laws.call import ANYTHING
 from agents.laws.law import Law, limits_in
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
 from wire.module_folder import folder_of
 from wire.parameters import Range, objections, range_objection
+from wire.plugin import scalar_objection
 from wire.registry import PluginError
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
-
-CARRIERS = ("use", "command", "fmu")
-"""Keys of the table `law`, one of which says what the law is."""
-
-OWN_KEYS = (*CARRIERS, "folder", "time_limit_s")
-"""Keys of the table `law` that are no parameters of the law."""
 
 TIME_LIMIT = Range(0.001, 60.0)
 """What a time limit may be (s)."""
@@ -48,7 +44,7 @@ def law_of(scenario: Scenario, case: str) -> LawChoice:
         fmu=table.get("fmu", ""),
         folder=table.get("folder", ""),
         time_limit=float(table.get("time_limit_s", LawChoice().time_limit)),
-        parameters={key: value for key, value in table.items() if key not in OWN_KEYS},
+        parameters={key: value for key, value in table.items() if key not in KEYS},
     )
 
 
@@ -105,7 +101,7 @@ def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
         mistakes.add(f"{path}.{key}", text)
     if wrong.keys() & {*CARRIERS, "folder"}:  # there is no law to ask
         return
-    parameters = {key: value for key, value in table.items() if key not in (*OWN_KEYS, *wrong)}
+    parameters = {key: value for key, value in table.items() if key not in (*KEYS, *wrong)}
     checks = {"use": _check_class, "command": _check_program, "fmu": _check_fmu}
     for key, text in checks[given[0]](table, parameters):
         mistakes.add(f"{path}.{key}" if isinstance(law, Mapping) else path, text)
@@ -119,16 +115,20 @@ def _wrong_values(table: Mapping[str, Any]) -> dict[str, str]:
     command = table.get("command", ["-"])
     if not (isinstance(command, list | tuple) and command and all(isinstance(word, str) for word in command)):
         wrong["command"] = 'must be a list of texts, the program first, e.g. ["./mylaw", "--fast"]'
-    if text := range_objection(table.get("time_limit_s", 1.0), TIME_LIMIT, "s"):
+    if text := _limit_problem(table.get("time_limit_s", 1.0)):
         wrong["time_limit_s"] = text
     for low, high in (("P_set_min", "P_set_max"), ("V_set_min", "V_set_max")):
         least, most = (table.get(key, getattr(Law, key)) for key in (low, high))
         if isinstance(least, int | float) and isinstance(most, int | float) and least > most:
             wrong[low if low in table else high] = f"{low} = {least:g} pu is above {high} = {most:g} pu"
     for key, value in table.items():
-        if key not in OWN_KEYS and not isinstance(value, str | int | float):
-            wrong[key] = f"a parameter is a number, a text, or true or false; got {value!r}"
+        if key not in KEYS and (text := scalar_objection(value)):
+            wrong[key] = text
     return wrong
+
+
+def _limit_problem(given: Any) -> str:
+    return range_objection(given, TIME_LIMIT, "s")
 
 
 def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -141,12 +141,15 @@ def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> lis
     except PluginError as error:
         return [("use", str(error))]
     wrong = objections(law, parameters)
-    if not wrong:
-        try:
-            law(**parameters).close()
-        except ANYTHING as error:  # its __init__ is anybody's code
-            wrong = [("use", f"{use} cannot be made: {type(error).__name__}: {error}")]
-    return wrong
+    if wrong:
+        return wrong
+    limit = table.get("time_limit_s", LawChoice().time_limit)
+    limit = LawChoice().time_limit if _limit_problem(limit) else limit
+    try:
+        failed = make_limited(law, parameters, limit).close_failure()
+    except ValueError as error:
+        return [("use", f"{use} {error}")]
+    return [("use", f"the close of {use} failed: {failed}")] if failed else []
 
 
 def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -156,7 +159,9 @@ def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> l
     if not folder.is_dir():
         return [("folder", f"there is no folder {folder}")]
     place = folder / program
-    if shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
+    if found := shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
+        if text := executable_problem(Path(found)):
+            return [("command", f"{program} {text}")]
         return objections(Law, limits_in(parameters))
     if place.is_file():
         return [("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
@@ -164,13 +169,11 @@ def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> l
 
 
 def _check_fmu(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
-    from agents.carriers.fmu import FmuLaw
+    from agents.carriers.fmu import load_problem
     from agents.carriers.fmu_interface import fmu_problems
 
-    wrong = fmu_problems(Path(table.get("folder", "")) / table["fmu"], parameters)
-    if not wrong:
-        try:
-            FmuLaw(LawChoice(fmu=table["fmu"], folder=table.get("folder", ""), parameters=dict(parameters))).close()
-        except ValueError as error:
-            wrong = [("fmu", str(error))]
+    path = Path(table.get("folder", "")) / table["fmu"]
+    wrong = fmu_problems(path, parameters)
+    if not wrong and (text := load_problem(path)):
+        wrong = [("fmu", text)]
     return wrong

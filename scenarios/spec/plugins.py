@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import PluginKey
 from wire.module_folder import folder_of
-from wire.plugin import Plugin, plugin_of, problems
+from wire.plugin import Plugin, plugin_of, problems, scalar_objection
 from wire.registry import Registry
 
 
@@ -49,9 +49,9 @@ def check_plugin(path: str, key: PluginKey, registry: Registry[Any], mistakes: M
     if not table.get("use"):
         mistakes.add(path, f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}')
         return None
-    wrong = [name for name, value in table.items() if not isinstance(value, str | int | float)]
-    for name in wrong:
-        mistakes.add(f"{path}.{name}", "a parameter is a number, a text, or true or false")
+    wrong = {name: text for name, value in table.items() if (text := scalar_objection(value))}
+    for name, text in wrong.items():
+        mistakes.add(f"{path}.{name}", text)
     if wrong:
         return None
     plugin = plugin_of(table)

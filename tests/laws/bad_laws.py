@@ -107,3 +107,40 @@ class Unmakeable(gp.Law):
 
 def no_class() -> None:
     """Is no law."""
+
+
+class Held(gp.Law):
+    """Holds its set-points."""
+
+    def step(self, own: gp.Own, neighbours: Any, T: float) -> gp.SetPoints:
+        """Hold."""
+        return gp.SetPoints(own.P_set, own.V_set)
+
+
+class NeverMade(Held):
+    """Is never made."""
+
+    def __init__(self, **parameters: Any) -> None:
+        while True:
+            pass
+
+
+class NeverClosed(Held):
+    """Never ends."""
+
+    def close(self) -> None:
+        """Go on."""
+        while True:
+            pass
+
+
+class NamedAsAKey(Held):
+    """Has a parameter that no scenario can give."""
+
+    folder: str = ""
+
+
+class NamedAsAMethod(Held):
+    """Has a parameter where a method should be."""
+
+    start: float = 0.0  # type: ignore[assignment]

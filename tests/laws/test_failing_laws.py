@@ -85,6 +85,12 @@ def _text(path: Path) -> str:
     (f"{BAD}:NoStep", r"NoStep is no law: it has no method step\(self, own, neighbours, T\)"),
     (f"{BAD}:WrongStep", r"WrongStep is no law: write its method step\(self, own, neighbours, T\): too many"),
     (f"{BAD}:Unmakeable", r"Unmakeable cannot be made: RuntimeError: no licence"),
+    ({"use": f"{BAD}:NeverMade", "time_limit_s": 0.01}, r"cannot be made: its __init__ took longer than 0.1 s, ten t"),
+    ({"use": f"{BAD}:NeverClosed", "time_limit_s": 0.01}, r"the close of .*:NeverClosed failed: it took longer than t"),
+    (f"{BAD}:NamedAsAKey", r"is no law: its parameter folder cannot be given, as a scenario has the key folder for s"),
+    (f"{BAD}:NamedAsAMethod", r"is no law: its start is no method; give the parameter another name"),
+    ({"use": "dapi", "k": 10**30}, r"case.IV.law.k: a whole number has at most 64 bits; got 1000"),
+    ({"command": ["ls"], "k": float("nan")}, r"case.IV.law.k: must be a finite number, got nan"),
     ({"use": f"{BAD}:Failing", "gain": 500}, r"case.IV.law.gain: must be from 0 to 100 1/s, got 500"),
     ({"use": f"{BAD}:Failing", "gian": 5}, r'case.IV.law.gian: unknown parameter; did you mean "gain"\?'),
     ({"use": "dapi", "k": "fast"}, r'case.IV.law.k: must be a number, got "fast"'),
@@ -115,6 +121,22 @@ def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said
 def test_a_program_may_have_any_parameter() -> None:
     """Also one that is called as something else of the class Law."""
     gp.load("islanding").replace({"case.IV.law": {"command": ["ls"], "source": 1, "step": 2, "k": 3}, **SHORT})
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("print(1)\n", r"\./law has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"),
+    ("#!/nowhere/python\n", r"\./law asks in its first line for /nowhere/python, and there is no such program"),
+    ("#!/usr/bin/env pithon3\n", r"\./law asks in its first line for pithon3, which is not on the PATH"),
+    ("#!/bin/sh\r\n", r"\./law has lines that end as those of Windows"),
+])  # fmt: skip
+def test_a_program_that_the_system_cannot_run_is_refused(text: str, said: str, tmp_path: Path) -> None:
+    """Its first line says it, before anything starts."""
+    file = tmp_path / "law"
+    file.write_bytes(text.encode())
+    file.chmod(0o755)
+
+    with pytest.raises(gp.ScenarioError, match=said):
+        gp.load("islanding").replace({"case.IV.law": {"command": ["./law"], "folder": str(tmp_path)}})
 
 
 def test_all_mistakes_of_a_law_come_at_once() -> None:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from scenarios.results.findings import Findings
 from scenarios.results.quantities import Quantity
-from wire.printable import printable
+from wire.anybody import ANYTHING, named
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
@@ -65,9 +65,8 @@ def judge(found: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     for claim in claims:
         try:
             verdicts.append(_verdict(claim, found))
-        except Exception as error:  # a claim is anybody's code
-            text = printable(f"{type(error).__name__}: {error}", 200)
-            verdicts.append(Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {text}"))
+        except ANYTHING as error:  # a claim is anybody's code
+            verdicts.append(Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}"))
     return tuple(verdicts)
 
 
@@ -81,7 +80,8 @@ def _verdict(claim: Claim, found: Findings) -> Verdict:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
     if lacking := claim.lacking(found):
         return Verdict(claim=claim, status="FAIL", found=lacking)
-    holds, text = claim.judge(found)
+    holds, told = claim.judge(found)
+    text = str(told)
     if not holds and claim.known_miss:
         return Verdict(claim=claim, status="MISS", found=text)
     unsteady = found.unsteady(claim.cases, claim.events, claim.measures)

@@ -12,6 +12,7 @@ value with its unit; or a `gridpeers.Claim` object, which also says which cases,
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Sequence
 
@@ -57,5 +58,5 @@ def judged(found: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
             claim = Claim(name=plugin.use, text=plugin.use, source="", judge=lambda _: (False, ""), measures=())
             verdicts.append(Verdict(claim=claim, status="FAIL", found=str(error)))
             continue
-        verdicts += judge(found, (claim,))
+        verdicts += judge(copy.deepcopy(found), (claim,))  # what it changes there is no other claim's concern
     return tuple(verdicts)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from plant.equipment import Feeder
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Plates, read_only
 from scenarios.results.metrics import Window
 from scenarios.results.own.metric import Measured, make_metrics, measured
 from scenarios.results.own.window_data import WindowData
@@ -43,7 +43,7 @@ def own_measures(
         return {}
     found: dict[str, dict[str, Measured]] = {}
     for case, history in histories.items():
-        mine = plates.without(without_agent(scenario, case))
+        mine, whole = read_only(plates.without(without_agent(scenario, case))), read_only(history)
         with np.errstate(all="ignore"):  # what is no number is told as such
             found[case] = {
                 window.label: measured(
@@ -51,7 +51,7 @@ def own_measures(
                     WindowData(
                         case=case,
                         window=window,
-                        whole=history,
+                        whole=whole,
                         plates=mine,
                         f_nom=feeder.f_nom,
                         T_c=scenario.time.T_c_s,

@@ -18,10 +18,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from wire.parameters import parameters_of
+from wire.anybody import ANYTHING, named
+from wire.parameters import parameter_objection
 from wire.plugin import Plugin, made
 from wire.printable import printable
-from wire.registry import Registry
+from wire.registry import PluginError, Registry
 
 if TYPE_CHECKING:
     from scenarios.results.own.window_data import WindowData
@@ -42,10 +43,9 @@ def callable_with(it: Any, argument: str) -> str:
             return f"the class needs a method __call__(self, {argument})"
         try:
             inspect.signature(call).bind(None, None)
-            parameters_of(it)
         except TypeError as error:
             return f"write its method __call__(self, {argument}): {error}"
-        return ""
+        return parameter_objection(it, ("use", "folder", "name"))
     if not callable(it):
         return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
     try:
@@ -107,13 +107,16 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     for name, metric in metrics:
         try:
             found = metric(data)
-        except Exception as error:  # a metric is anybody's code
+            several = dict(found) if isinstance(found, Mapping) else {"": found}
+            numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
+        except ANYTHING as error:  # a metric is anybody's code, and so is what it returns
             values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
             continue
-        several = found if isinstance(found, Mapping) else {"": found}
-        for key, value in several.items():
-            full = f"{name}.{key}" if key != "" else name
-            values[full], reasons[full] = _number(value)
+        finally:
+            vars(data).pop("history", None)  # the next metric has a table that this one has not changed
+        for key, (value, reason) in numbers.items():
+            full = f"{name}.{key}" if key else name
+            values[full], reasons[full] = value, reason
     return Measured(values=values, reasons={name: text for name, text in reasons.items() if text})
 
 
@@ -146,17 +149,16 @@ def _number(value: Any) -> tuple[float | None, str]:
         return None, ""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None, f"returned {printable(repr(value), 80)}; return a number, or numbers by name"
     return (number, "") if math.isfinite(number) else (None, f"is no finite number: {number}")
 
 
-def _shown(error: Exception) -> str:
-    text = printable(str(error), 160)
-    return text if type(error).__name__ == "PluginError" else f"{type(error).__name__}: {text}"
+def _shown(error: BaseException) -> str:
+    return printable(str(error), 160) if isinstance(error, PluginError) else named(error)
 
 
-def _columns(error: Exception, data: WindowData) -> str:
+def _columns(error: BaseException, data: WindowData) -> str:
     """What a table has, for a metric that asked for something else."""
     if not isinstance(error, (KeyError, AttributeError, IndexError)):
         return ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.results.history import Floats, History, Plates
+from scenarios.results.history import Floats, History, Plates, read_only
 from scenarios.results.metrics import Steady, Window, between, measure
 from scenarios.results.settling import Settling, settling
 
@@ -63,7 +63,7 @@ class WindowData:
         """Rows of the window alone, as arrays (rows, inverters)."""
         inside = between(self.whole.t, self.window)
         columns = {field.name: getattr(self.whole, field.name)[inside] for field in fields(History)[1:]}
-        return replace(self.whole, **columns)
+        return read_only(replace(self.whole, **columns))
 
     @property
     def t(self) -> Floats:
@@ -102,7 +102,7 @@ class WindowData:
 
     @cached_property
     def history(self) -> pd.DataFrame:
-        """Rows of the window as a table: columns (inverter, quantity), index t (s)."""
+        """Rows of the window as a table: columns (inverter, quantity), index t (s); each metric has its own."""
         import pandas as pd  # takes longer to import than a case to run
 
         values = np.stack([getattr(self.record, name) for name in QUANTITIES], axis=2).reshape(len(self.t), -1)

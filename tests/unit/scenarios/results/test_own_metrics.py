@@ -1,6 +1,7 @@
 """Metrics and claims of one's own: their values, and what becomes of those that fail."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from scenarios.results.claims import Claim
 from scenarios.results.findings import Findings
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Plates, read_only
 from scenarios.results.metrics import Window
 from scenarios.results.own.claim import judged
 from scenarios.results.own.claim_registry import CLAIMS
@@ -25,11 +26,26 @@ def window_data() -> WindowData:
     t = np.round(np.arange(0.0, 2.005, 0.01), 9)
     f = np.where((t > 1.0) & (t < 1.1), 59.5, 60.0)[:, None] + np.array([0.0, -1.0])
     ones = np.ones((len(t), 2))
-    whole = History(inverters=NAMES, t=t, f=f, P=5e5 * ones, Q=1e4 * ones, V=277.0 * ones, P_set=ones, V_set=ones)
+    whole = read_only(
+        History(inverters=NAMES, t=t, f=f, P=5e5 * ones, Q=1e4 * ones, V=277.0 * ones, P_set=ones, V_set=ones)
+    )
     plates = Plates(names=NAMES, GFM=np.array([True, False]), s=np.array([1e6, 1e6]), V_nom=np.array([277.0, 277.0]),
                     m_p=np.array([0.01, 0.01]), m_q=np.array([0.05, 0.05]))  # fmt: skip
     event = Window(label="event1", start=1.0, end=2.0)
     return WindowData(case="IV", window=event, whole=whole, plates=plates, f_nom=60.0, T_c=0.02)
+
+
+class Unlisted(Mapping[str, float]):
+    """Values by name that cannot be listed."""
+
+    def __getitem__(self, name: str) -> float:
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        raise RuntimeError("no list")
+
+    def __len__(self) -> int:
+        return 1
 
 
 def of(metric: Callable[[WindowData], Any]) -> tuple[dict[str, float | None], dict[str, str]]:
@@ -125,3 +141,48 @@ def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one
     ]
     assert verdicts[1].found == "cannot be judged: KeyError: 'V'"
     assert 'has no "nothing"' in verdicts[3].found
+
+
+@pytest.mark.parametrize(
+    ("metric", "said"),
+    [
+        (lambda window: sys.exit(3), "failed: SystemExit: 3"),
+        (lambda window: window.f.fill(0.0), "failed: ValueError: assignment destination is read-only"),
+        (lambda window: 10**400, "returned 1000"),
+        (lambda window: {"a\nb": 1.0, 3: "x"}, "returned 'x'"),
+        (lambda window: Unlisted(), "failed: RuntimeError: no list"),
+    ],
+)
+def test_a_metric_ends_no_run_and_changes_nothing_of_it(metric: Callable[[Any], Any], said: str) -> None:
+    """It may leave Python, write to what it is given, or return what cannot be read."""
+    _, reasons = of(metric)
+
+    assert next(iter(reasons.values())).startswith(said)
+    assert all(name.isprintable() for name in reasons)
+
+
+def test_a_metric_that_changes_its_table_changes_no_others() -> None:
+    """Each has a table of its own."""
+
+    def spoils(window: WindowData) -> float:
+        window.history.iloc[:, :] = 0.0
+        return float(window.history["inv1"]["f"].min())
+
+    found = measured([("one", spoils), ("other", lambda window: window.history["inv1"]["f"].min())], window_data())
+
+    assert found.values == {"one": 0.0, "other": 59.5}
+
+
+def spoils(found: Findings) -> bool:
+    """Is not true."""
+    found.results.clear()  # type: ignore[attr-defined]
+    sys.exit(3)
+
+
+def test_a_claim_ends_no_run_and_changes_no_other_claims_findings() -> None:
+    """It may leave Python, or empty what it is given."""
+    found = Findings(results={"IV": {}})
+    (verdict,) = judged(found, [Plugin(use=f"{__name__}:spoils")])
+
+    assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: SystemExit: 3")
+    assert found.results == {"IV": {}}

@@ -1,0 +1,69 @@
+"""Whatever a law's program does, it ends with its agent, and nothing that it has started is left."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from agents.carriers.make import close_laws
+from agents.carriers.program import ProgramLaw
+from agents.config import LawChoice
+from agents.laws.call import LawError
+from agents.laws.law import Own
+
+OWN = Own("inv1", True, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+
+STAYS = "sleep 600 & sleep 600"
+"""A shell that ignores the end of its input, and has started another program."""
+
+AGENT = f"""
+import os, signal
+from agents.carriers.program import ProgramLaw
+from agents.config import LawChoice
+law = ProgramLaw(LawChoice(command=("sh", "-c", {STAYS!r})))
+"""
+
+
+@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "law.close()", "os._exit(1)"])
+def test_nothing_outlives_an_agent_however_it_ends(end: str) -> None:
+    """All of them hold the same pipe: its end comes once the last has gone."""
+    subprocess.run([sys.executable, "-c", AGENT + end], stderr=subprocess.PIPE, timeout=30.0)
+
+
+def test_programs_that_ignore_the_end_of_their_input_are_waited_for_together() -> None:
+    """Each has 1 s to end, and so have all."""
+    laws = [ProgramLaw(LawChoice(command=("sh", "-c", STAYS))) for _ in range(4)]
+    began = monotonic()
+    close_laws(laws)
+
+    assert 0.9 < monotonic() - began < 3.0
+
+
+@pytest.mark.parametrize(("script", "said"), [
+    ("printf '{\"type\":'; sleep 600", r"did not answer the start at t = 0 s within 0.5 s"),
+    ("while :; do echo too much >&2; done", r"did not answer the start at t = 0 s within 0.5 s"),
+    ("sleep 600 & exit 3", r"ended at the start at t = 0 s with exit code 3"),
+    ("head -c 200000 /dev/zero | tr '\\0' x; sleep 600", r"answered the start at t = 0 s with more than 100000 bytes"),
+])  # fmt: skip
+def test_a_program_that_says_too_little_or_too_much_is_told_in_one_line(script: str, said: str) -> None:
+    """Half a line, endless complaints, an end that leaves another program, a line without end."""
+    law = ProgramLaw(LawChoice(command=("sh", "-c", f"exec 2>/dev/null; read -r _; {script}"), time_limit=0.05))
+    try:
+        with pytest.raises(LawError, match=said):
+            law.start(OWN)
+    finally:
+        law.close()
+
+
+def test_a_law_that_was_closed_says_so(tmp_path: Path) -> None:
+    """It is called no more; and it can be closed twice."""
+    law = ProgramLaw(LawChoice(command=("cat",), folder=str(tmp_path)))
+    law.close()
+    law.close()
+
+    with pytest.raises(LawError, match="cat has ended before the start at t = 0 s"):
+        law.start(OWN)
