@@ -14,7 +14,7 @@ from scenarios.spec.mistakes import Mistakes, ScenarioError
 from scenarios.sweep.file.paths import PathError, Tree, put, remove
 
 if TYPE_CHECKING:
-    from typing_extensions import Unpack
+    from typing import Unpack
 
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import How

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import get_args
+from typing import TypedDict, get_args
 
 import msgspec
 
@@ -43,7 +43,15 @@ def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str
     return msgspec.structs.replace(spec, cases={name: rule for name, rule in spec.cases.items() if name in chosen})
 
 
-def check_how(driver: str, clock: str, speed: float, *, strict: bool, dash: str = "") -> None:
+class Pace(TypedDict, total=False):
+    """How a run keeps time: fields of a `Request`, options of the command, arguments of `gridpeers.Scenario.run`."""
+
+    clock: Clock
+    speed: float
+    strict: bool
+
+
+def check_how(driver: str, pace: Pace, *, dash: str = "") -> None:
     """Check how a scenario is to be run; `dash` stands before the words' names: "--" on a command line.
 
     Raises
@@ -51,6 +59,7 @@ def check_how(driver: str, clock: str, speed: float, *, strict: bool, dash: str 
     ScenarioError
         If there is no such driver or clock, or they do not go together.
     """
+    clock, speed, strict = pace.get("clock", "simulated"), pace.get("speed", 1.0), pace.get("strict", False)
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
         if value not in choices:
             raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(str(value), choices, "choices")}'])

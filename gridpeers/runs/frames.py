@@ -18,9 +18,6 @@ from scenarios.sweep.words import unit_of
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's index and quantities."""
 
-METRIC_UNITS = {"f_error_Hz": "Hz", "V_error": "pu", "t_restore_s": "s", "t_load_s": "s"}
-"""Units of the metrics that are no pure numbers."""
-
 
 def history_frame(history: History) -> pd.DataFrame:
     """Return a case with columns (inverter, quantity) over time; the units are in its `attrs`.
@@ -58,7 +55,7 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     frame["reasons"] = [
         "; ".join(f"{name}: {text}" for name, text in window.get("reasons", {}).items()) for window in windows.values()
     ]
-    units = {name: METRIC_UNITS.get(name) or unit_of(name) for name in frame}
+    units = {name: unit_of(name) for name in frame}
     frame.attrs["units"] = {name: unit for name, unit in units.items() if unit}
     return frame
 

@@ -5,27 +5,24 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Unpack
 
-from gridpeers.runs.choices import check_how, with_cases
+from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Results
 from gridpeers.runs.run_folder import RunFolder, empty_folder
-from scenarios.results.numbers import Clock
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError
 from scenarios.spec.portability import check_portable
+from wire.nearest import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario
 
 
-class How(TypedDict, total=False):
+class How(Pace, total=False):
     """How a run goes, beside its driver; `gridpeers.Scenario.run` says what the words mean."""
 
-    clock: Clock
-    speed: float
-    strict: bool
     progress: Progress | None
     folder: str | Path | None
 
@@ -35,15 +32,17 @@ def run(
     cases: Iterable[str] | None,
     driver: Driver,
     *,
-    clock: Clock = "simulated",
-    speed: float = 1.0,
-    strict: bool = False,
     progress: Progress | None = None,
     folder: str | Path | None = None,
+    **pace: Unpack[Pace],
 ) -> Results:
     """Run some cases of a scenario, or all, into a folder of their own; see `gridpeers.Scenario.run`."""
+    words = How.__annotations__
+    for name in pace:
+        if name not in words:
+            raise TypeError(f'run has no argument "{name}"; {suggestion(name, words, "arguments")}')
     spec = with_cases(scenario.spec, cases)
-    check_how(driver, clock, speed, strict=strict)
+    check_how(driver, pace)
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
     if folder is None:
@@ -55,10 +54,8 @@ def run(
         feeder=scenario.feeder,
         driver=driver,
         folder=home.path,
-        clock=clock,
-        speed=speed,
-        strict=strict,
         lasting=folder is not None,
+        **pace,
     )
     try:
         run_request(request, progress or _silent)

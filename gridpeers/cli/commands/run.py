@@ -72,13 +72,14 @@ def run(
     """
     from datetime import datetime
 
-    from gridpeers.runs.choices import check_how
+    from gridpeers.runs.choices import Pace, check_how
     from scenarios.spec import ScenarioError
 
     spec, feeder = load(scenario)
     spec = chosen(spec, case, seed)
+    pace = Pace(clock=clock.value, speed=speed, strict=strict)
     try:
-        check_how(driver.value, clock.value, speed, strict=strict, dash="--")
+        check_how(driver.value, pace, dash="--")
     except ScenarioError as error:
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
@@ -102,15 +103,7 @@ def run(
         fail([str(error)], BAD_INPUT)
 
     console = Console()
-    request = Request(
-        scenario=spec,
-        feeder=feeder,
-        driver=driver.value,
-        folder=folder,
-        clock=clock.value,
-        speed=speed,
-        strict=strict,
-    )
+    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder, **pace)
     try:
         with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)

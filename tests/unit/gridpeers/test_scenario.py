@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 from collections import Counter
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gridpeers as gp
+from gridpeers.cli.commands.run import run as command
+from gridpeers.runs.choices import Pace
+from gridpeers.runs.running import How
+from scenarios.run import Request
 
 TABLES = {
     "name": "mine",
@@ -104,6 +110,16 @@ def test_an_unknown_case_driver_or_clock_is_one_line() -> None:
         with pytest.raises(gp.ScenarioError, match=text) as caught:
             scenario.run(**words)  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
+
+
+def test_every_argument_of_a_run_has_its_text_and_the_command_its_option() -> None:
+    """A new one that is forgotten in one of the places is found here; an unknown one is told with the nearest."""
+    text, options = gp.Scenario.run.__doc__ or "", inspect.signature(command).parameters
+
+    assert [name for name in How.__annotations__ if f"\n        {name} : " not in text] == []
+    assert set(Pace.__annotations__) <= set(options) & {field.name for field in fields(Request)}
+    with pytest.raises(TypeError, match='run has no argument "sped"; did you mean "speed"'):
+        gp.load("islanding").run("IV", sped=2.0)  # type: ignore[call-overload]
 
 
 def test_a_scenario_without_events_runs_and_has_no_windows() -> None:

@@ -1,7 +1,10 @@
 """Metrics and claims of one's own: their values, and what becomes of those that fail."""
 
+import inspect
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,11 +13,13 @@ import pytest
 from scenarios.results.claims import Claim
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Plates, read_only
-from scenarios.results.metrics import Window
+from scenarios.results.metrics import Steady, Window
+from scenarios.results.own import builtin
 from scenarios.results.own.claim import judged
 from scenarios.results.own.claim_registry import CLAIMS
-from scenarios.results.own.metric import METRICS, make_metrics, measured, name_of
+from scenarios.results.own.metric import ALWAYS, METRICS, make_metrics, measured, name_of
 from scenarios.results.own.window_data import WindowData
+from scenarios.sweep.words import unit_of
 from wire.plugin import Plugin, problems
 from wire.registry import PluginError
 
@@ -96,6 +101,17 @@ def test_gridpeers_own_metrics_are_entries_like_any_other() -> None:
     assert values["MPSI"] == data.steady.MPSI
     assert values["p.inv1"] == 0.5
     assert len(plugins) == 12
+
+
+def test_the_metrics_that_every_run_has_are_those_of_its_file() -> None:
+    """A metric that is added in one place alone, or whose name lacks its unit, is found here."""
+    written = {name for name, it in vars(builtin).items() if inspect.isfunction(it)}
+
+    assert written <= set(METRICS.names)
+    assert set(ALWAYS) == {field.name for field in fields(Steady)} - {"reasons"} | {"messages_saved"}
+    for name in written - {"p"}:
+        unit = re.search(r"\((s|Hz|pu)\)", inspect.getdoc(getattr(builtin, name)) or "")
+        assert unit_of(name) == (unit[1] if unit else "")
 
 
 def test_what_is_no_metric_and_no_claim_is_refused() -> None:
