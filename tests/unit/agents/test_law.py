@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from agents.config import Gains, Handling
 from agents.handling import gains_in_force
-from agents.laws.consensus import P_set_step, V_set_step, alpha_in_force, towards
+from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
+from wire.parameters import parameters_of
 
 Matrix = NDArray[np.float64]
 
@@ -302,3 +303,11 @@ def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: floa
 
     assert 0.1 <= P <= 0.9
     assert 0.95 <= V <= 1.05
+
+
+def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:
+    """`[gains]` and the class that takes them are declared apart, and say the same."""
+    defaults = {name: parameter.default for name, parameter in parameters_of(Consensus).items()}
+
+    assert defaults.pop("kappa_c") == 0.0
+    assert defaults == msgspec.structs.asdict(Gains())
