@@ -18,8 +18,8 @@ from typing import Annotated, Any, Protocol
 
 from wire.anybody import ANYTHING, named
 from wire.nearest import suggestion
-from wire.parameters import parameter_objection
 from wire.plugin import Plugin, made
+from wire.plugin_shape import callable_objection
 from wire.printable import printable
 from wire.registry import PluginError, Registry
 
@@ -128,20 +128,10 @@ def _pairwise(members: Members, linked: Callable[[Member, Member], bool]) -> dic
     }
 
 
-def _objection(it: Any) -> str:
-    if not callable(it):
-        return "write a function of the members' nameplates, or a class with a method __call__(self, members)"
-    if isinstance(it, type):
-        if not any("__call__" in vars(base) for base in it.__mro__):
-            return "the class needs a method __call__(self, members)"
-        return parameter_objection(it, ("use", "folder"))
-    return ""
-
-
 GRAPHS: Registry[Any] = Registry(
     "graph",
     "graphs",
-    _objection,
+    lambda it: callable_objection(it, "members"),
     own={
         "full": "agents.graphs:full",
         "none": "agents.graphs:none",

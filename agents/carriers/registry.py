@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 from agents.laws.law import Law
-from wire.parameters import parameter_objection
+from wire.plugin_shape import class_objection
 from wire.registry import Registry
 
 CARRIERS = ("use", "command", "fmu")
@@ -20,17 +19,10 @@ METHODS = ("start", "close")
 
 
 def _objection(it: Any) -> str:
-    if not (isinstance(it, type) and issubclass(it, Law)):
-        return "derive a class from gridpeers.Law"
-    if it.step is Law.step:
-        return "it has no method step(self, own, neighbours, T)"
-    try:
-        inspect.signature(it.step).bind(None, None, (), 0.02)
-    except TypeError as error:
-        return f"write its method step(self, own, neighbours, T): {error}"
-    if method := next((name for name in METHODS if not callable(getattr(it, name))), ""):
-        return f"its {method} is no method; give the parameter another name"
-    return parameter_objection(it, KEYS)
+    if wrong := class_objection(it, Law, "step", ("own", "neighbours", "T"), KEYS):
+        return wrong
+    method = next((name for name in METHODS if not callable(getattr(it, name))), "")
+    return f"its {method} is no method; give the parameter another name" if method else ""
 
 
 LAWS: Registry[type[Law]] = Registry(

@@ -12,7 +12,6 @@ A message meets it after loss and before the line's rate: it is dropped, or goes
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple
@@ -21,8 +20,9 @@ import msgspec
 
 from netem.draws import Stream
 from wire.anybody import ANYTHING, named
-from wire.parameters import parameter_objection, values_of
+from wire.parameters import values_of
 from wire.plugin import Plugin, made
+from wire.plugin_shape import class_objection
 from wire.printable import printable
 from wire.registry import Registry
 
@@ -101,15 +101,7 @@ class LinkFault:
 def _objection(it: Any) -> str:
     if isinstance(it, type) and issubclass(it, msgspec.Struct) and it.__module__.startswith("netem.models."):
         return ""
-    if not (isinstance(it, type) and issubclass(it, LinkFault)):
-        return "derive a class from gridpeers.LinkFault"
-    if it.judge is LinkFault.judge:
-        return "it has no method judge(self, message, draws)"
-    try:
-        inspect.signature(it.judge).bind(None, None, None)
-    except TypeError as error:
-        return f"write its method judge(self, message, draws): {error}"
-    return parameter_objection(it, ("use", "folder"))
+    return class_objection(it, LinkFault, "judge", ("message", "draws"))
 
 
 FAULTS: Registry[Any] = Registry(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenarios.results.own.metric import callable_with
+from wire.plugin_shape import callable_objection
 from wire.registry import Registry
 
 
 def _objection(it: Any) -> str:
     from scenarios.results.claims import Claim  # numpy, which a scenario is read without
 
-    return "" if isinstance(it, Claim) else callable_with(it, "findings")
+    return "" if isinstance(it, Claim) else callable_objection(it, "findings")
 
 
 CLAIMS: Registry[Any] = Registry("claim", "claims", _objection)

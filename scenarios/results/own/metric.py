@@ -11,7 +11,6 @@ A metric returns a number, or several by name. A name ends in the unit, as a key
 
 from __future__ import annotations
 
-import inspect
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -19,8 +18,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from wire.anybody import ANYTHING, named
-from wire.parameters import parameter_objection
 from wire.plugin import Plugin, made
+from wire.plugin_shape import KEYS, callable_objection
 from wire.printable import printable
 from wire.registry import PluginError, Registry
 
@@ -35,32 +34,10 @@ ALWAYS = ("f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s", "p
 _OURS = (*ALWAYS, "t_f_s", "t_share_s", "f_swing_Hz", "V_swing_pu")
 
 
-def callable_with(it: Any, argument: str) -> str:
-    """Why something is no function, nor class of functions, of one argument; "" if it is."""
-    if isinstance(it, type):
-        call = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
-        if call is None:
-            return f"the class needs a method __call__(self, {argument})"
-        try:
-            inspect.signature(call).bind(None, None)
-        except TypeError as error:
-            return f"write its method __call__(self, {argument}): {error}"
-        return parameter_objection(it, ("use", "folder", "name"))
-    if not callable(it):
-        return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
-    try:
-        inspect.signature(it).bind(None)
-    except TypeError as error:
-        return f"it is called with one argument, the {argument}: {error}"
-    except ValueError:  # a function of C tells no signature
-        return ""
-    return ""
-
-
 METRICS: Registry[Any] = Registry(
     "metric",
     "metrics",
-    lambda it: callable_with(it, "window"),
+    lambda it: callable_objection(it, "window", (*KEYS, "name")),
     own={name: f"scenarios.results.own.builtin:{name}" for name in _OURS},
 )
 """Metrics by name; those of gridpeers come first."""

@@ -30,6 +30,9 @@ class Next:
         names = list(members)
         return {a: [names[(i + j) % len(names)] for j in range(1, self.k + 1)] for i, a in enumerate(names)}
 
+def of_two(members, hub):
+    return {}
+
 def of_three(members):
     return {name: () for name in members} if len(members) != 2 else members["nobody"]
 
@@ -83,6 +86,7 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
             'module my_graphs has no "sta"; did you mean "star"? The graphs are star, Next, of_three',
         ),
         ("my_graphs:Wrong", {}, "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
+        ("my_graphs:of_two", {}, "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),
         ("my_graphs:MODULE", {}, 'module my_graphs has no "MODULE"'),
         ("no_graphs:star", {}, 'there is no module "no_graphs" in '),
         ("rings", {}, 'there is no graph "rings"; did you mean "ring"? The graphs are full, none, GFM-only, clustered'),

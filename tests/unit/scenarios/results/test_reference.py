@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from agents.config import Gains
+from gridpeers.cli.commands.show import Topic
 from netem.spec.netem import Netem
 from netem.spec.reading import ENTRIES
 from plant.config import GflParameters, GfmParameters
@@ -88,3 +89,8 @@ def test_the_reference_in_the_documentation_is_up_to_date() -> None:
     body = page("scenario").partition("\n")[2].strip().replace("\n## ", "\n### ")
 
     assert body in (DOCS / "scenarios.md").read_text(encoding="utf-8")
+
+
+def test_the_command_has_every_page() -> None:
+    """Its list is written apart, as help comes without what makes the pages."""
+    assert set(Topic) == set(TOPICS)
