@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
+from wire.path_text import is_no_path
 from wire.registry import NOTEBOOK, is_of_another
 
 
@@ -19,6 +20,8 @@ def folder_of(reference: str, folder: str) -> str:
     'here'
     """
     top = reference.partition(":")[0].partition(".")[0]
+    if is_no_path(folder) or is_no_path(f"{top}.py"):  # a mistake, which is told where the key is checked
+        return folder
     beside = Path(folder)
     if (beside / f"{top}.py").is_file() or (beside / top).is_dir() or top == NOTEBOOK:
         return folder

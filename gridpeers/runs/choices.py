@@ -37,9 +37,11 @@ def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str
     if not isinstance(names, Iterable):
         raise ScenarioError([f"{option}cases: needs a name, a list of names, or None for all, got {names!r:.60}"])
     chosen = list(names)
-    unknown = [name for name in chosen if name not in spec.cases] if chosen else [""]
+    unknown = [name for name in chosen if not isinstance(name, str) or name not in spec.cases] if chosen else [""]
     if unknown:
-        raise ScenarioError(f'{option}no case "{name}"; {suggestion(name, spec.cases, "cases")}' for name in unknown)
+        raise ScenarioError(
+            f'{option}no case "{name}"; {suggestion(str(name), spec.cases, "cases")}' for name in unknown
+        )
     return msgspec.structs.replace(spec, cases={name: rule for name, rule in spec.cases.items() if name in chosen})
 
 
@@ -61,7 +63,7 @@ def check_how(driver: str, pace: Pace, *, dash: str = "") -> None:
     """
     clock, speed, strict = pace.get("clock", "simulated"), pace.get("speed", 1.0), pace.get("strict", False)
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
-        if value not in choices:
+        if not isinstance(value, str) or value not in choices:
             raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(str(value), choices, "choices")}'])
     low, high = SPEEDS
     wrong = ""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.results.folder import FolderError, refusal
+from wire.path_text import is_no_path
 
 
 class RunFolder:
@@ -40,7 +41,7 @@ def as_folder(it: Any) -> Path:
     FolderError
         If it is no path.
     """
-    if not isinstance(it, str | PathLike) or "\0" in str(it) or not str(it):
+    if not isinstance(it, str | PathLike) or not str(it) or is_no_path(str(it)):
         raise FolderError(f"needs the path of a folder, got {it!r:.60}")
     return Path(it)
 

@@ -43,6 +43,8 @@ def run(
             raise TypeError(f'run has no argument "{name}"; {suggestion(name, words, "arguments")}')
     spec = with_cases(scenario.spec, cases)
     check_how(driver, pace)
+    if progress is not None and not callable(progress):
+        raise ScenarioError([f"progress: must be a function of a case and two times, got {progress!r:.60}"])
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
     if folder is None:

@@ -46,13 +46,18 @@ def compare(a: Run, b: Run, *, names: tuple[str, str] = ("a", "b")) -> Compariso
     --------
     >>> compare(load("islanding").run("III"), load("islanding").run("IV"), names=("III", "IV"))  # doctest: +SKIP
     """
-    if len(set(names)) != 2:
-        raise ScenarioError([f"names: two different words are needed, got {names[0]!r} and {names[1]!r}"])
+    if not _are_names(names):
+        raise ScenarioError([f'names: two different words are needed, as ("before", "after"), got {names!r:.60}'])
     first, second = (read(run) if isinstance(run, str | Path) else run for run in (a, b))
     for run in (first, second):
         if not isinstance(run, Result | Results):
             raise ScenarioError([f"compare: needs results or folders of runs, got {run!r:.60}"])
-    return Comparison(_pairs(first, second), names)
+    return Comparison(_pairs(first, second), (names[0], names[1]))
+
+
+def _are_names(it: Any) -> bool:
+    words = tuple(it) if isinstance(it, list | tuple) else ()
+    return len(words) == 2 and all(isinstance(word, str) and word for word in words) and words[0] != words[1]
 
 
 def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, Result]]:

@@ -37,7 +37,7 @@ def sweep(
     grid: Values | None = None,
     *,
     zip: Values | None = None,
-    cases: str | Iterable[str] = (),
+    cases: str | Iterable[str] | None = None,
     seeds: int = 1,
     metrics: str | Iterable[Any] | None = None,
     histories: bool = False,
@@ -83,8 +83,10 @@ def sweep(
     --------
     >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
     """
-    checked, chosen = _with_metrics(as_scenario(scenario), metrics)
-    plan = _plan(checked, grid or {}, zip or {}, _names(cases), seeds)
+    known = as_scenario(scenario)
+    _check_words(grid, zip, cases, metrics, jobs, progress)
+    checked, chosen = _with_metrics(known, metrics)
+    plan = _plan(checked, grid or {}, zip or {}, _names(cases or ()), seeds)
     runs = list(enumerate(plan.runs))
     done: dict[int, Done] = {}
     kept: dict[int, pd.DataFrame] = {}
@@ -105,11 +107,29 @@ def sweep(
     return frame
 
 
+def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, progress: Any) -> None:
+    """Check the kind of each argument, all at once."""
+    wrong = [
+        f'{name}: needs lists of values by the path of their key, as {{"gains.k_p": [0.001, 0.002]}}, got {it!r:.60}'
+        for name, it in (("grid", grid), ("zip", zipped))
+        if it is not None and not (isinstance(it, Mapping) and all(isinstance(path, str) for path in it))
+    ]
+    for name, it in (("cases", cases), ("metrics", metrics)):
+        if it is not None and not isinstance(it, Iterable) and not (name == "metrics" and callable(it)):
+            wrong.append(f"{name}: needs a list of names, or None for all, got {it!r:.60}")
+    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
+        wrong.append(f"jobs: must be a whole number, 1 or more, or None for one per core; got {jobs!r:.60}")
+    if progress is not None and not callable(progress):
+        wrong.append(f"progress: must be a function of two whole numbers, got {progress!r:.60}")
+    if wrong:
+        raise ScenarioError(wrong)
+
+
 def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tuple[Scenario, list[str] | None]:
     """Return the scenario with metrics of one's own beside its own, and the names of all that were asked for."""
     if metrics is None:
         return scenario, None
-    given: list[Any] = [metrics] if isinstance(metrics, str) or callable(metrics) else list(metrics)
+    given: list[Any] = [metrics] if isinstance(metrics, str | Mapping) or callable(metrics) else list(metrics)
     asked = [METRICS.name_of(it) or it for it in given]
     own = [it for it in asked if not isinstance(it, str) or ":" in METRICS.reference(it)]
     if own:
@@ -143,13 +163,11 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
 
 def _names(given: str | Iterable[str]) -> tuple[str, ...]:
     """Return names of which a single one may stand alone."""
-    return (given,) if isinstance(given, str) else tuple(given)
+    return (given,) if isinstance(given, str) else tuple(map(str, given))
 
 
 def _jobs(plan: Plan, jobs: int | None) -> int:
     """Return how many processes share the runs; what a notebook defines is known to its own process alone."""
-    if jobs is not None and jobs < 1:
-        raise ScenarioError([f"jobs: must be 1 or more, got {jobs}"])
     if jobs is None and find_spec("joblib") is None:
         return 1
     if any(check_portable(run.scenario, measures=True) for run in plan.runs):

@@ -18,6 +18,7 @@ from netem.spec.netem import Netem
 from netem.spec.node import NodeFault
 from netem.spec.partition import Partition
 from wire.nearest import suggestion
+from wire.path_text import is_no_path
 from wire.plugin import Plugin, plugin_of, scalar_objection
 
 ENTRIES: dict[str, type[msgspec.Struct]] = {"link": Fault, "partition": Partition, "node": NodeFault}
@@ -109,8 +110,8 @@ def _own(path: str, name: str, raw: Any, found: list[Mistake]) -> list[Plugin]:
     if wrong := {key: text for key, value in table.items() if (text := scalar_objection(value))}:
         found += [Mistake(f"{path}.{key}", text) for key, text in wrong.items()]
         return []
-    if not isinstance(table.get("folder", ""), str):
-        found.append(Mistake(f"{path}.folder", f"must be a text in quotes, got {shown(table['folder'])}"))
+    if not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", "")):
+        found.append(Mistake(f"{path}.folder", f"must be the path of a folder, got {shown(table['folder'])}"))
         return []
     return [plugin_of({**table, "use": name})]
 

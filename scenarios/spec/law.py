@@ -18,6 +18,7 @@ from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import LawKey, Scenario
 from wire.module_folder import folder_of
 from wire.parameters import Range, objections, range_objection
+from wire.path_text import is_no_path
 from wire.plugin import scalar_objection
 from wire.registry import PluginError
 
@@ -81,7 +82,7 @@ def _placed(law: LawKey, folder: Path) -> LawKey:
     table = _table(law)
     use = LAWS.reference(str(table.get("use", "")))  # a decorator's name is known to this process alone
     local = ":" in use or "command" in table or "fmu" in table
-    if not law or not local or not isinstance(table.get("folder", ""), str):
+    if not law or not local or not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", "")):
         return law
     place = str((folder / table.get("folder", "")).resolve())
     return table | ({"use": use, "folder": folder_of(use, place)} if ":" in use else {"folder": place})
@@ -112,9 +113,18 @@ def _wrong_values(table: Mapping[str, Any]) -> dict[str, str]:
     wrong = {
         key: "must be a text in quotes" for key in ("use", "fmu", "folder") if not isinstance(table.get(key, ""), str)
     }
+    wrong |= {
+        key: "can be no name of a module, folder or file"
+        for key in ("use", "fmu", "folder")
+        if key not in wrong and is_no_path(table.get(key, ""))
+    }
     command = table.get("command", ["-"])
     if not (isinstance(command, list | tuple) and command and all(isinstance(word, str) for word in command)):
         wrong["command"] = 'must be a list of texts, the program first, e.g. ["./mylaw", "--fast"]'
+    elif is_no_path(command[0]):
+        wrong["command"] = "begins with what can be no name of a program"
+    elif not all(word.isprintable() or word.isascii() for word in command):
+        wrong["command"] = "has a character in it that is no text"
     if text := _limit_problem(table.get("time_limit_s", 1.0)):
         wrong["time_limit_s"] = text
     for low, high in (("P_set_min", "P_set_max"), ("V_set_min", "V_set_max")):

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import PluginKey
 from wire.module_folder import folder_of
+from wire.path_text import is_no_path
 from wire.plugin import Plugin, plugin_of, problems, scalar_objection
 from wire.registry import Registry
 
@@ -26,7 +27,7 @@ def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
     """
     table: dict[str, Any] = {"use": key} if isinstance(key, str) else dict(key)
     use = registry.reference(str(table.get("use", "")))
-    if ":" not in use or not isinstance(table.get("folder", ""), str):
+    if ":" not in use or not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", "")):
         return key
     return table | {"use": use, "folder": folder_of(use, str((folder / table.get("folder", "")).resolve()))}
 
@@ -34,7 +35,7 @@ def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
 def placed_plugin(plugin: Plugin, registry: Registry[Any], folder: Path) -> Plugin:
     """Return a plugin as any process can follow it; see `placed`."""
     use = registry.reference(plugin.use)
-    if ":" not in use:
+    if ":" not in use or is_no_path(plugin.folder):
         return plugin
     return replace(plugin, use=use, folder=folder_of(use, str((folder / plugin.folder).resolve())))
 
@@ -45,6 +46,9 @@ def check_plugin(path: str, key: PluginKey, registry: Registry[Any], mistakes: M
     for name in ("use", "folder"):
         if not isinstance(table.get(name, ""), str):
             mistakes.add(f"{path}.{name}", "must be a text in quotes")
+            return None
+        if is_no_path(table.get(name, "")):
+            mistakes.add(f"{path}.{name}" if isinstance(key, Mapping) else path, "can be no name of a module or folder")
             return None
     if not table.get("use"):
         mistakes.add(path, f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}')
