@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from gridpeers.benchmarks import Claim, Findings
 from papers.singhal2022.claims.columns import near_relatively, near_the_table
 from papers.singhal2022.tolerances import AT_LIMIT, EQUAL, F_NONE, HEADROOM_GONE, MQSI_UNMOVED
@@ -57,47 +59,46 @@ def _infeasible(found: Findings) -> tuple[bool, str]:
     return holds, f"the others at {min(others):.3f} pu or more, abs(f-60) {steady.f_error_Hz:.2f} Hz and growing"
 
 
+_claim = partial(Claim, events=(CLOUDS,))
+"""What all claims of this experiment have in common, but for those about a whole column of a table."""
+
 INTERMITTENCY: tuple[Claim, ...] = (
     near_the_table("intermittency", "III", "MPSI"),
     near_the_table("intermittency", "III", "f_error_Hz"),
     near_the_table("intermittency", "III", "V_error"),
     near_relatively("intermittency", "III"),
-    Claim(
+    _claim(
         name="saturated_at_their_limit",
         text="inverters 2, 5 and 8 give what they have",
         source=SOURCE,
         figure="intermittency",
         cases=CUT,
-        events=(CLOUDS,),
         judge=_at_the_limit,
         measures=("p",),
     ),
-    Claim(
+    _claim(
         name="others_take_over",
         text="the others take over alike, and 60 Hz returns",
         source=SOURCE,
         figure="intermittency",
         cases=CUT,
-        events=(CLOUDS,),
         judge=_others_take_over,
         measures=("f_error_Hz", "p"),
     ),
-    Claim(
+    _claim(
         name="MQSI_unmoved",
         text=f"MQSI is the same in all columns (within {MQSI_UNMOVED.value:g})",
         source="Table III",
         cases=FEASIBLE,
-        events=(CLOUDS,),
         judge=_MQSI_unmoved,
         measures=("MQSI",),
     ),
-    Claim(
+    _claim(
         name="headroom_used_up",
         text="below 200 kW the headroom of the others is used up",
         source=SOURCE,
         figure="intermittency",
         cases=(INFEASIBLE,),
-        events=(CLOUDS,),
         judge=_infeasible,
         measures=("p",),  # the frequency falls: that is the claim
     ),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from gridpeers.benchmarks import F_BAND, MPSI_BAND, Claim, Findings, Judge
 from papers.singhal2022.claims.wording import seconds
 from papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
@@ -38,46 +40,37 @@ def _voltage(found: Findings) -> tuple[bool, str]:
 
 SOURCE = "section 4, figures of plug-n-play"
 
+_claim = partial(Claim, source=SOURCE, figure="plug-n-play", cases=("IV",))
+"""What all claims of this experiment have in common."""
+
 PLUG_N_PLAY: tuple[Claim, ...] = (
-    Claim(
+    _claim(
         name="others_carry_its_load",
         text=f"IV: the others carry the load of the one that left within {AT_ONCE.value:g} s",
-        source=SOURCE,
-        figure="plug-n-play",
-        cases=("IV",),
         events=(LEAVE,),
         judge=_others_carry,
         measures=(),
     ),
     *(
-        Claim(
+        _claim(
             name=f"restored_after_{event}",
             text=f"IV: abs(f-60) < {F_BAND:g} Hz and MPSI < {MPSI_BAND:g} within {WITHIN.value:g} s of the {event}",
-            source=SOURCE,
-            figure="plug-n-play",
-            cases=("IV",),
             events=(event,),
             judge=_restored(event),
             measures=(),
         )
         for event in (LEAVE, RETURN)
     ),
-    Claim(
+    _claim(
         name="shares_again",
         text=f"IV: after the return all powers are equal within {EQUAL.value:g} pu",
-        source=SOURCE,
-        figure="plug-n-play",
-        cases=("IV",),
         events=(RETURN,),
         judge=_shares_again,
         measures=("p",),
     ),
-    Claim(
+    _claim(
         name="voltage_likewise",
         text=f"IV: V_error below {V_FIGURE.value:g} pu after both",
-        source=SOURCE,
-        figure="plug-n-play",
-        cases=("IV",),
         events=(LEAVE, RETURN),
         judge=_voltage,
         measures=("V_error",),

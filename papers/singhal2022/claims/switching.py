@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from gridpeers.benchmarks import Claim, Findings
 from papers.singhal2022.claims.columns import near_relatively, near_the_table
 from papers.singhal2022.tolerances import EQUAL
@@ -26,6 +28,9 @@ def _own_level(found: Findings) -> tuple[bool, str]:
     return spread < EQUAL.value < apart, f"{shown} pu, within an island at most {spread:.4f} pu apart"
 
 
+_claim = partial(Claim, figure="switching", cases=("IV",), events=(EVENT,))
+"""What all claims of this experiment have in common, but for those about a whole column of a table."""
+
 SWITCHING: tuple[Claim, ...] = (
     near_the_table("switching", "V", "f_error_Hz"),
     near_the_table("switching", "V", "MPSI"),
@@ -37,23 +42,17 @@ SWITCHING: tuple[Claim, ...] = (
         "microgrids lie 0.002 pu apart (docs/reproduction.md)",
     ),
     near_the_table("switching", "V", "MQSI"),
-    Claim(
+    _claim(
         name="three_islands",
         text="three islands of one grid-forming and two grid-following inverters",
         source="section 4, microgrid switching",
-        figure="switching",
-        cases=("IV",),
-        events=(EVENT,),
         judge=_three_islands,
         measures=(),
     ),
-    Claim(
+    _claim(
         name="each_shares_its_own_load",
         text="each island shares its own load equally, at a level of its own",
         source="section 4, figures of P and Q of each microgrid",
-        figure="switching",
-        cases=("IV",),
-        events=(EVENT,),
         judge=_own_level,
         measures=("p",),
     ),

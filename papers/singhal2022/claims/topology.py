@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from statistics import median
 
 from gridpeers.benchmarks import MPSI_BAND, Claim, Findings
@@ -60,38 +61,29 @@ def _none_below(found: Findings) -> tuple[bool, str]:
     return bool(runs) and least >= MPSI_BAND, f"{len(runs)} graphs: MPSI at least {least:.3f}"
 
 
+_claim = partial(Claim, source=SOURCE, figure="topology", measures=())
+"""What all claims of this experiment have in common."""
+
 TOPOLOGY: tuple[Claim, ...] = (
-    Claim(
+    _claim(
         name="more_links_are_faster",
         text="time to MPSI < 0.01 falls with the number of links",
-        source=SOURCE,
-        figure="topology",
         judge=_falls,
-        measures=(),
     ),
-    Claim(
+    _claim(
         name="steepest_at_few_links",
         text="it rises slowly from 36 down to about 12 links, and sharply toward 8",
-        source=SOURCE,
-        figure="topology",
         judge=_steepest_at_few,
-        measures=(),
     ),
-    Claim(
+    _claim(
         name="same_steady_state",
         text="all connected graphs reach the same steady state",
-        source=SOURCE,
-        figure="topology",
         judge=_same_end,
-        measures=(),
     ),
-    Claim(
+    _claim(
         name="none_below_8",
         text="below 8 links there is no consensus",
-        source=SOURCE,
-        figure="topology",
         judge=_none_below,
-        measures=(),
     ),
 )
 """Claims of the topologies."""

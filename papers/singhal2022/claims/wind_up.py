@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from gridpeers.benchmarks import Claim, Findings
 from papers.singhal2022.claims.wording import seconds
 from papers.singhal2022.tolerances import WITHIN
@@ -25,23 +27,20 @@ def _sooner(found: Findings) -> tuple[bool, str]:
     return len(known) == 2 and (free is None or free > max(known)), shown
 
 
+_claim = partial(Claim, source="ours, on Remark 2", figure="wind-up", cases=CASES)
+"""What all claims of this experiment have in common."""
+
 WIND_UP: tuple[Claim, ...] = (
-    Claim(
+    _claim(
         name="wind_up_holds_frequency_up",
         text="set-points without limits hold the frequency up while power is short",
-        source="ours, on Remark 2",
-        figure="wind-up",
-        cases=CASES,
         events=(CLOUDS,),
         judge=_held_up,
         measures=(),  # the frequency falls: that is the claim
     ),
-    Claim(
+    _claim(
         name="limits_restore_sooner",
         text="with limits f and sharing are back within 1 s when power is, and sooner than without",
-        source="ours, on Remark 2",
-        figure="wind-up",
-        cases=CASES,
         events=(SUN,),
         judge=_sooner,
         measures=(),
