@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from gridpeers.theory import predicted_times, var_growth
@@ -13,8 +15,11 @@ from papers.singhal2022.experiments.output.table import Cell, Table
 
 X = "delay of every agent-agent link (s)"
 
-LEFT = (("V_error", "mean of abs(V - 1) (pu)"), ("MQSI", "var sharing index, MQSI"))
-"""Steady values, and what is written at their axes."""
+LEFT: tuple[tuple[str, str, Literal["", "y"], tuple[float, float]], ...] = (
+    ("V_error", "mean of abs(V - 1) (pu)", "", (0.0, 0.01)),
+    ("MQSI", "var sharing index, MQSI", "y", (0.003, 1.0)),
+)
+"""Steady values, what is written at their axes, and scale and ends of these."""
 
 
 def communication(swept: Swept) -> Result:
@@ -35,12 +40,13 @@ def communication(swept: Swept) -> Result:
             curves.append(Curve(x=x, y=y, style=style, look="predicted"))
         y_label = "time after islanding (s)"
         panels.append(Panel(title=title, x_label=X, y_label=y_label, curves=curves, log="y", y_range=(0.3, 25.0)))
-    for index, y_label in LEFT:
+    for index, y_label, log, y_range in LEFT:
         curves = []
         for style, case in enumerate(cases):
             x, y = swept.curve(DELAY, index, {"case": case})
             curves.append(Curve(x=x, y=y, style=style))
-        panels.append(Panel(title=f"{index} in the end", x_label=X, y_label=y_label, curves=curves))
+        title = f"{index} at the end of the run"
+        panels.append(Panel(title=title, x_label=X, y_label=y_label, curves=curves, log=log, y_range=y_range))
     page = Page(
         title="Islanding with the paper's reduced communication and link failure, over late links",
         panels=panels,

@@ -68,7 +68,7 @@ def handling(swept: Swept) -> Result:
                 times = [_measured(swept, case, condition, option, index) for index, _ in INDEXES]
                 rows.append((case, words(condition), option, *times))
     page = Page(
-        title="Islanding: what agents make of late and lost states",
+        title="Islanding over late and lossy links, with every option of the agents",
         panels=panels,
         columns=len(conditions),
         names={style: swept.base.cases[case].title for style, case in enumerate(CASES)},

@@ -46,7 +46,7 @@ def loss(swept: Swept) -> Result:
                 y_range=(0.3, 25.0),
             )
         )
-    for number, (index, _) in enumerate(INDEXES):
+    for number, (index, title) in enumerate(INDEXES):
         curves = []
         for style, case in enumerate(cases):
             _, y = swept.curve(LOSS, index, {"case": case, DELAY: 0.0})
@@ -56,7 +56,7 @@ def loss(swept: Swept) -> Result:
             curves.append(Curve(x=np.array(ages), y=said_of_age[case][:, number], style=style, look="predicted"))
         panels.append(
             Panel(
-                title="the same, against mean age",
+                title=f"{title}, against mean age",
                 x_label="mean age of what is used: delay, or T_c/(1 - p) (s)",
                 y_label="time after islanding (s)",
                 curves=curves,

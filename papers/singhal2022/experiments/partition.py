@@ -33,7 +33,7 @@ def partition(told: Told) -> Result:
     panels = []
     for row, (title, measure) in enumerate((("f", told.f), ("MPSI", told.MPSI))):
         for name, cases in COLUMNS:
-            curves = [Curve(x=told.t("whole"), y=measure("whole"), style=WHOLE, look="solid")]
+            curves = [Curve(x=told.t("whole"), y=measure("whole"), style=WHOLE, look="reference")]
             for style, case in zip((HELD, EXPIRED), cases, strict=False):
                 curves.append(Curve(x=told.t(case), y=measure(case), style=style, look="solid"))
                 t, said = predicted(told, case, end - event.t_s)

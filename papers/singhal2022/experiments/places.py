@@ -25,6 +25,9 @@ CASES = ("full", "reduced", "path", "star")
 F_SWINGS, V_SWINGS = 0.005, 0.002
 """What counts as swinging (Hz, pu). An oscillation that stays is ten times as large."""
 
+LEAST = 1e-5
+"""Swings below this (Hz, pu) are drawn as this: what is left of a transient, or rounding."""
+
 
 def places(swept: Swept) -> Result:
     """Swing at the end of the run against delay, for each place, with predicted limits."""
@@ -35,7 +38,7 @@ def places(swept: Swept) -> Result:
             curves, lines = [], []
             for style, case in enumerate(CASES):
                 x, y = swept.curve(DELAY, index, {"case": case, ON: on, K_Q: k_q})
-                curves.append(Curve(x=x, y=np.maximum(y, 1e-7), style=style))
+                curves.append(Curve(x=x, y=np.maximum(y, LEAST), style=style))
                 limit = limits[index, on != LINKS, case]
                 if np.isfinite(limit) and limit <= x[-1]:
                     lines.append(Line(x=limit, style=style))
@@ -51,7 +54,7 @@ def places(swept: Swept) -> Result:
                     level=F_SWINGS if index == "f_swing_Hz" else V_SWINGS,
                     log="y",
                     x_range=(-0.01, 0.62),
-                    y_range=(1e-7, 1.0),
+                    y_range=(LEAST, 1.0),
                 )
             )
     page = Page(

@@ -12,7 +12,7 @@ from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.cases import curves
 from scenarios.results.plots.marks import mark_events
-from scenarios.results.plots.style import MOVER, OTHER_STYLES, PAGE, STAYERS, time_axis, words
+from scenarios.results.plots.style import MOVER, OTHER_STYLES, PAGE, STAYERS, case_title, time_axis
 
 
 def plug_and_play(drawing: Drawing) -> Figure:
@@ -27,7 +27,7 @@ def plug_and_play(drawing: Drawing) -> Figure:
             for i, name in enumerate(drawing.plates.names):
                 colour, dashes, width = MOVER if not present[:, i].all() else STAYERS[drawing.plates.GFM[i]]
                 top.plot(history.t, history.P[:, i] / drawing.plates.s[i], dashes, color=colour, lw=width, label=name)
-            top.set_title(f"Case {words(drawing, case)}", loc="left")
+            top.set_title(case_title(drawing, case), loc="left")
             curves(middle, alone, metrics.mean_frequency)
             middle.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
             middle.ticklabel_format(axis="y", useOffset=False)
@@ -71,7 +71,7 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
                 linewidth=widths[number],
                 label=drawing.plates.names[i],
             )
-        panel.set_title(f"Case {words(drawing, case)}", loc="left")
+        panel.set_title(case_title(drawing, case), loc="left")
         time_axis(panel, drawing)
         mark_events(panel, drawing, labelled=True)
     for panel in grid.flat[count:]:

@@ -7,6 +7,7 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,9 @@ CASE_STYLES: dict[str, Look] = {
 }
 """Styles of the paper's cases. The full graph under full coordination is always blue. Less and less available power
 goes from dark to light, after the palette viridis."""
+
+TITLE_LENGTH = 48
+"""Characters of a panel's title that fit above half a page."""
 
 OTHER_STYLES: tuple[Look, ...] = (
     ("#0072b2", "-"),
@@ -154,6 +158,11 @@ def words(drawing: Drawing, case: str) -> str:
     """Name of a case and what it is, for legends and titles."""
     title = drawing.titles.get(case, "")
     return f"{case}: {title}" if title else case
+
+
+def case_title(drawing: Drawing, case: str) -> str:
+    """Title of a case's panel, in lines that fit above half a page."""
+    return "\n".join(wrap(f"Case {words(drawing, case)}", TITLE_LENGTH))
 
 
 def columns(labels: Sequence[str], width: float) -> int:

@@ -64,5 +64,5 @@ def test_every_experiment_is_told_with_its_figure() -> None:
     text = (DOCS / "experiments.md").read_text(encoding="utf-8")
 
     assert all(f"| [`{name}`](#" in text for name in EXPERIMENTS)
-    assert all(f"figures/experiments/{name}.png" in text for name in EXPERIMENTS)
-    assert {path.stem for path in (DOCS / "figures" / "experiments").iterdir()} == set(EXPERIMENTS)
+    assert all(f"images/experiments/{name}.png" in text for name in EXPERIMENTS)
+    assert {path.stem for path in (DOCS / "images" / "experiments").iterdir()} == set(EXPERIMENTS)

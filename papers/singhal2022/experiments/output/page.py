@@ -10,9 +10,10 @@ import numpy as np
 
 from gridpeers.measures import Floats
 
-Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid"]
+Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid", "reference"]
 """Measured: line and filled markers. Hollow: hollow markers, another way to measure. Predicted: a dashed line. Points:
-filled markers without a line. Trace: a line over time with the dashes of its style; solid: one without."""
+filled markers without a line. Trace: a line over time with the dashes of its style; solid: one without. Reference: a
+wide pale line, which is drawn first and stays visible below others."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """A page of an experiment as a PNG file.
 
 Colours are Okabe and Ito's, which stay apart for colour-blind readers; markers differ too, so that curves can be told
-in a black-and-white print.
+in a black-and-white print. Later curves have smaller markers and shifted dashes: curves that coincide all stay visible.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
     if panel.level is not None:
         axes.axhline(panel.level, color="#000000", linewidth=0.6, zorder=1)
     for line in panel.lines:
-        axes.axvline(line.x, color=COLOURS[line.style], linewidth=1.4, linestyle=(0, (4, 2)), zorder=1)
+        axes.axvline(line.x, color=COLOURS[line.style], linewidth=1.4, linestyle=(3 * line.style, (4, 2)), zorder=1)
     if "x" in panel.log:
         axes.set_xscale("symlog" if panel.zero else "log", **({"linthresh": panel.zero} if panel.zero else {}))
     if "y" in panel.log:
@@ -95,17 +95,24 @@ def _plot(axes: Axes, curve: Curve) -> None:
         axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
     match curve.look:
         case "measured":
-            axes.plot(curve.x, y, "-", color=colour, marker=marker, ms=4.5, lw=1.2)
+            axes.plot(curve.x, y, "-", color=colour, marker=marker, ms=_nested(curve, 7.0), lw=_nested(curve, 2.4))
         case "hollow":
             axes.plot(curve.x, y, "", color=colour, marker=marker, ms=6.5, mfc="none", lw=0)
         case "predicted":
-            axes.plot(curve.x, y, "--", color=colour, lw=1.6, dashes=(3, 1.6))
+            axes.plot(curve.x, y, color=colour, lw=1.6, linestyle=(2.3 * curve.style, (3, 1.6)))
         case "points":
             axes.plot(curve.x, y, "", color=colour, marker=marker, ms=4, lw=0, alpha=0.75)
         case "trace":
             axes.plot(curve.x, y, linestyle=DASHES[curve.style % len(DASHES)], color=colour, lw=1.5)
         case "solid":
             axes.plot(curve.x, y, "-", color=colour, lw=1.5)
+        case "reference":
+            axes.plot(curve.x, y, "-", color=colour, lw=4.0, alpha=0.6)
+
+
+def _nested(curve: Curve, largest: float) -> float:
+    """Size of a marker, or width of a line: largest in style 0, 0.55 of it from style 3 on."""
+    return largest * (1.0 - 0.15 * min(curve.style, 3))
 
 
 def _never(axes: Axes, panel: Panel) -> None:
@@ -127,11 +134,13 @@ def _never(axes: Axes, panel: Panel) -> None:
 
 def _names(page: Page) -> list[Line2D]:
     used = {curve.look for panel in page.panels for curve in panel.curves}
+    wide = {curve.style for panel in page.panels for curve in panel.curves if curve.look == "reference"}
     found = []
     for i, name in page.names.items():
         if used & {"trace", "solid"}:
             dashes: Any = DASHES[i] if "trace" in used else "-"
-            found.append(Line2D([], [], color=COLOURS[i], linestyle=dashes, lw=1.6, label=name))
+            width, alpha = (4.0, 0.6) if i in wide else (1.6, 1.0)
+            found.append(Line2D([], [], color=COLOURS[i], linestyle=dashes, lw=width, alpha=alpha, label=name))
         else:
             found.append(Line2D([], [], color=COLOURS[i], marker=MARKERS[i], lw=0, ms=5, label=name))
     return found
