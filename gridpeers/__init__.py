@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from scenarios.spec.mistakes import ScenarioError
     from wire.parameters import Range, Unit
 
-    claim, graph, law, link_fault, metric = (it.register for it in (CLAIMS, GRAPHS, LAWS, FAULTS, METRICS))
+    claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
+    link_fault, metric = FAULTS.register, METRICS.register
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
