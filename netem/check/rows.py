@@ -13,6 +13,8 @@ from netem.models.instant import INSTANT
 from netem.schedule import GATES
 from netem.spec.fault import Span
 
+Array = npt.NDArray[np.float64]
+
 UNSEEN = GATES
 """Reasons of those that never met loss, rate or delay."""
 
@@ -43,6 +45,8 @@ class Messages(NamedTuple):
 
     seq: npt.NDArray[np.int64]
     """Their numbers."""
+    t: Array
+    """When they were sent (s of run time)."""
     reason: npt.NDArray[np.str_]
     """Why they were dropped, empty if they were not."""
     delay: npt.NDArray[np.float64]
@@ -55,21 +59,28 @@ class Messages(NamedTuple):
     def those(self, chosen: npt.NDArray[np.bool_]) -> Messages:
         """Some of them."""
         return Messages(
-            self.seq[chosen], self.reason[chosen], self.delay[chosen], self.copies[chosen], self.flipped[chosen]
+            self.seq[chosen],
+            self.t[chosen],
+            self.reason[chosen],
+            self.delay[chosen],
+            self.copies[chosen],
+            self.flipped[chosen],
         )
 
 
 def messages(traces: tuple[LinkTrace, ...], span: Span) -> Messages:
     """Messages sent while an entry held; of one that was judged twice, the last verdict."""
     last: dict[int, Outcome] = {}
+    when: dict[int, float] = {}
     for trace in traces:
         for seq, t, outcome in zip(trace.seq, trace.t, trace.outcome, strict=True):
             if span.from_s <= t + INSTANT < span.to_s:
-                last[seq] = outcome
+                last[seq], when[seq] = outcome, t
     rows = [_columns(last[seq]) for seq in sorted(last)]
     reason, delay, copies, flipped = zip(*rows, strict=True) if rows else ((), (), (), ())
     return Messages(
         np.array(sorted(last), dtype=np.int64),
+        np.array([when[seq] for seq in sorted(last)], dtype=np.float64),
         np.array(reason, dtype=np.str_),
         np.array(delay, dtype=np.float64),
         np.array(copies, dtype=np.int64),

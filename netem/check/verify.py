@@ -10,6 +10,7 @@ from scipy import stats
 
 from netem.check.delay import check_delay
 from netem.check.loss import FEWEST, Finding, check_loss
+from netem.check.own import AS_IT_SAYS, added_by, check_own
 from netem.check.rows import Messages, Row, messages
 from netem.draws import Stream
 from netem.ledger import LinkCounts, LinkTrace
@@ -73,16 +74,24 @@ def verify(
         for finding in _findings(tuple(by_link.get(link, ())), span, spans[link], link, seed)
     ]
     judged = _holm(rows)
-    warnings = [
-        f"{row.src} -> {row.dst}: {row.what} is {row.realised}, configured {row.configured} "
-        f"(n = {row.n}, p = {row.p:.2g}); this is not chance, so netem or this check is wrong: please report it"
-        for row in judged
-        if row.ok is False
-    ]
+    warnings = [_warning(row) for row in judged if row.ok is False]
     for link, count in (counts or {}).items():
         if not count.closes:
             warnings.append(f"{link}: the account does not close: {count}")
     return Report(tuple(judged), tuple(warnings))
+
+
+def _warning(row: Row) -> str:
+    """Say what a test that failed means."""
+    if row.configured == AS_IT_SAYS:
+        return (
+            f"{row.src} -> {row.dst}: {row.what}, asked again, says {row.realised} messages: judge may depend on the "
+            "message and the draws alone, else no run can be repeated"
+        )
+    return (
+        f"{row.src} -> {row.dst}: {row.what} is {row.realised}, configured {row.configured} "
+        f"(n = {row.n}, p = {row.p:.2g}); this is not chance, so netem or this check is wrong: please report it"
+    )
 
 
 def _findings(
@@ -92,8 +101,12 @@ def _findings(
     if span.kind in ("rate", "slots"):
         return []
     sent = messages(traces, span)
+    own = [other for other in others if isinstance(other.model, Plugin) and _overlap(other, span)]
     if isinstance(span.model, Plugin):
-        return [(span.kind, "a fault of your own", "not tested: its law is known to you alone", len(sent.seq), None)]
+        if beside := [other.kind for other in own if other is not span]:
+            return [(span.kind, AS_IT_SAYS, f"not tested: {' and '.join(beside)} on it", len(sent.seq), None)]
+        alone = not any(other.kind in ("delay", *MASKS) and _overlap(other, span) for other in others)
+        return [check_own(sent, span, link, seed, alone=alone)]
     if span.kind == "loss":
         return check_loss(sent, span.model)
     if span.kind in GATES:
@@ -105,6 +118,10 @@ def _findings(
         return [_share("corrupt", int(arrived.flipped.sum()), int(arrived.copies.sum()), span.model.p)]
     masks = [MASKS.get(other.kind, other.kind) for other in others if _masks(other, span)]
     masks += ["fifo"] if span.model.fifo else []
+    if len(own) == 1 and masks == [own[0].kind]:  # what it added is known, and taken away
+        added, why = added_by(sent, own[0], link, seed)
+        sent = sent._replace(delay=sent.delay - added)
+        masks = [] if not why else masks
     if masks:
         return [("delay", str(span.model.__struct_config__.tag), f"not tested: {' and '.join(masks)} on it", 0, None)]
     return check_delay(sent, span.model, Stream(seed, *link, "delay"))
@@ -113,9 +130,14 @@ def _findings(
 def _masks(other: Span, span: Span) -> bool:
     """Whether another entry adds to the delays of this one."""
     own = isinstance(other.model, Plugin)
-    if (other.kind not in MASKS and not own) or other.from_s >= span.to_s or span.from_s >= other.to_s:
+    if (other.kind not in MASKS and not own) or not _overlap(other, span):
         return False
     return own or other.kind not in GATES or other.model.hold
+
+
+def _overlap(one: Span, other: Span) -> bool:
+    """Whether two entries hold at the same time."""
+    return one.from_s < other.to_s and other.from_s < one.to_s
 
 
 def _share(what: str, found: int, n: int, p: float) -> Finding:
