@@ -21,6 +21,7 @@ from gridpeers.cli.commands.sweep import sweep
 from gridpeers.cli.contributed import contributed
 from gridpeers.cli.mistyped import Commands
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
+from wire.driver.leftover import leave
 from wire.driver.output import speaking
 
 app = typer.Typer(
@@ -35,6 +36,18 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line; no bad input ends in a traceback."""
+    try:
+        _main()
+    except SystemExit as end:
+        leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
+        raise
+
+
+def _tell(line: str) -> None:
+    typer.echo(f"gridpeers: {line}", err=True)
+
+
+def _main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -18,6 +18,7 @@ from typing import TypeVar
 import msgspec
 
 from wire.driver.drive import StoppedError
+from wire.driver.leftover import leave
 from wire.driver.output import watch_readers
 from wire.driver.session import SessionError
 from wire.links import Links
@@ -78,6 +79,12 @@ def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) 
     int
         Exit status.
     """
+    status = _main(module, what, config_type, run)
+    leave(status, logging.getLogger(module).warning)
+    return status
+
+
+def _main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:
     watch_readers(quits=False)
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
