@@ -9,7 +9,7 @@ from gridpeers.benchmarks import Findings, Settling, Steady
 
 @dataclass(frozen=True, kw_only=True)
 class GraphRun:
-    """One run."""
+    """A run on one random graph: how the event settled, and what it left."""
 
     links: int
     """Links of the graph."""

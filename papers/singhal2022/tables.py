@@ -47,7 +47,7 @@ class Cell(Published):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperTable:
-    """One table."""
+    """A table of the paper, with our experiment that has its numbers."""
 
     number: Number
     experiment: str

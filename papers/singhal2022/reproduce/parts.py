@@ -26,7 +26,7 @@ class Picture:
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One experiment."""
+    """A part of the reproduction: one experiment, the paper's or ours."""
 
     name: str
     """Name for `--only`: that of the scenario, or "topology"."""

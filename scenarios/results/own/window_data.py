@@ -111,7 +111,7 @@ class WindowData:
 
     @cached_property
     def steady(self) -> Steady:
-        """The measures of metrics.json."""
+        """Measures that every run has in metrics.json, with the reason of each that is no steady value."""
         return measure(self.whole, self.plates, self.window, self.f_nom)
 
     @cached_property
