@@ -7,13 +7,11 @@ from typing import TypedDict, get_args
 
 import msgspec
 
+from scenarios.live.setup import SPEEDS
 from scenarios.results.numbers import Clock
 from scenarios.run import Driver
 from scenarios.spec import ScenarioError, model
 from wire.nearest import suggestion
-
-SPEEDS = (0.1, 50.0)
-"""Least and greatest speed of a run in real time."""
 
 
 def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:

@@ -16,7 +16,7 @@ from scenarios.spec.netem import netem_of, setup_of
 from wire.nearest import suggestion
 
 SPEEDS = (0.1, 50.0)
-"""Least and greatest speed (s of run time per s of wall time) that is of any use."""
+"""Least and greatest speed (s of run time per s of wall time) that is of any use, in a run by hand or of a scenario."""
 
 
 class Wishes(msgspec.Struct, frozen=True, kw_only=True):
