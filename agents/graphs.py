@@ -7,7 +7,7 @@
 
 A rule is called with the nameplates of all agents on the roster, by name in natural order, and returns whom each
 listens to. Every agent applies it for itself: the same nameplates must give the same graph. A class with parameters
-(`wire.parameters`) and a method `__call__(self, members)` is a rule too.
+(annotated attributes, `docs/plugins.md`) and a method `__call__(self, members)` is a rule too.
 """
 
 from __future__ import annotations

@@ -166,13 +166,13 @@ class Registry(Generic[T]):
                 found = getattr(found, part)
             except AttributeError:
                 there = [key for key, value in vars(module).items() if not key.startswith("_") and self._fits(value)]
-                hint = suggestion(part, there, self.plural)
+                hint = suggestion(part, there, "names there")
                 raise PluginError(f'{reference}: module {module_name} has no "{part}"; {hint}') from None
         self._check(found, reference)
         return found  # type: ignore[no-any-return]
 
     def _module(self, name: str, reference: str, folder: str) -> Any:
-        if folder and folder not in sys.path:
+        if folder and folder not in sys.path and _is_needed(name, folder):
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
             _folders.add(folder)
         try:
@@ -199,6 +199,13 @@ class Registry(Generic[T]):
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
+
+
+def _is_needed(name: str, folder: str) -> bool:
+    """Whether a module stands in a folder that Python would not look in, nor by "", which is where a session runs."""
+    top = name.partition(".")[0]
+    meant, found = PathFinder.find_spec(top, [folder]), PathFinder.find_spec(top)
+    return meant is not None and (found is None or found.origin is None or found.origin != meant.origin)
 
 
 def _check_place(module: Any, name: str, folder: str, reference: str) -> None:

@@ -29,7 +29,8 @@ def read(folder: str | Path) -> Result | Results:
     """
     path = as_folder(folder)
     if not (path / "status.txt").is_file():
-        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt")
+        hint = f"; {path / 'latest'} is one" if (path / "latest" / "status.txt").is_file() else ""
+        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt{hint}")
     status = (path / "status.txt").read_text(encoding="utf-8", errors="replace").strip()
     if status != "complete":
         raise FolderError(f'{folder}: the run has no results: its status is "{status}"')

@@ -15,7 +15,6 @@ from gridpeers.runs.showing import shown_in_notebooks
 from scenarios.spec.mistakes import ScenarioError
 from scenarios.spec.writing import to_toml
 from scenarios.sweep.file.paths import flatten
-from wire.nearest import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,7 +67,11 @@ def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, 
     both = [case for case in first if case in second]
     if not both:
         raise ScenarioError(
-            f'no case "{case}" in the second run; {suggestion(case, second, "cases")}' for case in first
+            [
+                f"the runs have no case in common: the first has {', '.join(first)}, the second {', '.join(second)}; "
+                "run one case of each (gridpeers run --case), or choose in Python: "
+                f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
+            ]
         )
     return {case: (first[case], second[case]) for case in both}
 

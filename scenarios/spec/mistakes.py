@@ -37,7 +37,8 @@ class Mistakes:
     text : str
         Its text, to find the lines of the keys.
     changed : Collection[str], optional
-        Keys that were changed since, in Python; a mistake in or below one of them has no line.
+        Keys that were changed since, in Python; a mistake in or below one of them has no line, nor has one in a table
+        around it that the file does not write.
     """
 
     def __init__(self, file: str, text: str = "", changed: Collection[str] = ()) -> None:
@@ -50,7 +51,9 @@ class Mistakes:
     def add(self, path: str, text: str) -> None:
         """Note a mistake at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
         self._paths.add(path)
-        if any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed):
+        within = any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed)
+        around = path not in self._lines and any(key.startswith((f"{path}.", f"{path}[")) for key in self._changed)
+        if within or around:
             self._found.append((0, f"replace: {path}: {text}"))
             return
         line = self._line_of(path)

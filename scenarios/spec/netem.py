@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 
 import msgspec
@@ -100,10 +101,11 @@ def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -
     names = tuple(row.name for row in rows) if feeder else None
     microgrids = {row.name: row.microgrid for row in rows}
     T_c = scenario.time.T_c_s
+    end_s = inf if mistakes.touch("time.end_s", "time") else scenario.time.end_s
 
     def wrong_in(netem: Netem) -> list[Mistake]:
         nodes = [mistake for i, node in enumerate(netem.nodes) for mistake in _wrong_node(f"node[{i}]", node, T_c)]
-        return netem.mistakes(names, microgrids, scenario.time.end_s) + nodes
+        return netem.mistakes(names, microgrids, end_s) + nodes
 
     common = wrong_in(scenario.netem)
     _add(common, "", mistakes)

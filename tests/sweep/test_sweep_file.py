@@ -160,8 +160,8 @@ BAD: list[tuple[str, str]] = [
     ('[grid]\n"gains.k_p" = { from = 0.0001, to = 1, count = 50000 }', "50,000 runs, about 12 min on one core, and"),
     ('[zip]\n"gains.k_p" = [0.001, 0.002]\n"gains.k_q" = [0.2]', "gains.k_p has 2, gains.k_q has 1"),
     ('[grid]\n"gains.k_p" = [1]\n[zip]\n"gains.k_p" = [2]', "gains.k_p is set by grid.gains.k_p already"),
-    ('[grid]\n"link[0].delay" = [0.1]', "there is no link[0]; the scenario writes 0 of them"),
-    ('[grid]\n"event[1].t_s" = [0.2]', "there is no event[1]; the scenario writes 1 of them, counted from 0"),
+    ('[grid]\n"link[0].delay" = [0.1]', "there is no link[0]; the scenario writes none: give link as a list first"),
+    ('[grid]\n"event[1].t_s" = [0.2]', "there is no event[1]; there is event[0] alone"),
     ('[grid]\n"case.VI.graph" = ["ring"]', "there is no case.VI; did you mean"),
     ('[grid]\n"gains..k_p" = [1]', "is no path of a key"),
     ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { unifrom = [1, 2] }', 'did you mean "uniform"?'),
@@ -197,5 +197,5 @@ def test_any_key_of_a_tree_can_be_set_that_a_later_version_may_know() -> None:
     put(tree, "netem.window_s", 2.0)
 
     assert tree == {"link": [{"delay": 0.0, "loss": {"p": 0.1}}], "netem": {"window_s": 2.0}}
-    with pytest.raises(PathError, match=r"there is no link\[1\]; the scenario writes 1 of them"):
+    with pytest.raises(PathError, match=r"there is no link\[1\]; there is link\[0\] alone"):
         put(tree, "link[1].delay", 0.1)

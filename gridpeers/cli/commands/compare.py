@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -50,10 +51,17 @@ def compare(
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """Return short names of two folders that differ: as much of their paths as tells them apart."""
+    """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
     parts, others = first.resolve().parts, second.resolve().parts
+    if _is_time(parts[-1]) and _is_time(others[-1]) and parts[-2] != others[-2]:
+        return parts[-2], others[-2]
     for count in range(1, max(len(parts), len(others)) + 1):
         names = "/".join(parts[-count:]), "/".join(others[-count:])
         if names[0] != names[1]:
             return names
     return "first", "second"
+
+
+def _is_time(name: str) -> bool:
+    """Whether a folder is called as `gridpeers run` calls those of a scenario."""
+    return re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", name) is not None

@@ -6,8 +6,10 @@
         t = found.results["IV"]["event1"].t_restore_s
         return t is not None and t <= 1.0, f"{t} s"
 
-A claim is a function of what was found (`scenarios.results.findings.Findings`) that returns whether it holds, and our
-value with its unit; or a `gridpeers.Claim` object, which also says which cases, events and steady values it needs.
+A claim is a function of what was found that returns whether it holds, and our value with its unit; or a
+`gridpeers.Claim` object, which also says which cases, events and steady values it needs. What was found:
+`found.results[case][event]` has the measures (f_error_Hz, MPSI, V_error, MQSI, t_restore_s, t_load_s), and
+`found.own[case][event].values[name]` the scenario's own metrics (`docs/plugins.md`).
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def page(topic: str) -> Iterator[str]:
     yield title
     yield from rest.rstrip().split("\n")
     yield ""
-    yield f"In a scenario: `{key}`. A module is looked for beside the scenario's file, then on the Python path. A"
+    yield f"In a scenario: {key}. A module is looked for beside the scenario's file, then on the Python path. A"
     yield f"distribution adds its own under the entry points `{registry.group}`."
     if not registry.names:
         yield ""

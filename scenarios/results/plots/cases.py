@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
+from scenarios.results.history import Floats
 from scenarios.results.islands import Quantity, worst
 from scenarios.results.plots.marks import mark_events
-from scenarios.results.plots.style import PAGE, case_styles, columns, from_zero, time_axis, words
+from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, case_styles, columns, from_zero, time_axis, words
 
 
 def overview(drawing: Drawing) -> Figure:
@@ -53,19 +54,19 @@ def frequency(axes: Axes, drawing: Drawing) -> None:
 def MPSI(axes: Axes, drawing: Drawing) -> None:
     """Mean power sharing index over time, (16)."""
     quantity = worst(metrics.MPSI, 0.0, drawing.spells)
-    curves(axes, drawing, quantity)
+    drawn = curves(axes, drawing, quantity)
     axes.set_title("Mean power sharing index, MPSI", loc="left")
     axes.set_ylabel(_of(drawing, "MPSI", "MPSI"))
-    from_zero(axes, drawing, quantity)
+    from_zero(axes, drawn, SHARING)
 
 
 def V_error(axes: Axes, drawing: Drawing) -> None:
     """Mean of abs(V - 1) over time: what the voltages are judged by."""
     quantity = worst(metrics.V_error, 0.0, drawing.spells)
-    curves(axes, drawing, quantity)
+    drawn = curves(axes, drawing, quantity)
     axes.set_title("Voltage error, V_error", loc="left")
     axes.set_ylabel(_of(drawing, "mean of abs(V - 1) (pu)", "V_error (pu)"))
-    from_zero(axes, drawing, quantity, least=0.01, shown=0.98)
+    from_zero(axes, drawn, VOLTAGE)
 
 
 def voltage(axes: Axes, drawing: Drawing) -> None:
@@ -80,10 +81,10 @@ def voltage(axes: Axes, drawing: Drawing) -> None:
 def MQSI(axes: Axes, drawing: Drawing) -> None:
     """Mean var sharing index over time, (17)."""
     quantity = worst(metrics.MQSI, 0.0, drawing.spells)
-    curves(axes, drawing, quantity)
+    drawn = curves(axes, drawing, quantity)
     axes.set_title("Mean var sharing index, MQSI", loc="left")
     axes.set_ylabel(_of(drawing, "MQSI", "MQSI"))
-    from_zero(axes, drawing, quantity)
+    from_zero(axes, drawn, SHARING)
 
 
 def _of(drawing: Drawing, whole: str, each: str) -> str:
@@ -91,18 +92,20 @@ def _of(drawing: Drawing, whole: str, each: str) -> str:
     return f"{each}, worst island" if drawing.spells else whole
 
 
-def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> None:
+def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> list[Floats]:
     """One curve per case; the later ones lie on top."""
-    styles = case_styles(drawing.histories)
+    styles, drawn = case_styles(drawing.histories), []
     for case, history in drawing.histories.items():
         colour, dashes, width = styles[case]
         label = words(drawing, case)
+        drawn.append(quantity(history, drawing.plates_in(case)))
         axes.plot(
             history.t,
-            quantity(history, drawing.plates_in(case)),
+            drawn[-1],
             color=colour,
             linestyle=dashes,
             linewidth=width,
             label=label,
         )
     time_axis(axes, drawing)
+    return drawn

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from matplotlib.axes import Axes
@@ -12,6 +13,9 @@ from scenarios.results.drawing import Drawing, Mark
 
 Side = Literal["left", "center", "right"]
 """Which part of a text stands at the line."""
+
+BLACK, GREY = "#000000", "#444444"
+"""Colours of lines and words."""
 
 LETTER = 0.056
 """Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt."""
@@ -27,19 +31,31 @@ class Placed(NamedTuple):
     """A text above the frame."""
 
     text: str
-    t: float
-    """Time of its event (s)."""
+    mark: Mark
     side: Side
 
 
-def mark_events(axes: Axes, drawing: Drawing, *, labelled: bool) -> None:
-    """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room."""
+def mark_events(
+    axes: Axes, drawing: Drawing, *, labelled: bool, colours: Mapping[Mark, str] = MappingProxyType({})
+) -> None:
+    """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room.
+
+    Parameters
+    ----------
+    axes, drawing : Axes, Drawing
+        Where, and what.
+    labelled : bool
+        Whether there are words.
+    colours : Mapping[Mark, str], optional
+        Colours of marks that are not black.
+    """
     for mark in drawing.events:
-        axes.axvline(mark.t, color="#000000", linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
+        axes.axvline(mark.t, color=colours.get(mark, BLACK), linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
     lines = 0
     if labelled:
-        for text, t, side in placed(drawing.events, _inches_per_s(axes, drawing)):
-            note_above(axes, text, t, "data", side)
+        for text, mark, side in placed(drawing.events, _inches_per_s(axes, drawing)):
+            colour = colours.get(mark, BLACK)
+            note_above(axes, text, mark.t, "data", side, colour=GREY if colour == BLACK else colour)
             lines = max(lines, text.count("\n") + 1)
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=5.0 + 9.0 * lines)
 
@@ -49,8 +65,9 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
 
     Examples
     --------
-    >>> placed([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
-    [Placed(text='event1\n13-152 opens', t=1.0, side='right'), Placed(text='leave', t=1.1, side='left')]
+    >>> found = placed([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
+    >>> [(text, side) for text, _, side in found]
+    [('event1\n13-152 opens', 'right'), ('leave', 'left')]
     """
     best: dict[float, tuple[float, list[Placed]]] = {-inf: (0.0, [])}
     """By the right edge of the last text (inches): the least cost of all texts so far, and where they stand."""
@@ -66,7 +83,7 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
                         continue
                     end = start + width
                 if cost + price < found.get(end, (inf, []))[0]:
-                    found[end] = cost + price, [*texts, *([Placed(text, mark.t, side)] if text else [])]
+                    found[end] = cost + price, [*texts, *([Placed(text, mark, side)] if text else [])]
         best = found
     return min(best.values(), key=lambda one: one[0])[1]
 
@@ -80,7 +97,7 @@ def _choices(mark: Mark) -> list[tuple[float, str, Side]]:
     return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
 
 
-def note_above(axes: Axes, text: str, x: float, of: str, side: Side) -> None:
+def note_above(axes: Axes, text: str, x: float, of: str, side: Side, *, colour: str = GREY) -> None:
     """Write small words above the frame, at x of the data or of the frame."""
     axes.annotate(
         text,
@@ -90,7 +107,7 @@ def note_above(axes: Axes, text: str, x: float, of: str, side: Side) -> None:
         textcoords="offset points",
         ha=side,
         fontsize=7,
-        color="#444444",
+        color=colour,
     )
 
 

@@ -6,15 +6,15 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from scenarios.results.drawing import Drawing
-from scenarios.results.history import Floats, History, Plates
+from scenarios.results.history import Floats
 
 Look = tuple[str, Any]
 """Colour and dash pattern."""
@@ -117,23 +117,29 @@ def widths(count: int) -> list[float]:
     return [1.5 + step * above for above in reversed(range(count))]
 
 
-def from_zero(
-    axes: Axes,
-    drawing: Drawing,
-    quantity: Callable[[History, Plates], Floats],
-    *,
-    least: float = 0.05,
-    shown: float = 0.995,
-) -> None:
-    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
+class Bounds(NamedTuple):
+    """Where an axis that starts at 0 ends."""
 
-    It ends at `least` or above, so that what is next to nothing looks like it, and has that part of all values.
-    """
-    values = np.concatenate([quantity(history, drawing.plates_in(case)) for case, history in drawing.histories.items()])
+    least: float = 0.05
+    """There or above, so that what is next to nothing looks like it."""
+    shown: float = 0.995
+    """Part of all values that it has."""
+
+
+SHARING = Bounds()
+"""Of MPSI and MQSI."""
+
+VOLTAGE = Bounds(least=0.01, shown=0.98)
+"""Of V_error (pu), whose spikes at a switching are ten times what is left of it, and last longer."""
+
+
+def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
+    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
+    values = np.concatenate([*curves])
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    top, peak = max(float(np.quantile(values, shown)) * 1.15, least), float(values.max())
+    top, peak = max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
         axes.annotate(

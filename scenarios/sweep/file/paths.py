@@ -79,11 +79,16 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
         if isinstance(step, int):
             if not isinstance(node, list) or step >= len(node):
                 count = len(node) if isinstance(node, list) else 0
-                raise PathError(f"there is no {here}; the scenario writes {count} of them, counted from 0")
+                of = here.rpartition("[")[0]
+                there = f"there are {of}[0] to {of}[{count - 1}]" if count > 1 else f"there is {of}[0] alone"
+                raise PathError(
+                    f"there is no {here}; {there if count else f'the scenario writes none: give {of} as a list first'}"
+                )
         elif not isinstance(node, dict):
             raise PathError(f"{_written(way[:depth])} is no table, so that it has no key {step}")
         elif depth == 1 and way[0] in _named_tables() and step not in node and not (whole and following is None):
-            raise PathError(f"there is no {here}; {suggestion(step, node, f'tables of {way[0]}')}")
+            known = suggestion(step, node, f"tables of {way[0]}")
+            raise PathError(f"there is no {here}; {known}; a new one is given as a whole table, at {here}")
         if following is None:
             break
         if step in ("law", "graph") and isinstance(node.get(step), str):

@@ -83,7 +83,7 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
         (
             "my_graphs:sta",
             {},
-            'module my_graphs has no "sta"; did you mean "star"? The graphs are star, Next, of_three',
+            'module my_graphs has no "sta"; did you mean "star"? The names there are star, Next, of_three',
         ),
         ("my_graphs:Wrong", {}, "my_graphs:Wrong is no graph: the class needs a method __call__(self, members)"),
         ("my_graphs:of_two", {}, "my_graphs:of_two is no graph: it is called with one argument, the members: missing"),

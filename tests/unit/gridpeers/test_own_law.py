@@ -43,6 +43,12 @@ print(json.dumps([run.sha256 for run in runs] + table["history_sha256"].tolist()
 """
 )
 
+IN_A_SESSION = """
+import gridpeers as gp
+for gain in (1.0, 2.0, 3.0):
+    print(gp.load("islanding").replace({"case.IV.law": {"use": "mine:Mine", "gain": gain}}).cases["IV"].law["gain"])
+"""
+
 IN_A_NOTEBOOK = (
     MINE
     + STUDY
@@ -75,6 +81,16 @@ def test_a_law_beside_the_script_runs_in_one_process_and_in_many(tmp_path: Path)
 
     one, two, three, slow, five = json.loads(line)
     assert one == two == three == five != slow
+
+
+def test_a_law_beside_a_session_is_found_again_and_again(tmp_path: Path) -> None:
+    """Python in a terminal looks for modules where it runs, which it writes as ""; a second scenario finds them too."""
+    (tmp_path / "mine.py").write_text(MINE)
+    done = subprocess.run(
+        [sys.executable, "-"], cwd=tmp_path, input=IN_A_SESSION, capture_output=True, text=True, check=False
+    )
+
+    assert (done.stdout.split(), done.stderr) == (["1.0", "2.0", "3.0"], "")
 
 
 def test_a_law_of_a_notebook_runs_where_it_is_and_is_refused_elsewhere(tmp_path: Path) -> None:

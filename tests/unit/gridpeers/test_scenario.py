@@ -24,6 +24,20 @@ TABLES = {
 }
 
 
+def test_one_slip_is_one_mistake() -> None:
+    """What is wrong with the end of the run is not told again of each link; what replace writes is told as its own."""
+    case = {"IV": {"secondary": "all", "graph": "full", "link": [{"on": "* <-> *", "loss": 0.1}]}}
+    with pytest.raises(gp.ScenarioError) as caught:
+        gp.Scenario(time={"end_s": "7"}, case=case)
+    assert caught.value.mistakes == ('Scenario(...): time.end_s: must be a number, got "7"; write 7',)
+    with pytest.raises(gp.ScenarioError, match=r'^replace: gain: unknown key; did you mean "gains"'):
+        gp.load("islanding").replace({"gain.k_p": 0.001})
+    with pytest.raises(
+        gp.ScenarioError, match=r"^replace: case.IV.link\[0\].delay: .*: give case.IV.link as a list first"
+    ):
+        gp.load("islanding").replace({"case.IV.link[0].delay": 0.1})
+
+
 def test_a_scenario_of_keyword_tables_is_the_scenario_of_the_same_file(tmp_path: Path) -> None:
     """The keys in Python are those of the file."""
     built = gp.Scenario(**TABLES)

@@ -124,6 +124,10 @@ def test_the_command_compare_prints_the_table_and_draws_both(
     assert "f_error_Hz" in text
     assert "case.secondary" in text
     assert (tmp_path / "runs" / "comparison.png").is_file()
+    Path("two").rename("latest")
+    code, text = invoke("compare", "one", ".")
+    assert code == 2
+    assert text == "gridpeers: .: this is no folder of a run, which has a file status.txt; latest is one\n"
     code, text = invoke("compare", "one", "nowhere")
     assert code == 2
     assert text == "gridpeers: nowhere: this is no folder of a run, which has a file status.txt\n"
@@ -133,7 +137,7 @@ def test_runs_without_a_common_case_are_not_compared(scenario: gp.Scenario) -> N
     """What cannot be compared is told."""
     runs = scenario.run()
 
-    with pytest.raises(gp.ScenarioError, match='no case "I" in the second run'):
+    with pytest.raises(gp.ScenarioError, match="no case in common: the first has I, IV, the second II, III; run one"):
         gp.compare(runs, gp.load("islanding").replace({"time.end_s": 4.5}).run(["II", "III"]))
     with pytest.raises(gp.ScenarioError, match="needs results or folders of runs, got 3"):
         gp.compare(runs, 3)  # type: ignore[arg-type]

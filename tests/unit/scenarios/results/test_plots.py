@@ -153,7 +153,7 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
         Mark("", 3.2),
         Mark("by hand", 3.3, "sw1_2 opens"),
     ]
-    found = [edges(*one, inches_per_s) for one in placed(marks, inches_per_s)]
+    found = [edges(text, mark.t, side, inches_per_s) for text, mark, side in placed(marks, inches_per_s)]
 
     assert all(right[0] >= left[1] + GAP - 1e-9 for left, right in pairwise(found))
     assert found
