@@ -51,6 +51,17 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.use
 
 
+def table_of(key: str | Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario's key as a table, a copy: a text alone is its `use`.
+
+    Examples
+    --------
+    >>> table_of("mine:Nearest")
+    {'use': 'mine:Nearest'}
+    """
+    return {"use": key} if isinstance(key, str) else dict(key)
+
+
 def plugin_of(text: str | Mapping[str, Any], folder: str = "") -> Plugin:
     """Return what a scenario's key says: a text, or a table with `use` and parameters.
 
@@ -59,7 +70,7 @@ def plugin_of(text: str | Mapping[str, Any], folder: str = "") -> Plugin:
     >>> plugin_of({"use": "mine:Nearest", "k": 3}).parameters
     (('k', 3),)
     """
-    table = {"use": text} if isinstance(text, str) else dict(text)
+    table = table_of(text)
     use, place = table.pop("use", ""), table.pop("folder", "")
     return Plugin(use=use, folder=place or folder, parameters=tuple(sorted(table.items())))
 

@@ -19,7 +19,7 @@ from scenarios.spec.model import LawKey, Scenario
 from wire.module_folder import folder_of
 from wire.parameters import Range, objections, range_objection
 from wire.path_text import is_no_path
-from wire.plugin import scalar_objection
+from wire.plugin import scalar_objection, table_of
 from wire.registry import PluginError
 
 PAPER = LawChoice().use
@@ -38,7 +38,7 @@ def law_of(scenario: Scenario, case: str) -> LawChoice:
     >>> law_of(load_scenario("islanding")[0], "IV").use
     'consensus'
     """
-    table = _table(scenario.cases[case].law or scenario.law)
+    table = table_of(scenario.cases[case].law or scenario.law)
     return LawChoice(
         use=table.get("use", PAPER),
         command=tuple(table.get("command", ())),
@@ -73,13 +73,9 @@ def check_laws(scenario: Scenario, mistakes: Mistakes) -> None:
             mistakes.add(f"case.{name}.handling.weights", text)
 
 
-def _table(law: LawKey) -> dict[str, Any]:
-    return {"use": law} if isinstance(law, str) else dict(law)
-
-
 def _placed(law: LawKey, folder: Path) -> LawKey:
     """A law as it is written, with the folder in which its module, program or FMU is looked for."""
-    table = _table(law)
+    table = table_of(law)
     use = LAWS.reference(str(table.get("use", "")))  # a decorator's name is known to this process alone
     local = ":" in use or "command" in table or "fmu" in table
     if not law or not local or not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", "")):
@@ -89,7 +85,7 @@ def _placed(law: LawKey, folder: Path) -> LawKey:
 
 
 def _check(path: str, law: LawKey, mistakes: Mistakes) -> None:
-    table = _table(law)
+    table = table_of(law)
     if mistakes.touch(path):
         return
     given = [key for key in CARRIERS if key in table]

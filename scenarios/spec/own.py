@@ -12,7 +12,7 @@ from scenarios.results.own.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import PluginKey, Scenario
 from scenarios.spec.plugins import check_plugin, placed
-from wire.plugin import Plugin, plugin_of
+from wire.plugin import Plugin, plugin_of, table_of
 from wire.registry import Registry
 
 
@@ -20,7 +20,7 @@ def metrics_of(scenario: Scenario) -> list[tuple[str, Plugin]]:
     """Return a scenario's own metrics: the name of each in tables, and the metric."""
     found = []
     for key in scenario.metrics:
-        table = _table(key)
+        table = table_of(key)
         label = str(table.pop("name", ""))
         plugin = plugin_of(table)
         found.append((name_of(plugin, label), plugin))
@@ -45,7 +45,7 @@ def check_own(scenario: Scenario, mistakes: Mistakes) -> None:
     """Note metrics and claims that there are not, and metrics of one name."""
     names: list[str] = []
     for i, key in enumerate(scenario.metrics):
-        path, table = f"metrics[{i}]", _table(key)
+        path, table = f"metrics[{i}]", table_of(key)
         label = table.pop("name", "")
         if not isinstance(label, str) or (label and not good_name(label)):
             mistakes.add(f"{path}.name", "a name in tables is up to 41 letters, digits and _, the unit last: f_min_Hz")
@@ -62,7 +62,7 @@ def check_own(scenario: Scenario, mistakes: Mistakes) -> None:
             mistakes.add(path, f'there is a metric "{name}" in this list already; give one of them another name')
         names.append(name)
     for i, key in enumerate(scenario.claims):
-        _checked(f"claims[{i}]", key, _table(key), CLAIMS, mistakes)
+        _checked(f"claims[{i}]", key, table_of(key), CLAIMS, mistakes)
 
 
 def _checked(
@@ -73,12 +73,8 @@ def _checked(
 
 def _placed_metric(key: PluginKey, folder: Path) -> PluginKey:
     """A metric as any process can follow it; one of a decorator's name keeps that name in tables."""
-    table = _table(key)
+    table = table_of(key)
     use = str(table.get("use", ""))
     if METRICS.reference(use) != use and "name" not in table and good_name(use):
         key = table | {"name": use}
     return placed(key, METRICS, folder)
-
-
-def _table(key: PluginKey) -> dict[str, Any]:
-    return {"use": key} if isinstance(key, str) else dict(key)

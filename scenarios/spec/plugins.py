@@ -12,7 +12,7 @@ from scenarios.spec.mistakes import Mistakes
 from scenarios.spec.model import PluginKey
 from wire.module_folder import folder_of
 from wire.path_text import is_no_path
-from wire.plugin import Plugin, plugin_of, problems, scalar_objection
+from wire.plugin import Plugin, plugin_of, problems, scalar_objection, table_of
 from wire.registry import Registry
 
 
@@ -25,7 +25,7 @@ def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
     >>> placed("ring", GRAPHS, Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, GRAPHS, Path("/here"))
     ('ring', {'use': 'mine:Star', 'hub': 'inv1', 'folder': '/here'})
     """
-    table: dict[str, Any] = {"use": key} if isinstance(key, str) else dict(key)
+    table = table_of(key)
     use = registry.reference(str(table.get("use", "")))
     if ":" not in use or not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", "")):
         return key
@@ -42,7 +42,7 @@ def placed_plugin(plugin: Plugin, registry: Registry[Any], folder: Path) -> Plug
 
 def check_plugin(path: str, key: PluginKey, registry: Registry[Any], mistakes: Mistakes) -> Plugin | None:
     """Note what is wrong with a key and with what it names; return the plugin if nothing is."""
-    table: dict[str, Any] = {"use": key} if isinstance(key, str) else key
+    table = table_of(key)
     for name in ("use", "folder"):
         if not isinstance(table.get(name, ""), str):
             mistakes.add(f"{path}.{name}", "must be a text in quotes")
