@@ -182,7 +182,10 @@ class FreeAgent(Side):
     def _note_astray(self, now: float) -> None:
         """Ask for a new session if this one has not brought what it should, or not taken it, for too long."""
         measured = self.heard.measurement if self.phase == "running" else None
-        why = self._roll_call.complaint(None if measured is None else measured.roster, now)
+        roster = None if measured is None else measured.roster
+        if roster is not None and self._agent.fault:
+            roster = (*roster, self._name)  # who says nothing is not heard, and no session changes that
+        why = self._roll_call.complaint(roster, now)
         if why:
             self._go_astray(why)
 

@@ -258,7 +258,7 @@ class FreePlant(Side):
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         self.admission.take(state)
         self._heard.came(state.sender, now)
-        self._silence.heard(state.sender)
+        self._silence.heard(state.sender, failed=bool(state.fault))
         self._note_state(state)
         if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
             self._heard.keep(state)

@@ -65,6 +65,8 @@ class Silence:
         """When each agent was heard last, or joined."""
         self._holding: set[str] = set()
         """Agents that say that they have no measurement."""
+        self._failed: set[str] = set()
+        """Agents whose law has failed: they say nothing more."""
         self._silent: set[str] = set()
         self._unheard: dict[str, dict[str, float]] = {}
         """Of each agent the neighbours that it does not hear, and from when on that is to be told."""
@@ -75,8 +77,9 @@ class Silence:
         """Note that an agent takes part from now on."""
         self._joined[name] = self._last[name] = self._clock
 
-    def heard(self, name: str) -> None:
-        """Note a state that came off the wire."""
+    def heard(self, name: str, *, failed: bool = False) -> None:
+        """Note a state that came off the wire, perhaps the last, by which an agent says that its law has failed."""
+        (self._failed.add if failed else self._failed.discard)(name)
         self._last[name] = self._clock
         self._holding.discard(name)
 
@@ -86,6 +89,7 @@ class Silence:
             known.pop(name, None)
         self._silent.discard(name)
         self._holding.discard(name)
+        self._failed.discard(name)
         for unheard in self._unheard.values():
             unheard.pop(name, None)
         for told in self._told.values():
@@ -120,13 +124,17 @@ class Silence:
             if self._clock - last > self._limit:
                 if name not in self._silent:
                     self._silent.add(name)
-                    why = "it says that it has no measurement" if name in self._holding else "nothing comes from it"
-                    yield name, f"{name} is silent: no state for {self._max_age:g} s, {why}"
+                    yield name, f"{name} is silent: no state for {self._max_age:g} s, {self._why(name)}"
             elif name in self._silent:
                 self._silent.discard(name)
                 yield name, f"{name} is heard again"
         for name in self._unheard:
             yield from self._take_unheard(name)
+
+    def _why(self, name: str) -> str:
+        if name in self._failed:
+            return "as its law has failed"
+        return "it says that it has no measurement" if name in self._holding else "nothing comes from it"
 
     def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
         """Neighbours whom an agent has ceased to hear, or hears again. Whom nobody hears is told of as silent."""

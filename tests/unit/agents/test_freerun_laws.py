@@ -66,10 +66,14 @@ def test_what_was_not_told_does_not_count_as_lost() -> None:
 
 
 def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None:
-    """The plant hears why in a last state, which nobody uses; the log has it too."""
-    lab = running(law=Divides())
-    for k in range(1, 10):
-        lab.measure(k)
+    """The plant hears why in a last state, which nobody uses; the log has it too.
+
+    That the plant does not hear it from then on is no reason for a new session.
+    """
+    lab = running("inv2", law=Divides())
+    for k in range(1, 300):
+        lab.measure(k, roster=("inv1", "inv2") if k < 10 else ("inv2",))
+        lab.state("inv2", k, k * T_C)
         lab.go(T_C)
     said: list[State] = lab.decided()
 
@@ -77,3 +81,4 @@ def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None
     assert said[0].fault == "law consensus: step at t = 0.02 s raised ZeroDivisionError: float division by zero"
     assert lab.said[-1].startswith("inv1: law consensus: step at t = 0.02 s raised ZeroDivisionError")
     assert not lab.side.over
+    assert not lab.side.astray

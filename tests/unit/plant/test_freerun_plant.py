@@ -69,9 +69,19 @@ class Lab:
         self.side.received(key, encode(message), self.now)
         self.do()
 
-    def state(self, name: str, seq: int, P_set: float, life: int = 1) -> None:
+    def state(self, name: str, seq: int, P_set: float, life: int = 1, *, fault: str = "") -> None:
         """An agent's state comes in."""
-        state = State(sender=name, incarnation=life, seq=seq, t=0.0, P_set=P_set, V_set=277.0, Q=0.0)
+        state = State(
+            sender=name,
+            incarnation=life,
+            seq=seq,
+            t=0.0,
+            P_set=P_set,
+            V_set=277.0,
+            Q=0.0,
+            fault=fault,
+            idle=bool(fault),
+        )
         self.hear(KEYS.state(name), state)
 
     def leave(self, name: str, life: int = 1) -> None:

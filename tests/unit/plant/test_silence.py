@@ -51,6 +51,18 @@ def told(lab: Lab) -> list[tuple[float, str]]:
     return [(event.t, event.text) for event in lab.events("roster") if " joined" not in event.text]
 
 
+def test_an_agent_whose_law_has_failed_is_silent_for_that_reason() -> None:
+    """It says so in its last state; nobody looks for a broken path then."""
+    lab = running(end=None)
+    all_tick(lab, 100)
+    lab.state("inv2", lab.side.tick, 50e3, fault="law mine:Mine: step raised")
+    all_tick(lab, 20, ("inv1", "inv3"))
+
+    assert [text.partition(", at")[0] for _, text in told(lab)] == [
+        "inv2 is silent: no state for 0.25 s, as its law has failed"
+    ]
+
+
 def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_speaks_again() -> None:
     """As soon as its state is older than the neighbours use, long before its token goes; not for a lost message."""
     lab = running(end=None)
