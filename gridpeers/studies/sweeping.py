@@ -130,7 +130,9 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
     if metrics is None:
         return scenario, None
     given: list[Any] = [metrics] if isinstance(metrics, str | Mapping) or callable(metrics) else list(metrics)
+    there = {plugin.use: name for name, plugin in metrics_of(scenario.spec) if not plugin.parameters}
     asked = [METRICS.name_of(it) or it for it in given]
+    asked = [there.get(METRICS.reference(it), it) if isinstance(it, str) else it for it in asked]
     own = [it for it in asked if not isinstance(it, str) or ":" in METRICS.reference(it)]
     if own:
         before = len(scenario.spec.metrics)

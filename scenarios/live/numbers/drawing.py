@@ -17,6 +17,9 @@ from scenarios.results.moves import as_they_came
 from scenarios.spec import Scenario
 from wire.messages import PlantEvent
 
+PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
+"""Words of the plant, as figures have them."""
+
 
 def drawing_by_hand(
     compared: Compared, scenario: Scenario, feeder: Feeder, case: str, history: History, events: Sequence[PlantEvent]
@@ -45,10 +48,19 @@ def drawing_by_hand(
 
 
 def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
-    """Marks of what people did: the switches of one moment have one, with words; what else there is, a line alone."""
-    by_time: dict[float, list[str]] = {}
+    """Marks of what people did, and of what befell agents; one for all of a moment."""
+    by_time: dict[float, list[PlantEvent]] = {}
     for event in departures:
         if event.t > 0.0:
-            switched = re.fullmatch(r"switch (\S+)(?: \(.*\))? (open|close)d", event.text)
-            by_time.setdefault(event.t, []).extend([f"{switched[1]} {switched[2]}s"] if switched else [])
-    yield from (Mark("by hand" if what else "", t, ", ".join(what)) for t, what in by_time.items())
+            by_time.setdefault(event.t, []).append(event)
+    for t, of in by_time.items():
+        what = ", ".join(dict.fromkeys(text for event in of if (text := _in_short(event))))
+        yield Mark("by hand" if any(event.kind == "switch" for event in of) else "", t, what)
+
+
+def _in_short(event: PlantEvent) -> str:
+    """What somebody did, in two words; "" where that takes more."""
+    if event.kind == "link":
+        return "links"
+    match = re.match(r"(?:switch )?(\S+)(?: \(.*\))? (opened|closed|joined|left|died)\b", event.text)
+    return f"{match[1]} {PRESENT[match[2]]}" if match else ""

@@ -66,8 +66,24 @@ def judge(found: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
         try:
             verdicts.append(_verdict(claim, found))
         except ANYTHING as error:  # a claim is anybody's code
-            verdicts.append(Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}"))
+            verdicts.append(
+                Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, found)}")
+            )
     return tuple(verdicts)
+
+
+def _there(error: BaseException, found: Findings) -> str:
+    """Names that there are, for a claim that asked for another."""
+    if not isinstance(error, KeyError):
+        return ""
+    known = {
+        "cases": dict.fromkeys(found.results),
+        "events": dict.fromkeys(event for of in found.results.values() for event in of),
+        "scenario's own metrics": dict.fromkeys(
+            n for of in found.own.values() for one in of.values() for n in one.values
+        ),
+    }
+    return "".join(f"; the {kind} are {', '.join(names)}" for kind, names in known.items() if names)
 
 
 def _verdict(claim: Claim, found: Findings) -> Verdict:

@@ -17,6 +17,9 @@ from __future__ import annotations
 import copy
 import inspect
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 from scenarios.results.claims import Claim, Verdict, judge
 from scenarios.results.findings import Findings
@@ -44,10 +47,17 @@ def claim_of(plugin: Plugin) -> Claim:
     def holds(findings: Findings) -> tuple[bool, str]:
         result = found(findings)
         if isinstance(result, tuple) and len(result) == 2:
-            return bool(result[0]), printable(str(result[1]), 200)
-        return bool(result), ""
+            return _truth(result[0]), printable(str(result[1]), 200)
+        return _truth(result), ""
 
     return Claim(name=name, text=text, source=plugin.use, judge=holds, measures=())
+
+
+def _truth(value: Any) -> bool:
+    """Return whether a claim holds: a text, or a forgotten `return`, says nothing of it."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"returned {value!r:.60}; return True or False, or that and our value: (True, '0.3 s')")
+    return bool(value)
 
 
 def judged(found: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:

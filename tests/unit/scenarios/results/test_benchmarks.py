@@ -92,7 +92,8 @@ def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:
     verdicts = judge(found, broken.claims)
     report = Report(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/")
 
-    assert [(verdict.status, verdict.found) for verdict in verdicts] == [("FAIL", "cannot be judged: KeyError: 'V'")]
+    (verdict,) = verdicts
+    assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: KeyError: 'V'; the cases are IV")
     assert "The benchmark's summary failed: AttributeError" in plain(report)
 
 

@@ -145,6 +145,23 @@ def fails(found: Findings) -> bool:
 STEADY = Claim(name="steady", text="is steady", source="here", judge=lambda _: (True, "1"), measures=(), cases=("IV",))
 
 
+def says_no(found: Findings) -> str:
+    """Returns a text alone."""
+    return "no"
+
+
+def forgets(found: Findings) -> None:
+    """Returns nothing."""
+
+
+def test_a_claim_that_says_neither_yes_nor_no_does_not_hold() -> None:
+    """A text is true to Python, and would pass as a claim whatever it says."""
+    verdicts = judged(Findings(results={}), [Plugin(use=f"{__name__}:{name}") for name in ("says_no", "forgets")])
+
+    assert [one.status for one in verdicts] == ["FAIL", "FAIL"]
+    assert verdicts[0].found.startswith("cannot be judged: TypeError: returned 'no'; return True or False, or that and")
+
+
 def test_a_function_or_a_claim_object_is_judged_and_one_that_raises_fails_in_one_line() -> None:
     """The docstring's first line is the claim; a case that was not run is told."""
     plugins = [Plugin(use=f"{__name__}:{name}") for name in ("holds", "fails", "STEADY", "nothing")]
