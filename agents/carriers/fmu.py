@@ -45,7 +45,7 @@ class FmuLaw(ProgramLaw):
             raise ValueError(f"law {path.name}: there is nowhere to unpack it: {error.strerror}; set TMPDIR") from None
         command = (sys.executable, "-P", "-m", "agents.carriers.fmu_host", str(path), self._unpacked)
         try:
-            super().__init__(replace(choice, command=command), path.name)
+            super().__init__(replace(choice, command=command), path.name, self._unpacked)
         except ValueError:
             shutil.rmtree(self._unpacked, ignore_errors=True)
             raise

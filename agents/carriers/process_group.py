@@ -11,7 +11,7 @@ from collections.abc import Sequence
 LEAVING = 1.0
 """Time (s) that a program has to end once its input has."""
 
-_GUARD = 'read -r _; sleep "$1"; kill -KILL 0'
+_GUARD = 'read -r _; sleep "$1"; test -z "$2" || rm -rf -- "$2"; kill -KILL 0'
 """Leads the group. Its own input ends with the process that started it, also by SIGKILL; then it ends the group."""
 
 
@@ -24,6 +24,8 @@ class ProcessGroup:
         What to run.
     folder : str
         Where to run it; "" is here.
+    litter : str, optional
+        Folder that is removed if whoever started the program dies; else it is theirs to remove.
 
     Raises
     ------
@@ -31,9 +33,9 @@ class ProcessGroup:
         If it cannot be started.
     """
 
-    def __init__(self, command: Sequence[str], folder: str) -> None:
+    def __init__(self, command: Sequence[str], folder: str, litter: str = "") -> None:
         self._guard = subprocess.Popen(
-            ["/bin/sh", "-c", _GUARD, "gridpeers-guard", f"{LEAVING:g}"],
+            ["/bin/sh", "-c", _GUARD, "gridpeers-guard", f"{LEAVING:g}", litter],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

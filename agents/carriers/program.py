@@ -54,6 +54,8 @@ class ProgramLaw(Law):
         The command, its parameters and the folder to run it in.
     name : str, optional
         What people call it; the name of the program if left out.
+    litter : str, optional
+        Folder that is removed if the agent dies.
 
     Raises
     ------
@@ -61,7 +63,7 @@ class ProgramLaw(Law):
         If the program cannot be started, or a limit among the parameters is wrong.
     """
 
-    def __init__(self, choice: LawChoice, name: str = "") -> None:
+    def __init__(self, choice: LawChoice, name: str = "", litter: str = "") -> None:
         super().__init__(**limits_in(choice.parameters))
         self._choice = choice
         self._name = name or Path(choice.command[0]).name
@@ -72,7 +74,7 @@ class ProgramLaw(Law):
         if choice.folder and (Path(choice.folder) / command[0]).exists():  # else it is on the PATH, or nowhere
             command[0] = str(Path(choice.folder) / command[0])
         try:
-            self._group = ProcessGroup(command, choice.folder)
+            self._group = ProcessGroup(command, choice.folder, litter)
         except OSError as error:
             text = f"{choice.command[0]}: {error.strerror}; write the path of a program that can be run"
             raise ValueError(f"law program {text}") from None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Results
 from gridpeers.runs.run_folder import RunFolder, empty_folder
+from scenarios.results.folder import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError
@@ -48,7 +49,11 @@ def run(
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
     if folder is None:
-        home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
+        try:
+            home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)
+        except OSError as error:
+            text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
+            raise FolderError(text) from error
     else:
         home = RunFolder(empty_folder(folder))
     request = Request(

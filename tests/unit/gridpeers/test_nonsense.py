@@ -74,3 +74,16 @@ def test_other_nonsense_is_refused(call: Callable[[gp.Scenario], Any], said: str
     """Names that are no words, cases and drivers that are no texts, folders that can be none."""
     with pytest.raises(ValueError, match=re.escape(said)):
         call(scenario)
+
+
+def test_a_machine_without_room_for_temporary_files_is_told(
+    scenario: gp.Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result that is not saved needs a folder too."""
+
+    def refuse(**_: str) -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)
+    with pytest.raises(ValueError, match="there is nowhere for temporary files: No usable temporary directory found"):
+        scenario.run("I")
