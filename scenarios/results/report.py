@@ -189,8 +189,13 @@ def _row(
         ]
         if quantities[0] == "f_error_Hz":
             restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
-            row.append("-" if mixed else restored)
+            row.append("-" if mixed or _nothing_shared(values, "MPSI") else restored)
     return tuple(row)
+
+
+def _nothing_shared(values: Steady, name: str) -> bool:
+    """Whether a share means nothing, as there is next to nothing to share: then power is not shared equally ever."""
+    return values.reasons.get(name, "").startswith("nothing shared")
 
 
 def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
@@ -219,7 +224,8 @@ def _reasons(report: Report, quantities: tuple[Quantity, ...]) -> list[str]:
                     if name not in values.reasons or (apart and not where and name in SHARED):
                         continue
                     mean = getattr(values, name)
-                    last = "" if math.isnan(mean) else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
+                    dust = math.isnan(mean) or _nothing_shared(values, name)
+                    last = "" if dust else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
                     lines.append(
                         f"case {case}, {event}{where}: {label(name, report.found.f_nom)} {values.reasons[name]}{last}"
                     )

@@ -12,6 +12,7 @@ from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats
 from scenarios.results.islands import Quantity, worst
+from scenarios.results.plots import sharing
 from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, case_styles, columns, from_zero, time_axis, words
 
@@ -53,7 +54,7 @@ def frequency(axes: Axes, drawing: Drawing) -> None:
 
 def MPSI(axes: Axes, drawing: Drawing) -> None:
     """Mean power sharing index over time, (16)."""
-    quantity = worst(metrics.MPSI, 0.0, drawing.spells)
+    quantity = worst(sharing.MPSI, 0.0, drawing.spells)
     drawn = curves(axes, drawing, quantity)
     axes.set_title("Mean power sharing index, MPSI", loc="left")
     axes.set_ylabel(_of(drawing, "MPSI", "MPSI"))
@@ -80,7 +81,7 @@ def voltage(axes: Axes, drawing: Drawing) -> None:
 
 def MQSI(axes: Axes, drawing: Drawing) -> None:
     """Mean var sharing index over time, (17)."""
-    quantity = worst(metrics.MQSI, 0.0, drawing.spells)
+    quantity = worst(sharing.MQSI, 0.0, drawing.spells)
     drawn = curves(axes, drawing, quantity)
     axes.set_title("Mean var sharing index, MQSI", loc="left")
     axes.set_ylabel(_of(drawing, "MQSI", "MQSI"))

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.islands import Quantity, worst
+from scenarios.results.plots import sharing
 from scenarios.results.plots.marks import BLACK, mark_events
 from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, Bounds, Style, columns, from_zero, time_axis
 
@@ -23,9 +24,9 @@ COLUMNS = 2
 
 _PANELS: tuple[tuple[str, str, Quantity, Bounds | None], ...] = (
     ("Frequency", "f (Hz)", metrics.mean_frequency, None),
-    ("Mean power sharing index, MPSI", "MPSI", metrics.MPSI, SHARING),
+    ("Mean power sharing index, MPSI", "MPSI", sharing.MPSI, SHARING),
     ("Voltage error, V_error", "mean of abs(V - 1) (pu)", metrics.V_error, VOLTAGE),
-    ("Mean var sharing index, MQSI", "MQSI", metrics.MQSI, SHARING),
+    ("Mean var sharing index, MQSI", "MQSI", sharing.MQSI, SHARING),
 )
 """Title, axis, quantity, and where an axis ends that starts at 0; the frequency's does not."""
 

@@ -7,6 +7,7 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import inf
 from textwrap import wrap
 from typing import Any, NamedTuple
 
@@ -124,10 +125,12 @@ class Bounds(NamedTuple):
     """There or above, so that what is next to nothing looks like it."""
     shown: float = 0.995
     """Part of all values that it has."""
+    most: float = inf
+    """There or below."""
 
 
-SHARING = Bounds()
-"""Of MPSI and MQSI."""
+SHARING = Bounds(most=5.0)
+"""Of MPSI and MQSI, which have no bound where little is shared. The paper's go up to 2, ours after an event to 4."""
 
 VOLTAGE = Bounds(least=0.01, shown=0.98)
 """Of V_error (pu), whose spikes at a switching are ten times what is left of it, and last longer."""
@@ -139,7 +142,8 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    top, peak = max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), float(values.max())
+    top = min(max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), bounds.most)
+    peak = float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
         axes.annotate(

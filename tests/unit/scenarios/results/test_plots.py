@@ -193,6 +193,21 @@ def test_where_there_are_islands_the_worst_is_drawn() -> None:
     ]
 
 
+def test_an_island_without_load_draws_no_dust() -> None:
+    """Its sharing index divides next to nothing by next to nothing: no curve there, and the axis stays readable."""
+    it = drawing("IV")
+    history = it.histories["IV"]
+    history.P[history.t > 4.0] = 1e-6 * np.array([1, -1, 1, -1, 1, -1, 1, -1, 0.001])
+    history.Q[history.t > 4.0] *= np.array([1, 100, -98, 1, 100, -98, 1, 1, 1])
+    page = overview(it)
+
+    line = next(line for line in page.axes[1].get_lines() if line.get_label() == "IV: made up")
+    drawn = np.asarray(line.get_ydata())
+    assert np.isnan(drawn[history.t > 4.0]).all()
+    assert np.isfinite(drawn[history.t <= 4.0]).all()
+    assert page.axes[3].get_ylim()[1] == 5.0
+
+
 def test_the_lowest_panel_of_every_column_has_its_times() -> None:
     """With three cases there is nothing below the second, so its own axis tells the time."""
     panels = powers(drawing("ring", "path", "star"), GFM=False).axes

@@ -102,6 +102,19 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     assert "-:" not in plain(report())
 
 
+def test_an_island_without_load_has_no_time_to_share_it() -> None:
+    """Nothing is shared, so it is never shared equally: "never" would be a verdict on the control."""
+    idle = {"MPSI": "nothing shared: the total is below 0.1% of the ratings"}
+    part = Steady(f_error_Hz=0.0, MPSI=12719.3, V_error=0.0, MQSI=0.1, t_restore_s=None, p={}, reasons=idle)
+    text = plain(
+        Report(scenario="own", titles={}, found=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder="")
+    )
+
+    assert "nothing shared            -\n" in text
+    assert "MPSI nothing shared: the total is below 0.1% of the ratings\n" in text
+    assert "12719" not in text
+
+
 def test_metrics_of_several_islands_together_are_null() -> None:
     """metrics.json has no number either that means nothing; what the islands share is beside it."""
     whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=2.0, p={})
