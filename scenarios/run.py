@@ -85,6 +85,7 @@ def run(request: Request, progress: Progress) -> Report:
     BrokenRunError
         If a case broke. What came until then stays in the folder, and `status.txt` tells that it is not whole.
     """
+    request = dataclasses.replace(request, folder=request.folder.absolute())  # a law or metric may go elsewhere
     try:
         return _logged(request, progress)
     except KeyboardInterrupt as error:

@@ -40,7 +40,7 @@ def read(folder: str | Path) -> Result | Results:
         spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
         mistakes.raise_if_any()
         feeder = as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
-        results = Results(RunFolder(path), spec, feeder)
+        results = Results(RunFolder(path.absolute()), spec, feeder)
     except (OSError, ValueError, KeyError) as error:
         text = "; ".join(getattr(error, "mistakes", ())) or str(error)
         raise FolderError(f"{folder}: cannot be read: {text}") from error

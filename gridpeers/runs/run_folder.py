@@ -62,4 +62,4 @@ def empty_folder(it: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FolderError(refusal(folder, error)) from error
-    return folder
+    return folder.absolute()  # whoever reads the results may have gone elsewhere meanwhile
