@@ -1,4 +1,4 @@
-"""An agent as a process: `agents.lockstep` or `agents.freerun` on a Zenoh session."""
+"""An agent as a process: `LockstepAgent` or `RealtimeAgent` on a Zenoh session."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from msgspec.structs import replace
 
 from agents.carriers.make import make_law
 from agents.config import AgentConfig
-from agents.freerun import FreeAgent
 from agents.laws.law import Law
-from agents.lockstep import AgentSide
+from agents.lockstep_agent import LockstepAgent
+from agents.realtime.realtime_agent import RealtimeAgent
 from wire.driver.drive import StoppedError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
 from wire.driver.session import Session
@@ -54,14 +54,14 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     except ValueError as error:
         raise ConfigurationError(f"{config.name}: {error}") from None
     with closing(law):
-        side = _one_session_after_the_other(config, make_links, law, log)
-    if side.rejects.counts:
-        log.warning("%s: dropped messages by kind: %s", config.name, dict(side.rejects.counts))
-    if not side.failed:
-        log.info("%s: %s", config.name, side.stopped)
+        node = _one_session_after_the_other(config, make_links, law, log)
+    if node.rejects.counts:
+        log.warning("%s: dropped messages by kind: %s", config.name, dict(node.rejects.counts))
+    if not node.failed:
+        log.info("%s: %s", config.name, node.stopped)
         return ""
-    failed = side.failed
-    if not side.plant_seen:
+    failed = node.failed
+    if not node.plant_seen:
         failed += f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
     if wall:
         raise ConfigurationError(failed)
@@ -70,33 +70,33 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
 
 def _one_session_after_the_other(
     config: AgentConfig, make_links: MakeLinks, law: Law, log: logging.Logger
-) -> FreeAgent | AgentSide:
-    """Take part with one session, and with a new one as long as the last had gone astray."""
-    side: FreeAgent | AgentSide | None = None
-    while side is None or (isinstance(side, FreeAgent) and side.astray):
+) -> RealtimeAgent | LockstepAgent:
+    """Take part with one session, and with a new one as long as the last was broken."""
+    node: RealtimeAgent | LockstepAgent | None = None
+    while node is None or (isinstance(node, RealtimeAgent) and node.session_broken):
         session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
         try:
-            if side is None:
+            if node is None:
                 try:
                     links = make_links(config.name, config.links)
-                    side = (FreeAgent if config.clock == "wall" else AgentSide)(config, session.id, links, law)
+                    node = (RealtimeAgent if config.clock == "wall" else LockstepAgent)(config, session.id, links, law)
                 except ValueError as error:
                     raise ConfigurationError(str(error)) from None
-            _take_part(side, session, log)
+            _take_part(node, session, log)
         finally:
             session.close()
-    return side
+    return node
 
 
-def _take_part(side: FreeAgent | AgentSide, session: Session, log: logging.Logger) -> None:
+def _take_part(node: RealtimeAgent | LockstepAgent, session: Session, log: logging.Logger) -> None:
     """Take part with one session. All of an agent's sessions hold one token: for the others it is one agent."""
-    session.answer(*side.nameplate)
-    for key in side.publications:
+    session.answer(*node.nameplate)
+    for key in node.publications:
         session.prepare(key)
     try:
-        drive(side, session, log)
+        drive(node, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
-        if isinstance(side, FreeAgent):
-            side.leave(f"asked to leave: {stop}")
-            serve(side, session, log)  # until the plant knows
+        if isinstance(node, RealtimeAgent):
+            node.leave(f"asked to leave: {stop}")
+            serve(node, session, log)  # until the plant knows
         raise

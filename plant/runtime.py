@@ -1,4 +1,4 @@
-"""The plant as a process: `plant.lockstep` or `plant.freerun` on a Zenoh session."""
+"""The plant as a process: `LockstepPlant` or `RealtimePlant` on a Zenoh session."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from time import monotonic, time_ns
 from msgspec.structs import replace
 
 from plant.config import PlantConfig
-from plant.freerun import FreePlant
 from plant.interface import LivePlant
-from plant.lockstep import PlantSide
+from plant.lockstep_plant import LockstepPlant
+from plant.realtime.realtime_plant import RealtimePlant
 from wire.driver.drive import StoppedError, drive, perform, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
 from wire.driver.session import Session
@@ -68,34 +68,34 @@ def run_plant(
             tell(COMPILING)
             plant = builder(config)
             links = make_links(PLANT, config.links)
-            side = FreePlant(config, plant, links) if wall else PlantSide(config, plant, links)
+            node = RealtimePlant(config, plant, links) if wall else LockstepPlant(config, plant, links)
         except ValueError as error:
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:
             return f"plant: cannot start: {error}"
-        for key in side.publications:
+        for key in node.publications:
             session.prepare(key)
         for name, text in config.handout.items():
-            session.answer(side.keys.config(name), text.encode())
+            session.answer(node.keys.config(name), text.encode())
         gc.freeze()  # what was built stays: later collections need not look at it
         tell(READY)
         try:
-            drive(side, session, log)
+            drive(node, session, log)
         except (StoppedError, KeyboardInterrupt) as stop:
-            side.interrupt(f"the plant was asked to leave: {stop}", 0.0)
-            perform(side.take_actions(), session, log)
+            node.interrupt(f"the plant was asked to leave: {stop}", 0.0)
+            perform(node.take_actions(), session, log)
             raise
         except Exception as error:  # whatever it is: agents that are told close at once, else they seek a plant
-            side.cause = error
-            side.abort(f"plant at t = {side.t:g} s: {type(error).__name__}: {error}", monotonic())
-            serve(side, session, log)
+            node.cause = error
+            node.abort(f"plant at t = {node.t:g} s: {type(error).__name__}: {error}", monotonic())
+            serve(node, session, log)
     finally:
         session.close()
-    if side.cause is not None:
-        log.error("the plant broke", exc_info=side.cause)
-    if side.rejects.counts:
-        log.warning("plant: dropped messages by kind: %s", dict(side.rejects.counts))
-    return side.outcome
+    if node.cause is not None:
+        log.error("the plant broke", exc_info=node.cause)
+    if node.rejects.counts:
+        log.warning("plant: dropped messages by kind: %s", dict(node.rejects.counts))
+    return node.outcome
 
 
 def tell(word: str) -> None:

@@ -18,7 +18,7 @@ import msgspec
 
 from agents.config import AgentConfig
 from plant.config import PlantConfig
-from plant.freerun.pacing import sentence
+from plant.realtime.pacer import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.emulation.setup import Setup

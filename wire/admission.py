@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import inf
 
 from wire.codec import RejectedError
-from wire.messages import AnyMessage, Nameplate
+from wire.messages import AnyMessage
 
 AHEAD = 50
 """Numbers by which a sender may be ahead of its run time: it may have sent some at once."""
@@ -143,16 +143,3 @@ class Admission:
             return False
         self._passed[name] = message.seq
         return True
-
-
-def is_news(plate: Nameplate, known: Nameplate | None) -> bool:
-    """Whether a process says who it is for the first time; what it has said before holds.
-
-    Raises
-    ------
-    RejectedError
-        If it says something else now.
-    """
-    if known is not None and known != plate:
-        raise RejectedError("implausible", f"{plate.sender} is not what it was; a nameplate never changes")
-    return known is None

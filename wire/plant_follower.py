@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import inf
 
-from wire.endpoint import Endpoint, Route
 from wire.keys import epoch_of
 from wire.messages import PLANT, AnyMessage
+from wire.node import Node, Route
 
 
-class PlantFollower(Endpoint):
+class PlantFollower(Node):
     """Follows the plant that speaks first of those whose tokens are there, until its token is gone.
 
     Parameters

@@ -1,7 +1,7 @@
 """Driver without processes: plant and agents in one thread, on a bus that delivers in order.
 
-Every message is encoded and decoded, and discovery, roster and ticks are those of `agents.lockstep` and
-`plant.lockstep`; so the result is that of the processes, byte by byte, and is the reference for them.
+Every message is encoded and decoded, and discovery, roster and ticks are those of `LockstepAgent` and
+`LockstepPlant`; so the result is that of the processes, byte by byte, and is the reference for them.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import msgspec
 from agents.carriers.make import close_laws, make_law
 from agents.config import AgentConfig
 from agents.laws.law import Law
-from agents.lockstep import AgentSide
+from agents.lockstep_agent import LockstepAgent
 from plant.config import PlantConfig
 from plant.interface import PlantLike
-from plant.lockstep import PlantSide
+from plant.lockstep_plant import LockstepPlant
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.links import links_of
 from wire.actions import Action, Fetch, Listen, Publish, Say
@@ -31,7 +31,7 @@ from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 class _Delivery(NamedTuple):
     """One message on its way to one receiver."""
 
-    to: PlantSide | AgentSide
+    to: LockstepPlant | LockstepAgent
     key: str
     payload: bytes
 
@@ -41,31 +41,31 @@ class Bus:
 
     Parameters
     ----------
-    plant : PlantSide
+    plant : LockstepPlant
         The plant's core.
-    agents : Iterable[AgentSide]
+    agents : Iterable[LockstepAgent]
         The agents' cores, in the order in which they start.
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
     on_links : Callable[[LinkReport], None]
         Takes what emulated links did.
-    newcomer : Callable[[str], AgentSide]
+    newcomer : Callable[[str], LockstepAgent]
         Makes the core of an agent that the plant awaits while the run goes on.
     """
 
     def __init__(
         self,
-        plant: PlantSide,
-        agents: Iterable[AgentSide],
+        plant: LockstepPlant,
+        agents: Iterable[LockstepAgent],
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
-        newcomer: Callable[[str], AgentSide],
+        newcomer: Callable[[str], LockstepAgent],
     ) -> None:
         self._plant, self._agents = plant, list(agents)
         self._newcomer = newcomer
         self._awaited: list[str] = []
         self._on_telemetry, self._on_links = on_telemetry, on_links
-        self._subscribers: defaultdict[str, list[PlantSide | AgentSide]] = defaultdict(list)
+        self._subscribers: defaultdict[str, list[LockstepPlant | LockstepAgent]] = defaultdict(list)
         self._nameplates: dict[str, bytes] = {}
         self._queue: deque[_Delivery] = deque()
 
@@ -97,7 +97,7 @@ class Bus:
             agent.start(0.0)
             self._start(agent)
 
-    def _start(self, agent: AgentSide) -> None:
+    def _start(self, agent: LockstepAgent) -> None:
         """Let an agent and everybody before it see each other."""
         name = agent.token
         for key in agent.subscriptions:
@@ -118,7 +118,7 @@ class Bus:
             self._do(other, other.take_actions())
         self._do(agent, agent.take_actions())
 
-    def _do(self, side: PlantSide | AgentSide, actions: Sequence[Action | Say]) -> None:
+    def _do(self, side: LockstepPlant | LockstepAgent, actions: Sequence[Action | Say]) -> None:
         for action in actions:
             if isinstance(action, Publish):
                 key, payload = action
@@ -192,21 +192,23 @@ def run_inprocess(
         from plant.build import build_plant  # numba and scipy: only for who runs a plant
 
         plant = build_plant(plant_config)
-    side = PlantSide(msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links))
+    side = LockstepPlant(
+        msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links)
+    )
     known = {config.name: config for config in agent_configs}
     laws: list[Law] = []
     with ExitStack() as stack:
         stack.callback(close_laws, laws)
 
-        def agent_of(config: AgentConfig, instance: str) -> AgentSide:
+        def agent_of(config: AgentConfig, instance: str) -> LockstepAgent:
             laws.append(make_law(config.control))
-            return AgentSide(config, instance, links_of(config.name, config.links), laws[-1])
+            return LockstepAgent(config, instance, links_of(config.name, config.links), laws[-1])
 
         agents = [
             agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
         ]
 
-        def newcomer(name: str) -> AgentSide:
+        def newcomer(name: str) -> LockstepAgent:
             known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
             agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
             return agents[-1]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.codec import RejectedError, encode
-from wire.endpoint import Route
 from wire.messages import PLANT, Answer, AnyMessage, Command, LinkOrder, LinkReport, Telemetry
+from wire.node import Route
 from wire.plant_follower import PlantFollower
 
 

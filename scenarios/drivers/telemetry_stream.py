@@ -1,7 +1,7 @@
 """The plant's telemetry in order and without gaps: what is missing, and when to ask for it again. Pure.
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it what was on the way. The plant
-keeps what it has published of late (`plant.freerun.kept`) and publishes it again when asked by a `Command`.
+keeps what it has published of late (`plant.realtime.kept_telemetry`) and publishes it again when asked by a `Command`.
 """
 
 from __future__ import annotations

@@ -9,13 +9,13 @@ import msgspec
 
 from agents.agent import check_nameplate
 from agents.config import AgentConfig
-from agents.freerun.hearing import Hearing
 from scenarios.live.show.look import Look
 from scenarios.live.show.picture import Picture, Standing
 from scenarios.live.visit import NobodyError, Visit
 from scenarios.short_names import in_order
 from wire.codec import encode
 from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
+from wire.session_patience import SessionPatience
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
@@ -151,7 +151,7 @@ class Watching:
         """When who last told anything."""
         self._used: dict[str, tuple[str, ...]] = {}
         """Whom each agent has in its sums."""
-        self._hearing = Hearing()
+        self._patience = SessionPatience()
         visit.listen(visit.keys.telemetry)
         visit.fetch(visit.keys.config("*"))
 
@@ -191,9 +191,9 @@ class Watching:
         there = {*([PLANT] if self._visit.plant else []), *present(self._visit)}
         there.update(*(self._used.get(name, ()) for name in telling))
         silent = sorted(there - telling)
-        self._hearing.whole |= PLANT in telling and not silent
-        if self._hearing.lost(silent, now):
-            self._hearing = self._hearing.next()
+        self._patience.whole |= PLANT in telling and not silent
+        if self._patience.lost(silent, now):
+            self._patience = self._patience.next()
             self._visit.renew()
 
 

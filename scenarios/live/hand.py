@@ -18,7 +18,7 @@ import msgspec
 from agents.config import AgentConfig
 from agents.runtime import run_agent
 from plant.config import PlantConfig
-from plant.freerun.pacing import sentence
+from plant.realtime.pacer import sentence
 from plant.runtime import COMPILING, READY, run_plant
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.misfortunes import Misfortunes

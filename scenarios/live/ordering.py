@@ -24,7 +24,7 @@ ACKNOWLEDGED = 4.0
 
 
 class _Taken(msgspec.Struct, frozen=True):
-    """The plant's answer; see `plant.freerun.service`."""
+    """The plant's answer; see `plant.realtime.run_commands`."""
 
     number: int
     t: float

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from agents.config import AgentConfig, Control
 from plant.config import PlantConfig, SwitchEvent
-from plant.freerun.pacing import TOLERATED
+from plant.realtime.pacer import TOLERATED
 from scenarios.drivers.children import Children
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from plant.freerun.pacing import TOLERATED
+from plant.realtime.pacer import TOLERATED
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous

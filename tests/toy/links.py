@@ -13,15 +13,15 @@ from functools import partial
 import msgspec
 
 from agents.config import AgentConfig
-from agents.lockstep import AgentSide
+from agents.lockstep_agent import LockstepAgent
 from plant.config import PlantConfig
-from plant.lockstep import PlantSide
+from plant.lockstep_plant import LockstepPlant
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode
 from wire.messages import PlantEvent, Telemetry
 
-Side = PlantSide | AgentSide
+Side = LockstepPlant | LockstepAgent
 
 
 class Links:
@@ -38,7 +38,7 @@ class Links:
     """
 
     def __init__(self, plant_config: PlantConfig, agent_configs: Iterable[AgentConfig], rng: random.Random) -> None:
-        self.plant = PlantSide(plant_config, ToyPlant(plant_config))
+        self.plant = LockstepPlant(plant_config, ToyPlant(plant_config))
         self._configs = {config.name: config for config in agent_configs}
         self._born = 0
         self.agents = [
@@ -69,7 +69,7 @@ class Links:
         """All events."""
         return [event for message in self.telemetry for event in message.events]
 
-    def agent(self, name: str) -> AgentSide:
+    def agent(self, name: str) -> LockstepAgent:
         """The first agent of a name."""
         return next(agent for agent in self.agents if self.plant.keys.parts(agent.token)[2] == name)
 
@@ -102,9 +102,9 @@ class Links:
                     self._to_all(token, lambda to, a=action, b=token: partial(self._subscribed.add, (to, b, a.key)))
         return True
 
-    def _bear(self, config: AgentConfig) -> AgentSide:
+    def _bear(self, config: AgentConfig) -> LockstepAgent:
         self._born += 1
-        return AgentSide(config, f"p{self._born}")
+        return LockstepAgent(config, f"p{self._born}")
 
     def _start(self, name: str) -> None:
         """Start an agent, perhaps once more: all others hear of it, and it of them, each at another time."""
@@ -122,7 +122,7 @@ class Links:
                     self._send(a, b, partial(self._subscribed.add, (b, a, key)))
                 self._send(a, b, partial(self._living[b].appeared, a, 0.0))
 
-    def _leave(self, agent: AgentSide) -> None:
+    def _leave(self, agent: LockstepAgent) -> None:
         del self._living[agent.token]
         self.agents.remove(agent)
         self._to_all(agent.token, lambda to: partial(self._living[to].vanished, agent.token, 0.0))
@@ -137,7 +137,7 @@ class Links:
 
     def _answer(self, token: str, asker: str, key: str) -> None:
         side = self._living[token]
-        if isinstance(side, AgentSide) and side.nameplate[0] == key and asker in self._living:
+        if isinstance(side, LockstepAgent) and side.nameplate[0] == key and asker in self._living:
             self._send(token, asker, partial(self._living[asker].received, *side.nameplate, 0.0))
 
     def _publish(self, sender: str, key: str, payload: bytes) -> None:

@@ -14,7 +14,7 @@ from wire.driver.session import Session
 
 
 class Core(Protocol):
-    """What the cores have in common: `agents.lockstep`, `plant.lockstep`, `agents.freerun`, `plant.freerun`."""
+    """What the driver needs of a node (`wire.node`)."""
 
     rejects: Rejects
 

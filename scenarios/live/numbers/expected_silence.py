@@ -28,7 +28,7 @@ _AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
 
 
 class ExpectedSilence:
-    """Whether a scenario lets happen what the plant told of silence (`plant.freerun.silence`).
+    """Whether a scenario lets happen what the plant told of silence (`plant.realtime.silence_detector`).
 
     Parameters
     ----------

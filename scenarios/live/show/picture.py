@@ -27,7 +27,7 @@ _KEPT = 100
 
 
 class Standing(msgspec.Struct, frozen=True, kw_only=True):
-    """What the plant answers to "status", as far as it is shown; see `plant.freerun.service`."""
+    """What the plant answers to "status", as far as it is shown; see `plant.realtime.run_commands`."""
 
     phase: str
     """gathering, running or closing."""

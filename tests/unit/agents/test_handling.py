@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.config import Control, Gains, Handling
-from agents.freerun import FreeAgent
 from agents.handling import Follows, Worth, gains_in_force
+from agents.realtime.realtime_agent import RealtimeAgent
 from agents.slip import Slips
 from scenarios.spec import load_scenario
 from scenarios.sweep.one import run_one
@@ -212,7 +212,7 @@ def test_the_default_is_the_papers() -> None:
 def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
     """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
     control = Control(secondary="all", graph="full", handling=Handling(max_age=max_age))
-    side = FreeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
+    side = RealtimeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
     keys = side.keys
     side.start(0.0)
     side.appeared(keys.alive_plant(1), 0.0)

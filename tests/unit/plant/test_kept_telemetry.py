@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from plant.freerun.kept import KeptTelemetry
+from plant.realtime.kept_telemetry import KeptTelemetry
 from scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
-from tests.unit.plant.test_freerun_plant import KEYS, Lab, running
+from tests.unit.plant.test_realtime_plant import KEYS, Lab, running
 from wire.messages import Answer, Command, LinkReport, Message, Telemetry
 
 

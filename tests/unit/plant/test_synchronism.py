@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from plant.config import PlantSettings, SwitchEvent, SyncCheck
 from plant.feeder import Plant
-from plant.freerun import FreePlant
 from plant.network import Network
+from plant.realtime.realtime_plant import RealtimePlant
 from tests.toy.toy_configs import toy_configs
 from wire.actions import Publish
 from wire.codec import decode, encode
@@ -156,7 +156,7 @@ def test_the_command_to_close_in_step_is_answered_with_the_differences(network: 
     p = plant(network)
     run(p, 2.5)
     config = replace(toy_configs(9, end=60.0)[0], clock="wall")
-    side = FreePlant(config, p)
+    side = RealtimePlant(config, p)
     side.start(0.0)
     command = Command(
         sender="visitor", incarnation=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v"

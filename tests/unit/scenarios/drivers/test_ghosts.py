@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from plant.freerun import FreePlant
+from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.links import links_of
 from scenarios.emulation.setup import Setup
@@ -57,7 +57,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
     config, _ = toy_configs(3, end=9.0)
     config = replace(config, clock="wall", links=LATE)
     toy, now = Holding(config), 50.0
-    plant = FreePlant(config, toy, links_of("plant", LATE))
+    plant = RealtimePlant(config, toy, links_of("plant", LATE))
     plant.start(now)
 
     def join(name: str, instance: str, epoch: int) -> None:

@@ -13,18 +13,18 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.freerun import FreeAgent
-from agents.lockstep import AgentSide
-from plant.freerun import FreePlant
-from plant.lockstep import PlantSide
+from agents.lockstep_agent import LockstepAgent
+from agents.realtime.realtime_agent import RealtimeAgent
+from plant.lockstep_plant import LockstepPlant
+from plant.realtime.realtime_plant import RealtimePlant
 from tests.hostile.cases import hostile
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Listen, Publish, Say
 from wire.codec import KINDS, decode, encode
-from wire.endpoint import Endpoint
 from wire.keys import Keys
 from wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
+from wire.node import Node
 
 KEYS = Keys("toy")
 T_C = 0.02
@@ -67,7 +67,7 @@ def measurement(k: int) -> Measurement:
 class _Played:
     """A core in the middle of a run: what it is told, and what it does."""
 
-    def __init__(self, side: FreeAgent | FreePlant | AgentSide | PlantSide) -> None:
+    def __init__(self, side: RealtimeAgent | RealtimePlant | LockstepAgent | LockstepPlant) -> None:
         self.side: Any = side
         self.now = 100.0
         self.done: list[object] = []
@@ -96,11 +96,11 @@ def _comparable(action: Publish | Fetch | Listen | Say) -> object:
     return action
 
 
-class FreeAgentScene(_Played):
+class RealtimeAgentScene(_Played):
     """inv1 in wall-clock time."""
 
     def __init__(self) -> None:
-        super().__init__(FreeAgent(replace(agent_config("inv1"), clock="wall", incarnation=EPOCH), "a"))
+        super().__init__(RealtimeAgent(replace(agent_config("inv1"), clock="wall", incarnation=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
@@ -120,7 +120,7 @@ class AgentScene(_Played):
     """inv1 in simulated time."""
 
     def __init__(self) -> None:
-        super().__init__(AgentSide(replace(agent_config("inv1"), incarnation=EPOCH), "a"))
+        super().__init__(LockstepAgent(replace(agent_config("inv1"), incarnation=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
@@ -137,13 +137,13 @@ class AgentScene(_Played):
         self.take()
 
 
-class FreePlantScene(_Played):
+class RealtimePlantScene(_Played):
     """The toy plant in wall-clock time."""
 
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]
         config = replace(config, clock="wall", incarnation=EPOCH)
-        super().__init__(FreePlant(config, ToyPlant(config)))
+        super().__init__(RealtimePlant(config, ToyPlant(config)))
         _join(self)
 
     def honest(self, k: int) -> None:
@@ -161,7 +161,7 @@ class PlantScene(_Played):
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=1e4)
         config = replace(config, incarnation=EPOCH)
-        super().__init__(PlantSide(config, ToyPlant(config)))
+        super().__init__(LockstepPlant(config, ToyPlant(config)))
         _join(self)
         for name in NAMES:
             self.hear(KEYS.ready(name), Ready(sender=name, incarnation=EPOCH, seq=0, t=0.0))
@@ -181,14 +181,14 @@ def _join(scene: _Played) -> None:
     scene.take()
 
 
-def flood(side: Endpoint, rng: random.Random) -> list[tuple[str, bytes]]:
+def flood(side: Node, rng: random.Random) -> list[tuple[str, bytes]]:
     """All that is hostile to a core, in some order."""
     truth = {key: (route.sender, route.types) for key, route in side._routes.items()}
     truth |= {KEYS.state("inv9"): ("inv9", ()), KEYS.telemetry: ("plant", ())}
     return list(hostile(truth, dict.fromkeys(("plant", *NAMES), EPOCH), rng))
 
 
-@pytest.mark.parametrize("make", [FreeAgentScene, AgentScene, FreePlantScene, PlantScene])
+@pytest.mark.parametrize("make", [RealtimeAgentScene, AgentScene, RealtimePlantScene, PlantScene])
 def test_nothing_raises_and_nothing_false_is_believed(make: Callable[[], _Played]) -> None:
     """Set-points, rosters, neighbours' values, sessions, what is published: all as if nobody had said anything."""
     rng = random.Random(1)
@@ -214,7 +214,7 @@ def test_nothing_raises_and_nothing_false_is_believed(make: Callable[[], _Played
     assert all(line.isprintable() and len(line) < 600 for line in lines)
 
 
-@pytest.mark.parametrize("make", [FreeAgentScene, AgentScene, FreePlantScene, PlantScene])
+@pytest.mark.parametrize("make", [RealtimeAgentScene, AgentScene, RealtimePlantScene, PlantScene])
 def test_tokens_of_anybody_change_nothing(make: Callable[[], _Played]) -> None:
     """Whoever can connect can hold tokens: garbled, of other plants, of a namesake; what is decided stays the same."""
     flooded, calm = make(), make()
@@ -232,7 +232,7 @@ def test_tokens_of_anybody_change_nothing(make: Callable[[], _Played]) -> None:
     assert all(text.isprintable() for text in said)
 
 
-@pytest.mark.parametrize("make", [FreeAgentScene, FreePlantScene])
+@pytest.mark.parametrize("make", [RealtimeAgentScene, RealtimePlantScene])
 def test_a_flood_of_tokens_does_not_flood_the_log(make: Callable[[], _Played]) -> None:
     """Ten thousand processes that claim a name, or names that nobody knows."""
     scene = make()

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.config import Control, GraphRule
-from plant.lockstep import PlantSide
+from plant.lockstep_plant import LockstepPlant
 from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -213,4 +213,4 @@ def test_the_plant_refuses_agents_without_inverters() -> None:
     config, _ = toy_configs(2)
 
     with pytest.raises(ValueError, match='agents: no inverter "inv3"; inverters are inv1, inv2'):
-        PlantSide(msgspec.structs.replace(config, agents=("inv1", "inv3")), ToyPlant(config))
+        LockstepPlant(msgspec.structs.replace(config, agents=("inv1", "inv3")), ToyPlant(config))

@@ -6,8 +6,8 @@ import random
 
 import msgspec
 
-from agents.lockstep import AgentSide
-from plant.lockstep import PlantSide
+from agents.lockstep_agent import LockstepAgent
+from plant.lockstep_plant import LockstepPlant
 from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -15,7 +15,7 @@ from wire.codec import encode
 from wire.messages import State
 
 
-def started(n: int = 2) -> PlantSide:
+def started(n: int = 2) -> LockstepPlant:
     """A plant that has sent Measurement(0), and heard nothing since."""
     run = Links(*toy_configs(n), random.Random(0))
     while run.plant.phase != "ticking":
@@ -40,7 +40,7 @@ def test_the_plants_deadline_names_who_is_missing() -> None:
 def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
     """Agents that never came, and recorders, are named."""
     config, _ = toy_configs(2)
-    plant = PlantSide(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
+    plant = LockstepPlant(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
     plant.start(100.0)
     plant.appeared(plant.keys.alive_agent("inv2", "a"), 101.0)
 
@@ -55,7 +55,7 @@ def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
 
 def test_an_agent_without_a_plant_says_so() -> None:
     """It waits twice the deadline, so that a plant would complain first."""
-    agent = AgentSide(agent_config("inv1"), "a")
+    agent = LockstepAgent(agent_config("inv1"), "a")
     agent.start(0.0)
     agent.expire(19.9)
     assert not agent.over
@@ -66,7 +66,7 @@ def test_an_agent_without_a_plant_says_so() -> None:
 
 def test_a_plant_that_is_built_slowly_is_waited_for() -> None:
     """On a slow computer the first compilation takes longer than any message may: only the first wait is longer."""
-    agent = AgentSide(msgspec.structs.replace(agent_config("inv1"), plant_wait=600.0), "a")
+    agent = LockstepAgent(msgspec.structs.replace(agent_config("inv1"), plant_wait=600.0), "a")
     agent.start(0.0)
     agent.expire(599.9)
 
@@ -77,7 +77,7 @@ def test_a_plant_that_is_built_slowly_is_waited_for() -> None:
 
 def test_a_plant_that_still_compiles_is_waited_for() -> None:
     """Once its token is seen there is no deadline until it calls; its death ends the wait."""
-    agent = AgentSide(agent_config("inv1"), "a")
+    agent = LockstepAgent(agent_config("inv1"), "a")
     agent.start(0.0)
     agent.appeared(agent.keys.alive_plant(1), 1.0)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from agents.config import AgentConfig, Control, GraphRule
 from plant.config import PlantConfig
-from plant.lockstep import PlantSide
+from plant.lockstep_plant import LockstepPlant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from tests.toy.links import Links
@@ -168,13 +168,13 @@ def test_a_move_that_cannot_be_is_refused_at_the_start(
     plant, _ = configured((move,), n=2)
 
     with pytest.raises(ValueError, match=said):
-        PlantSide(plant, ToyPlant(plant))
+        LockstepPlant(plant, ToyPlant(plant))
 
 
 def test_who_comes_before_its_time_is_refused() -> None:
     """An agent of a spare that is to join later is told so when it comes at the start."""
     plant, agents = configured(((0.2, "inv4", "join"),), spares=("inv4",))
-    side = PlantSide(plant, ToyPlant(plant))
+    side = LockstepPlant(plant, ToyPlant(plant))
     side.start(0.0)
     side.appeared(side.keys.alive_agent("inv4", "early"), 0.0)
     (stop,) = [decode(action.payload) for action in side.take_actions() if isinstance(action, Publish)]

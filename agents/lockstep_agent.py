@@ -1,0 +1,321 @@
+"""An agent under simulated time: it ticks when all that a tick needs is here. Pure; `now` serves deadlines only.
+
+**Getting ready.** Nothing tells an agent who exists: for every token of another agent it asks for the nameplate. Whom
+the graph makes its in-neighbour it subscribes to, and then asks for the nameplate once more: subscription and query
+take the same way in the same order, so the answer proves that the neighbour's publications will come. For graphs that
+look at pairs this happens at once; for a ring, when `Prepare` has named the roster. `Ready` goes to the plant when all
+of the roster are met and all in-neighbours proven.
+
+**Ticks.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
+computes and sends State(k). A State(k) that overtakes the own Measurement(k) is kept until tick k is done, so what is
+used never depends on who was faster. Whoever is not on roster k is left out at once, so that it does not matter whether
+its last state or its end is heard first. At its first tick an agent has no roster k-1 and waits for nobody.
+
+**No deadlock.** State(k) waits for Measurement(k) and States(k-1) only, Measurement(k) for States(k-1) only: every wait
+is for something earlier, so the earliest thing not yet sent always can be, if its sender lives. The token of a dead
+process vanishes, which ends the wait for it: its last value counts once more, and the next roster leaves it out. A
+process that neither sends nor dies meets the deadline. The agent's is twice the plant's, so that the plant, who sees
+all, names the culprit. Receivers only enqueue, without bound, so nobody blocks a sender.
+"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.agent_node import REPORT_TICKS, AgentNode
+from agents.config import AgentConfig
+from agents.laws.law import Law
+from agents.topology import is_pairwise
+from wire.clock import time_of
+from wire.codec import RejectedError, encode
+from wire.links import Links
+from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
+from wire.node import Route
+from wire.tick_barrier import Awaited, TickBarrier
+
+CLOSING = 2.0
+"""Longest wait (s) for the neighbours' last states, and for word that the report on emulated links has come."""
+
+DEADLINES = 2.0
+"""An agent waits this many deadlines, so that the plant complains first."""
+
+
+class LockstepAgent(AgentNode):
+    """One agent under simulated time.
+
+    Parameters
+    ----------
+    config : AgentConfig
+        Who it is and the run's rule.
+    instance : str
+        Which process this is, unique in the run; part of the agent's token.
+    links : Links, optional
+        What the links to it do to its messages.
+    law : Law, optional
+        What decides its set-points; the paper's if left out.
+    """
+
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
+        super().__init__(config, instance, links, law)
+        if config.clock_rate != 1.0:  # its periods seem longer to it than they are
+            self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
+        self._routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
+        self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
+        self._pairwise = is_pairwise(config.control)
+        self._roster: Prepare | None = None
+        """The last roster that this process is on."""
+        self._ready = False
+        """Whether all is known that this roster needs. It stays so if somebody dies: the next roster tells."""
+        self._proofs: dict[tuple[str, str], bool] = {}
+        """Processes that were asked for proof that they hear the subscription to them; True once they have answered."""
+        self._tick: int | None = None
+        """Number of the next tick; None until the first measurement has come."""
+        self._grant: Measurement | None = None
+        """The measurement that grants it."""
+        self._early: dict[str, tuple[State, bytes]] = {}
+        """States of this tick that came before it was done, and their bytes."""
+        self._neighbours: tuple[str, ...] = ()
+        """In-neighbours on the roster of the last tick."""
+        self._neighbours_of: tuple[str, ...] = ()
+        """That roster."""
+        self._ending = ""
+        """Why it is about to close."""
+        self._reported = False
+        """Whether the last report on emulated links is out."""
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return self.keys.ready(self._name), self.keys.state(self._name), self.keys.report(self._name)
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages without which the next tick cannot be computed."""
+        return self._barrier.messages_needed
+
+    @property
+    def until(self) -> float | None:
+        """When the deadline of the present wait passes (s on the driver's clock); None if it has none."""
+        return self._barrier.until
+
+    def start(self, now: float) -> None:
+        """Begin to wait for the plant, which is built first."""
+        self._barrier.renew(now)
+        self._barrier.until = max(self._barrier.until or 0.0, now + self._config.plant_wait)
+
+    def missing(self) -> tuple[Awaited, ...]:
+        """Who is awaited, and for what."""
+        if not self.plant_seen:
+            return (Awaited("sign of life", PLANT),)
+        if self._roster is None:
+            return (Awaited("Prepare", PLANT),)
+        if not self._ready:
+            return tuple(Awaited("nameplate", name) for name in self._unmet() or self._unproven())
+        missing = self._barrier.missing()  # without a measurement, the states do not matter yet
+        return missing[:1] if self._barrier.awaits(PLANT) else missing
+
+    def expire(self, now: float) -> None:
+        """Give up if the deadline has passed."""
+        if self.over or self.until is None or now < self.until:
+            return
+        if self._ending:
+            self._report_the_last()
+            self.stopped = self._ending
+        else:
+            self.failed = self._barrier.complaint(self.missing(), now)
+
+    # ---------------------------------------------------------------- liveliness
+
+    def _plant_came(self, now: float) -> None:
+        # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
+        self._barrier.rest()
+
+    def _plant_gone(self, now: float) -> None:
+        if self._ending:
+            self.stopped = self._ending
+        elif not self.over:
+            tick = "" if self._tick is None else f" at tick {self._tick}"
+            self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
+
+    def _agent_gone(self, name: str, instance: str, now: float) -> None:
+        self._proofs.pop((name, instance), None)
+        if self._barrier.awaits(name):
+            self._barrier.came(name)
+            self._compute(now)
+
+    # ---------------------------------------------------------------- the plant's word
+
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self._barrier.heard(message.sender, message.seq, now)
+
+    def _on_control(self, message: Prepare | Stop, payload: bytes, now: float) -> None:
+        if isinstance(message, Stop):
+            self._end(message.reason, now)
+        else:
+            self._prepare(message)
+            self._barrier.renew(now)
+            self._get_ready(now)
+
+    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
+        if message.refused:
+            self.failed = message.reason
+        else:
+            self._end(message.reason, now)
+
+    def _end(self, reason: str, now: float) -> None:
+        """Close; with emulated links only once the neighbours' last states are booked and the plant has the book."""
+        if self._links is None or self._ending:
+            self.stopped = self._ending or reason
+            return
+        self._ending = reason
+        self._barrier.until = now + CLOSING
+        self._compute(now)
+
+    def _report_the_last(self) -> None:
+        if not self._reported:
+            self._reported = True
+            self._report_links(final=True)
+
+    # ---------------------------------------------------------------- getting ready
+
+    def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
+        super()._on_nameplate(instance, nameplate, payload, now)
+        process = nameplate.sender, instance
+        if process in self._proofs:
+            self._proofs[process] = True
+        elif self._pairwise and self.members.instance(nameplate.sender) == instance:
+            for name in self._agent.in_neighbours((self._name, nameplate.sender)):
+                self._ask_for_proof(name)
+        self._get_ready(now)
+
+    def _prepare(self, message: Prepare) -> None:
+        if self._roster is not None and message.seq <= self._roster.seq:
+            raise RejectedError("stale", f"roster {message.seq}, {self._roster.seq} is known")
+        instances = dict(zip(message.roster, message.instances, strict=True))
+        if instances.get(self._name) != self._instance:
+            raise RejectedError("unexpected", f"roster {message.seq} is without this process")
+        self._roster, self._ready = message, False
+        for name, instance in instances.items():
+            self.members.prefer(name, instance)
+            if name in self.members.nameplates:
+                self._agent.meet(self.members.nameplates[name])
+
+    def _ask_for_proof(self, name: str) -> None:
+        """Listen to an agent, and have it prove that it hears the subscription."""
+        instance = self.members.instance(name)
+        self._proofs[name, instance] = False
+        self._listen_to(name)
+        self._ask(name, instance)
+
+    def _members_of_roster(self) -> dict[str, str]:
+        """Names on the roster, and their processes."""
+        return {} if self._roster is None else dict(zip(self._roster.roster, self._roster.instances, strict=True))
+
+    def _unmet(self) -> list[str]:
+        """Members of the roster whose nameplate is missing."""
+        met = self.members.nameplates
+        return [
+            name
+            for name, instance in self._members_of_roster().items()
+            if name != self._name and (name not in met or self.members.instance(name) != instance)
+        ]
+
+    def _unproven(self) -> list[str]:
+        """In-neighbours on the roster that have not proven that they hear the subscription to them."""
+        instances = self._members_of_roster()
+        return [name for name in self._agent.in_neighbours(instances) if not self._proofs.get((name, instances[name]))]
+
+    def _get_ready(self, now: float) -> None:
+        """Ask for proof of whom this roster makes in-neighbours; say so once nothing is missing any more."""
+        if self._roster is None or self._ready or self._unmet():
+            return
+        unproven = self._unproven()
+        for name in unproven:
+            if (name, self.members.instance(name)) not in self._proofs:
+                self._ask_for_proof(name)
+        if unproven:
+            return
+        self._ready = True
+        if self._tick is None:
+            self._barrier.wait_for({PLANT: "Measurement(0)"}, now)
+        else:
+            self._barrier.renew(now)
+        t = time_of(self._tick or 0, self._config.T_c)
+        ready = Ready(sender=self._name, incarnation=self._config.incarnation, seq=self._roster.seq, t=t)
+        self._publish(self.keys.ready(self._name), encode(ready))
+
+    # ---------------------------------------------------------------- ticks
+
+    def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
+        if not self._ready:
+            raise RejectedError("unexpected", "no roster has this process on it")
+        if self._tick is None:
+            self._tick = message.seq
+            self._early = {name: early for name, early in self._early.items() if early[0].seq == message.seq}
+        if message.seq != self._tick or self._grant is not None:
+            kind = "unexpected" if message.seq > self._tick else "stale"
+            raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
+        self._grant = message
+        self._barrier.came(PLANT)
+        for name in set(self._neighbours).difference(message.roster):
+            self._barrier.came(name)
+        self._hear(message, payload, message.t)
+        self._barrier.renew(now)
+        self._compute(now)
+
+    def _on_state(self, message: State, payload: bytes, now: float) -> None:
+        name, seq = message.sender, message.seq
+        if self._tick is None or seq == self._tick:
+            self._early[name] = message, payload
+            return
+        if seq != self._tick - 1:
+            kind = "stale" if seq < self._tick else "unexpected"
+            raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
+        self._barrier.came(name)
+        self._use(message, payload)
+        self._compute(now)
+
+    def _use(self, state: State, payload: bytes) -> None:
+        if not state.quiet:  # no link carries what its law did not send
+            self._hear(state, payload, state.t)
+
+    def _compute(self, now: float) -> None:
+        """Compute and send the next tick, if all that it needs is here."""
+        if self._ending:
+            if not any(self._barrier.awaits(name) for name in self._neighbours):
+                self._report_the_last()
+            return
+        grant = self._grant
+        if grant is None or not self._barrier.is_open:
+            return
+        self._hear_late(grant.t)
+        measured = self.states.measured(grant.t, self._config.max_age)
+        if measured is None or (self._links is not None and self._links.stalled(grant.t)):
+            state = self._agent.stand_still(grant)
+        else:
+            neighbours = tuple(name for name in self._neighbours if name in grant.roster)
+            state = self._agent.tick(replace(measured, seq=grant.seq, t=grant.t), neighbours)
+        self._publish(self.keys.state(self._name), encode(state))
+        if (grant.seq + 1) % REPORT_TICKS == 0:
+            self._report_links()
+        self._await_next(grant, now)
+
+    def _await_next(self, grant: Measurement, now: float) -> None:
+        """Go on to the tick after this one: it needs the states of this one, some of which may be here already."""
+        if grant.roster != self._neighbours_of:
+            self._neighbours_of = grant.roster
+            self._neighbours = self._agent.in_neighbours(grant.roster)
+        early, self._early = self._early, {}
+        self._grant, self._tick = None, grant.seq + 1
+        instances = self._members_of_roster()
+        awaited = {
+            name: f"State({grant.seq})"
+            for name in self._neighbours
+            if name not in early and self.members.instance(name) == instances.get(name)
+        }
+        self._barrier.wait_for({PLANT: f"Measurement({self._tick})", **awaited}, now)
+        for state, payload in early.values():
+            self._use(state, payload)

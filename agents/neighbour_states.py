@@ -1,0 +1,71 @@
+"""What an agent heard last: its own measurement and its neighbours' states, and how old they are. Pure.
+
+Times are run time (s). Under simulated time they are those of the ticks; under real time the agent counts them on its
+own clock, from an origin of its own.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from wire.messages import Measurement, State
+
+
+class NeighbourStates:
+    """The last measurement and the last state of each neighbour that the links let through.
+
+    Examples
+    --------
+    The age of a state counts from its arrival; but one that was long on its way is as old as its time says:
+
+    >>> states = NeighbourStates()
+    >>> states.keep(State(sender="inv2", incarnation=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0), at=10.0)
+    >>> states.age("inv2", at=10.25), states.age("inv3", at=10.25)
+    (0.25, inf)
+    >>> states.keep(Measurement(sender="plant", incarnation=1, seq=100, t=2.0, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0,
+    ...     P_set=0.0, V_set=277.0, grid_connected=False, island="inv1", roster=()), at=10.25)
+    >>> states.t, states.age("inv2", at=10.25)
+    (2.0, 1.5)
+    """
+
+    def __init__(self) -> None:
+        self._states: dict[str, tuple[State, float]] = {}
+        """Last state of each agent, and when it came."""
+        self.measurement: Measurement | None = None
+        """The own measurement that counts."""
+        self._measured_at = 0.0
+
+    def keep(self, message: State | Measurement, at: float) -> None:
+        """Note a state or the own measurement, which came at this time."""
+        if isinstance(message, State):
+            self._states[message.sender] = message, at
+        else:
+            self.measurement, self._measured_at = message, at
+
+    @property
+    def t(self) -> float:
+        """Time written in the own measurement (s of run time); 0 if there is none."""
+        return 0.0 if self.measurement is None else self.measurement.t
+
+    def measured(self, at: float, max_age: float) -> Measurement | None:
+        """Return the own measurement, if it came not longer ago than `max_age` (s)."""
+        return None if round(at - self._measured_at, 9) > max_age else self.measurement
+
+    def age(self, name: str, at: float) -> float:
+        """Age of somebody's last state (s); infinite if there is none.
+
+        That since it came, or that by its own time beside the own measurement's, if that is more.
+        """
+        if name not in self._states:
+            return inf
+        state, came = self._states[name]
+        return max(at - came, self.t - state.t)
+
+    def forget(self, name: str) -> None:
+        """Forget somebody, as its process is gone."""
+        self._states.pop(name, None)
+
+    def clear(self) -> None:
+        """Use nothing that has come so far."""
+        self._states.clear()
+        self.measurement = None

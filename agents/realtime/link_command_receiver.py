@@ -1,0 +1,63 @@
+"""Commands to the emulated links into an agent: taken in their sequence, each once, and acknowledged. Pure."""
+
+from __future__ import annotations
+
+from wire.links import Links
+from wire.messages import LinkAnswer, LinkOrder
+from wire.printable import printable
+
+
+class LinkCommandReceiver:
+    """Takes the plant's commands to the links into one agent.
+
+    The plant sends again what is not acknowledged, so a command may come twice, and one behind a lost one waits for it:
+    which of two commands came later decides which of them holds.
+
+    Parameters
+    ----------
+    name : str
+        The agent.
+    incarnation : int
+        Its epoch.
+    links : Links or None
+        Its links; without any, commands are rejected.
+    """
+
+    def __init__(self, name: str, incarnation: int, links: Links | None) -> None:
+        self._name, self._incarnation, self._links = name, incarnation, links
+        self._last = 0
+        """Number of the last command that was taken."""
+
+    def restart(self) -> None:
+        """Forget all commands: another plant has begun, whose run starts at 0."""
+        self._last = 0
+        if self._links is not None:
+            self._links.restart()
+
+    def take(self, order: LinkOrder, t: float) -> LinkAnswer | None:
+        """Carry a command out, or tell the links' status at t (s of run time); None if an earlier one is missing."""
+        if self._links is None:
+            return self._answer(order, ok=False, text="there are no emulated links to this agent")
+        if order.seq == 0:
+            return self._answer(order, ok=True, text="", data=self._links.standing(t))
+        if order.seq > self._last + 1:
+            return None
+        if order.seq <= self._last:
+            return self._answer(order, ok=True, text="done before")
+        self._last = order.seq
+        try:
+            return self._answer(order, ok=True, text=self._links.order(order.text, order.t))
+        except ValueError as error:
+            return self._answer(order, ok=False, text=str(error))
+
+    def _answer(self, order: LinkOrder, *, ok: bool, text: str, data: bytes = b"") -> LinkAnswer:
+        return LinkAnswer(
+            sender=self._name,
+            incarnation=self._incarnation,
+            seq=order.seq,
+            t=order.t,
+            ok=ok,
+            text=printable(text),
+            reply_to=order.reply_to,
+            data=data,
+        )

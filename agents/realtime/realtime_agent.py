@@ -1,0 +1,353 @@
+"""An agent under real time: it ticks on its own timer, with what it heard last. Pure.
+
+Nobody grants a tick. At each one the agent uses
+
+- its *measurement*, if it is not older than `max_age`; else it is on hold, and sends nothing to its neighbours;
+- the last state of each *neighbour* whose token is there, whose value is not older than `max_age`, and who is in the
+  same island. The age is that on the own clock; but a state that was long on its way is as old as its run time says,
+  beside that of the own measurement.
+
+Ages are s of run time. Tokens say who exists, never who works: a frozen process keeps its token for seconds.
+
+**Phases.** *seeking*: there is no plant. *waiting*: the plant is there, but has sent no measurement recently.
+*running*: the agent ticks. Whoever comes back to *running* starts from the set-points that its measurement shows: those
+the plant holds for it. An agent that finds itself woken late (frozen, or starved) drops what it knew and waits for
+news.
+"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from agents.agent_node import REPORT_TICKS, AgentNode
+from agents.config import AgentConfig
+from agents.laws.law import Law
+from agents.realtime.agent_statistics import AgentStatistics, Phase
+from agents.realtime.link_command_receiver import LinkCommandReceiver
+from agents.realtime.session_health import SessionHealth
+from agents.realtime.tick_timer import TickTimer
+from wire.admission import FASTER
+from wire.codec import encode
+from wire.links import Links
+from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
+from wire.node import Route
+from wire.timer import Timer
+
+STATUS_PERIOD = 0.5
+"""Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
+
+LEAVING = 1.0
+"""Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
+take what was sent last with it."""
+
+WANTED = 1 << 30
+"""Messages wait for the next tick; only tokens and words wake the agent before."""
+
+
+class RealtimeAgent(AgentNode):
+    """One agent under real time, on one session after the other if need be.
+
+    Parameters
+    ----------
+    config : AgentConfig
+        Who it is and the run's rule.
+    instance : str
+        Which process this is, unique in the run; part of the agent's token.
+    links : Links, optional
+        What the links to it do to its messages.
+    law : Law, optional
+        What decides its set-points; the paper's if left out.
+    """
+
+    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
+        if config.speed <= 0.0:
+            raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
+        super().__init__(config, instance, links, law, rate=FASTER / config.T_c)
+        self._routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
+        self._routes[self.keys.order(config.name)] = Route(PLANT, (LinkOrder,), self._on_link_command)
+        self._first_routes = dict(self._routes)
+        self.phase: Phase = "seeking"
+        self.session_broken = False
+        """Whether it closes only to begin again with a new session."""
+        self.statistics = AgentStatistics()
+        """What it has done."""
+        self._plant_epoch = 0
+        """Epoch of the plant that was followed last; 0 before the first."""
+        self._link_commands = LinkCommandReceiver(config.name, config.incarnation, links)
+        # a clock that is to drift must drift
+        self._timer = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
+        self._status = Timer(STATUS_PERIOD, 0.0)
+        self._give_up: float | None = None
+        self._health = SessionHealth(config.name)
+        self._leaving = ""
+        """Why it leaves, once the plant has been told."""
+        self._ran = False
+        """Whether it has ticked in the present epoch of the plant."""
+        self._left = 0
+        """Periods since then."""
+        self._skipped = 0
+        """States since the last that neighbours were sent."""
+        self._forget_everybody()
+
+    def _forget_everybody(self) -> None:
+        """Know nothing of the others, as before the first session."""
+        self.phase = "seeking"
+        self._routes = dict(self._first_routes)
+        self._plants.clear()
+        self.admission.release(PLANT)
+        for name in self.members.names():
+            self._agent.forget(name)
+        self.members.clear()
+        self.states.clear()
+        self._missing_agents: tuple[str, ...] = ()
+        """For whom the plant said last that it waits."""
+        self._run_time = 0.0
+        """That of the last measurement that came off the wire (s)."""
+        self._neighbours: tuple[str, ...] = ()
+        """In-neighbours among the agents that have been met."""
+        self._used_neighbours: tuple[str, ...] = ()
+        """Neighbours in the sums of the last tick."""
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        keys, name = self.keys, self._name
+        own = (keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.obeyed)
+        return tuple(key(name) for key in own)
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return super().over or self.session_broken
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages to be woken for: messages wait for the tick."""
+        return WANTED
+
+    @property
+    def until(self) -> float:
+        """When the next tick is due (s on the driver's clock)."""
+        return self._timer.due
+
+    def start(self, now: float) -> None:
+        """Begin to tick, or begin again after a broken session; there is nothing to do yet."""
+        self._timer.start(now)
+        self._status = Timer(STATUS_PERIOD, now)
+        if self._config.deadline > 0.0:
+            self._give_up = now + self._config.deadline
+        if self.session_broken:
+            self.session_broken = False
+            self._health.next_session()
+            self._agent.let_go()
+            self._forget_everybody()
+
+    def expire(self, now: float) -> None:
+        """Tick, if it is time."""
+        late = now - self._timer.due
+        if late < 0.0 or self.over:
+            return
+        skipped = self._timer.take(now)
+        if self._leaving:
+            self._left += 1
+            if self._left * self._timer.period >= LEAVING or not self._plants:
+                self.stopped = self._leaving
+            return
+        if self._give_up is not None and not self.plant_seen and now >= self._give_up:
+            self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
+            return
+        if self.phase == "running":
+            self.statistics.woken(late, skipped)
+            if late * self._config.speed > self._config.max_age:
+                self._hold(f"woken {late:.2f} s late; waits for news")
+        at = now * self._config.speed
+        self._hear_late(at)
+        before = self.phase, self._used_neighbours
+        self._tick(at)
+        self._check_session(now)
+        due = now >= self._status.due
+        if due:
+            self._status.take(now)
+            self._ask_again()
+        if due or (self.phase, self._used_neighbours) != before:
+            self._publish_status(at)
+
+    def _check_session(self, now: float) -> None:
+        """Ask for a new session if this one has not brought what it should, or not taken it, for too long."""
+        measured = self.states.measurement if self.phase == "running" else None
+        roster = None if measured is None else measured.roster
+        if roster is not None and self._agent.fault:
+            roster = (*roster, self._name)  # who says nothing is not heard, and no session changes that
+        problem = self._health.problem(
+            roster,
+            met=self.members.nameplates,
+            neighbours=self._neighbours,
+            now=now,
+        )
+        if problem:
+            self.session_broken = True
+            self._say(f"{problem}; opens a new session")
+
+    def leave(self, reason: str) -> None:
+        """Leave properly: have the own inverter taken off the network, and close once the plant says that it is."""
+        if self.over or self._leaving:
+            return
+        self._report_links(final=True)
+        name, epoch = self._name, self._config.incarnation
+        message = Leave(sender=name, incarnation=epoch, seq=self.statistics.sent, t=self.states.t)
+        self._publish(self.keys.leave(name), encode(message))
+        if self._plants:
+            self._leaving = reason
+        else:
+            self.stopped = reason
+
+    # ---------------------------------------------------------------- liveliness
+
+    def _plant_came(self, now: float) -> None:
+        self._health.plant_seen(now)
+        if self.phase == "seeking":
+            self.phase = "waiting"
+            self._say("the plant is there; waits for its measurement")
+
+    def _plant_gone(self, now: float) -> None:
+        self._hold("the plant is gone; holds, and seeks it again")
+        self.phase = "waiting" if self._plants else "seeking"
+
+    def _agent_gone(self, name: str, instance: str, now: float) -> None:
+        self._agent.forget(name)
+        self.states.forget(name)
+        self._health.forget(name)
+        if name in self.members.nameplates:  # another process counts from now on, and has answered
+            self._agent.meet(self.members.nameplates[name])
+        self._listen()
+
+    def _met(self, nameplate: Nameplate, now: float) -> None:
+        super()._met(nameplate, now)
+        self._listen()
+
+    def _ask_again(self) -> None:
+        """Ask for the nameplates that have not come: a question dies with its link."""
+        for name, instance in self.members.unmet:
+            self._ask(name, instance)
+
+    def _listen(self) -> None:
+        """Listen to the in-neighbours among all who have been met."""
+        self._neighbours = self._agent.in_neighbours((self._name, *sorted(self.members.nameplates)))
+        for name in self._neighbours:
+            self._listen_to(name)
+
+    def _follow(self, epoch: int) -> None:
+        """Begin anew with another plant; one whose token was gone for a while goes on where it was."""
+        if self._plant_epoch not in (0, epoch):
+            self._hold("the plant has a new life; starts from what it measures")
+            self._ran = False
+            self._link_commands.restart()
+            self._health.forget(PLANT)
+        self._plant_epoch = epoch
+
+    # ---------------------------------------------------------------- messages
+
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self.statistics.used += 1
+
+    def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
+        if self.admission.lives(message):
+            self._health.crossed(message.sender, expected, now)
+
+    def _on_control(self, message: Waiting | Stop, payload: bytes, now: float) -> None:
+        if isinstance(message, Waiting):
+            self._health.plant_seen(now)
+            self._missing_agents = message.waits_for
+        else:
+            self._on_dismissal(message, payload, now)
+
+    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
+        if message.refused:
+            self.failed = message.reason
+        elif self._leaving:
+            self.stopped = self._leaving
+        else:
+            self.leave(message.reason)
+
+    def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
+        self.statistics.lost += self.admission.take(message)
+        self._health.came(PLANT, now)
+        self._timer.measured(now)
+        self._run_time, self._missing_agents = message.t, ()
+        self._hear(message, payload, now * self._config.speed)
+
+    def _on_state(self, message: State, payload: bytes, now: float) -> None:
+        self.statistics.lost += max(0, self.admission.take(message) - message.skipped)
+        self._health.came(message.sender, now)
+        if self._links is not None and not self._health.has_come(PLANT):
+            return  # the plant sends its commands to links before a measurement: till then no link is known
+        self._hear(message, payload, now * self._config.speed)
+
+    def _on_link_command(self, message: LinkOrder, payload: bytes, now: float) -> None:
+        answer = self._link_commands.take(message, self._run_time)
+        if answer is not None:
+            self._publish(self.keys.obeyed(self._name), encode(answer))
+
+    # ---------------------------------------------------------------- ticks
+
+    def _hold(self, why: str) -> None:
+        """Stop ticking; what was heard is of no use any more."""
+        if self.phase == "running":
+            self.phase = "waiting"
+            self._say(why)
+        self._used_neighbours = ()
+        self.states.clear()
+        self._agent.let_go()
+
+    def _tick(self, at: float) -> None:
+        """Tick at this time (s of run time on the own clock), if there is a measurement to tick with."""
+        if self.admission.epoch(PLANT) is None:
+            return  # what the dead plant said last would still look fresh
+        measurement = self.states.measured(at, self._config.max_age)
+        if measurement is None:
+            self._hold("no measurement of late; holds")
+            return
+        if self.phase != "running":
+            self.phase = "running"
+            m, joins = measurement, "goes on" if self._ran else "joins"
+            self._say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
+            self._ran = True
+        if self._agent.fault:
+            return
+        limit = self._config.control.handling.max_age or self._config.max_age
+        ages = {name: age for name in self._neighbours if (age := self.states.age(name, at)) <= limit}
+        state = replace(self._agent.tick(measurement, tuple(ages), ages), seq=self.statistics.sent)
+        self._used_neighbours = tuple(name for name in ages if self._agent.shares_island(name))
+        self.statistics.ticks += 1
+        self.statistics.sent += 1
+        if self.statistics.ticks % REPORT_TICKS == 0:
+            self._report_links()
+        self._send(state)
+
+    def _send(self, state: State) -> None:
+        """Send a state to everybody, or to the plant alone if the law does not tell the neighbours."""
+        if state.fault:
+            self._say(f"{state.fault}; stands still, its inverter stays on primary droop")
+        if state.quiet:
+            self._skipped += 1
+            self._publish(self.keys.set_points(self._name), encode(state))
+        else:
+            state, self._skipped = replace(state, skipped=self._skipped) if self._skipped else state, 0
+            self._publish(self.keys.state(self._name), encode(state))
+
+    def _publish_status(self, at: float) -> None:
+        status = self.statistics.take_status(
+            self._config,
+            self.phase,
+            self.states,
+            at,
+            missing_agents=self._missing_agents,
+            neighbours=self._neighbours,
+            used=self._used_neighbours,
+            rejected=sum(self.rejects.counts.values()),
+            dropped=0 if self._links is None else self._links.dropped,
+            impaired=() if self._links is None else self._links.impaired(self._run_time),
+        )
+        self._publish(self.keys.status(self._name), encode(status))

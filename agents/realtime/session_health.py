@@ -1,0 +1,129 @@
+"""Detect a broken Zenoh session: agents that should be heard but are not, or an agent that nobody hears. Pure.
+
+The plant tells whom it hears: a neighbour that the agent does not hear, or not the agent itself, shows that the session
+fails (`wire.session_patience`).
+
+Times are s of wall time on the agent's clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from math import inf
+
+from wire.messages import PLANT
+from wire.session_patience import SessionPatience
+
+SILENT = 1.0
+"""Time (s) without a message of the plant, or of a neighbour whom it hears, after which that one is silent."""
+
+
+class SessionHealth:
+    """Whether the agent's session brings what it should, one session after the other.
+
+    Parameters
+    ----------
+    name : str
+        The agent.
+
+    Examples
+    --------
+    The plant hears inv3, nothing comes from it here, and so the session is given up after 3.5 s:
+
+    >>> health = SessionHealth("inv1")
+    >>> health.came("plant", now=9.0)
+    >>> [health.problem(("inv1", "inv3"), met=("inv3",), neighbours=("inv3",), now=now) for now in (9.0, 9.5)]
+    ['', '']
+    >>> health.came("plant", now=12.5); health.problem(("inv1", "inv3"), met=("inv3",), neighbours=("inv3",), now=12.5)
+    'the plant hears inv3, but nothing comes from it here'
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._ran = False
+        """Whether the agent has ever been in touch with a plant; before that, silence proves nothing."""
+        self._plant_seen = -inf
+        """When the plant was last known to be there, though it measures nothing yet."""
+        self._patience = SessionPatience()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with a session of which nothing is known."""
+        self._came: dict[str, float] = {}
+        """When the last message of each sender came off the wire."""
+        self._crossed: dict[str, tuple[str, float]] = {}
+        """By sender: the owner of the other key under which its messages came, and the time of the last."""
+
+    def next_session(self) -> None:
+        """Begin anew; with more patience, if the last session never was whole."""
+        self._patience = self._patience.next()
+        self._begin()
+
+    def came(self, name: str, now: float) -> None:
+        """Note that a message came off the wire."""
+        self._came[name] = now
+
+    def has_come(self, name: str) -> bool:
+        """Whether a message has come from somebody."""
+        return name in self._came
+
+    def forget(self, name: str) -> None:
+        """Forget somebody, as its process is gone."""
+        self._came.pop(name, None)
+
+    def plant_seen(self, now: float) -> None:
+        """Note that the plant is there: it has appeared, or says that it waits for agents."""
+        self._plant_seen = now
+
+    def crossed(self, name: str, key: str, now: float) -> None:
+        """Note a message that came under another's key.
+
+        By itself that proves nothing: anybody may publish it. But if its sender is silent under its own key, although
+        the plant hears it, the key numbers of the session are confused: nobody else can bring that about, and there is
+        no need to wait any longer.
+        """
+        self._crossed[name] = key, now
+
+    def problem(
+        self, roster: Sequence[str] | None, *, met: Collection[str], neighbours: Collection[str], now: float
+    ) -> str:
+        """Say why a new session is needed; empty if it is not.
+
+        Parameters
+        ----------
+        roster : Sequence[str] or None
+            Whom the plant hears, as the last measurement says; None if there is no recent one.
+        met, neighbours : Collection[str]
+            Agents whose nameplate is known, and those of them whom the agent listens to.
+        now : float
+            s on the own clock.
+        """
+        silent = self._silent(roster, met, neighbours, now)
+        self._patience.whole |= roster is not None and not silent
+        lost = self._patience.lost(silent, now)
+        for name in silent:
+            key, at = self._crossed.get(name, ("", -inf))
+            if self._ran and now - at <= SILENT:
+                return f"messages of {name} come under the key of {key}"
+        if lost in ("", PLANT):
+            return lost and "nothing comes from the plant"
+        if lost == self._name:
+            return "the plant is heard, but does not hear this agent"
+        return f"the plant hears {lost}, but nothing comes from it here"
+
+    def _silent(
+        self, roster: Sequence[str] | None, met: Collection[str], neighbours: Collection[str], now: float
+    ) -> tuple[str, ...]:
+        """Give the plant, or neighbours that the plant hears, or the agent itself, if the plant does not hear it."""
+        if self._ran and now - max(self._came.get(PLANT, -inf), self._plant_seen) > SILENT:
+            return (PLANT,)
+        if roster is None:
+            return ()
+        self._ran = True
+        unheard = () if self._name in roster else (self._name,)
+        others = (name for name in roster if name != self._name)
+        return *unheard, *(
+            name
+            for name in others
+            if name not in met or (name in neighbours and now - self._came.get(name, -inf) > SILENT)
+        )

@@ -1,0 +1,77 @@
+"""When an agent ticks within the plant's control period. Pure.
+
+An agent has a clock of its own, and nobody tells it when to tick. Ticking just as its next measurement comes would be
+the worst time: now before it and now after, and what it decides then misses the plant's step, so that its loop is one
+period longer. With the paper's gains the vars of a returning inverter then ring for a second. So an agent keeps to the
+middle half of the period between two measurements, as an inverter's controller keeps clear of its own sampling.
+"""
+
+from __future__ import annotations
+
+from wire.timer import Timer
+
+EARLIEST, LATEST = 0.25, 0.75
+"""Bounds of the middle half."""
+
+CONVINCED = 5
+"""So many measurements in a row come at a bad time before the ticks are moved: one may just have been late."""
+
+
+class TickTimer:
+    """Due times of an agent's ticks.
+
+    Parameters
+    ----------
+    period : float
+        Control period (s of wall time).
+    keeps_clear : bool, optional
+        Whether the ticks are kept clear of the measurements; if not, they drift as the own clock does.
+
+    Examples
+    --------
+    A measurement came 1 ms before the first tick. The second is moved to the middle of its period:
+
+    >>> timer = TickTimer(0.020)
+    >>> timer.start(10.0)
+    >>> timer.measured(9.999)
+    >>> timer.take(10.0), round(timer.due, 3)
+    (0, 10.029)
+    """
+
+    def __init__(self, period: float, *, keeps_clear: bool = True) -> None:
+        self.period = period
+        self._keeps_clear = keeps_clear
+        self.start(0.0)
+
+    def start(self, now: float) -> None:
+        """Begin anew, with a tick at once; the first measurement is believed."""
+        self._timer = Timer(self.period, now)
+        self._measured: float | None = None
+        self._astride = CONVINCED - 1
+
+    @property
+    def due(self) -> float:
+        """Next due time (s)."""
+        return self._timer.due
+
+    def measured(self, at: float) -> None:
+        """Note when a measurement came (s)."""
+        self._measured = at
+
+    def take(self, now: float) -> int:
+        """Note that a tick is done now; number of ticks that were skipped for it."""
+        skipped = self._timer.take(now)
+        if self._measured is not None and self._keeps_clear:
+            self._keep_clear(self._measured)
+            self._measured = None
+        return skipped
+
+    def _keep_clear(self, measured: float) -> None:
+        phase = (self._timer.due - measured) / self.period % 1.0
+        if EARLIEST <= phase <= LATEST:
+            self._astride = 0
+            return
+        self._astride += 1
+        if self._astride >= CONVINCED:
+            self._astride = 0
+            self._timer.shift((0.5 - phase) * self.period)

@@ -1,0 +1,338 @@
+"""The plant under simulated time: it advances when the whole roster has decided. Pure; `now` serves deadlines only.
+
+*gathering*: until every agent of the configuration has a token and a nameplate, and every recorder a token.
+*preparing*: `Prepare` with the roster is out, until every agent on it is `Ready`.
+*ticking*: Measurement(k) is out, until the whole roster has sent State(k); then the plant holds the set-points, goes on
+to k+1 and sends Measurement(k+1). A change of the roster goes through *preparing* again, between two ticks.
+*joining*: the tick is held until those whom the scenario lets join have a token and a nameplate; telemetry has told,
+once, that they are missing. As the tick is held, it shows nowhere how long a process took to come up.
+*closing*: `Stop` is out, until all tokens are gone, as proof that everybody has heard it.
+
+An agent that the scenario lets leave is told to stop, and its inverter goes off the network; one that joins finds its
+inverter on the network again, at no load. One that the scenario lets die is told to stop, but its inverter stays. One
+that dies of itself is taken off the roster and the run goes on, marked not reproducible; one that dies before tick 0
+ends the run: it would be another run. Why there is no deadlock is written in `agents.lockstep_agent`.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from plant.config import PlantConfig
+from plant.interface import PlantLike
+from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
+from plant.reporting import measurement_of
+from wire.codec import RejectedError, encode
+from wire.links import Links, is_usable
+from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, PlantEvent, Prepare, Ready, State
+from wire.node import Route
+from wire.tick_barrier import Awaited, TickBarrier
+
+Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
+
+TELEMETRY_TICKS = 10
+"""Telemetry is sent at tick 0 and then every so many ticks: enough for a progress bar, few enough to be cheap."""
+
+
+class LockstepPlant(PlantNode):
+    """The plant under simulated time.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        Names the agents and recorders to wait for, the control period and the end.
+    plant : PlantLike
+        The plant at t = 0.
+    links : Links, optional
+        What the links to the plant do to its messages.
+    """
+
+    def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
+        super().__init__(config, plant, links)
+        if self._end_tick is None:
+            raise ValueError("end: a run in simulated time must have one; give a multiple of T_c in s")
+        self.reproducible = True
+        self.phase: Phase = "gathering"
+        self._plant = plant
+        joiners = self._schedule.joiners.difference(config.agents)
+        self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
+        """All who may ever take part, in the order of the inverters."""
+        self._roster: tuple[str, ...] = ()
+        """Who is on the roster that was sent last."""
+        self._roster_number = -1
+        self._roster_changed = False
+        """Whether somebody has come or gone since."""
+        self._joining: tuple[str, ...] = ()
+        """Whom the tick is held for: they may appear although the run has begun."""
+        self._barrier = TickBarrier(PLANT, config.deadline)
+        self._states: dict[str, State] = {}
+        for name in self._everyone:
+            self._routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
+            self._routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
+            self._routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+        self.subscriptions = tuple(self._routes)
+        """Keys to subscribe to before the token is declared."""
+        self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return self.phase == "over"
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages without which the plant cannot go on."""
+        return self._barrier.messages_needed
+
+    @property
+    def until(self) -> float | None:
+        """When the deadline of the present wait passes (s on the driver's clock)."""
+        return self._barrier.until
+
+    def start(self, now: float) -> None:
+        """Begin to wait for the agents."""
+        self._barrier.renew(now)
+        self._gather(now)
+
+    def missing(self) -> tuple[Awaited, ...]:
+        """Who is awaited, and for what."""
+        match self.phase:
+            case "gathering":
+                absent = [name for name in self.config.recorders if name not in self._recorders]
+                return *self._unmet(self.config.agents), *(Awaited("token", name) for name in absent)
+            case "joining":
+                return self._unmet(self._joining)
+            case "preparing" | "ticking":
+                return self._barrier.missing()
+        return ()
+
+    def expire(self, now: float) -> None:
+        """End the run if the deadline has passed."""
+        if self.until is not None and now >= self.until:
+            if self.phase == "closing":
+                self._be_over()
+            elif missing := self.missing():  # else the last that was awaited has just come
+                self.abort(self._barrier.complaint(missing, now), now)
+
+    def abort(self, reason: str, now: float) -> None:
+        """End the run because something went wrong."""
+        if self.phase not in ("closing", "over"):
+            self.outcome = reason
+            self.reproducible = False
+            self._close(reason, now)
+
+    interrupt = abort
+    """End the run because this process must leave."""
+
+    # ---------------------------------------------------------------- liveliness
+
+    def _unmet(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
+        """What is still to come of these: tokens and nameplates."""
+        here = [name for name in names if self.members.instance(name)]
+        tokens = [Awaited("token", name) for name in names if name not in here]
+        return *tokens, *(Awaited("nameplate", name) for name in here if name not in self.members.nameplates)
+
+    def _refusal(self, name: str, instance: str) -> str:
+        if name not in self._everyone:
+            return f"{name}: the plant waits for no agent of this name, only for {', '.join(self._everyone)}"
+        if self._is_taken(name, instance):
+            return f"{name}: another agent of this name takes part in the run already; give this one another name"
+        if self.phase == "gathering" and name not in self.config.agents:
+            return f"{name}: the scenario lets it join later; start it when the plant awaits it"
+        if self.phase != "gathering" and not self.members.instance(name) and name not in self._joining:
+            return f"{name}: the run has begun, at t = {self.t:g} s; an agent can join only before its start"
+        return ""
+
+    def _recorder_came(self, name: str, now: float) -> None:
+        self._gather(now)
+
+    def _met(self, nameplate: Nameplate, now: float) -> None:
+        self._gather(now)
+
+    def _agent_gone(self, name: str, now: float) -> None:
+        if self.phase in ("closing", "over"):
+            return
+        begun = self.phase != "gathering" and not (self.phase == "preparing" and self._roster_number == 0)
+        self.reproducible = False
+        self._roster_changed = True
+        self._barrier.came(name)  # it never will
+        if not begun:
+            self.abort(f"{name} died before the run began", now)
+        elif name in self._joining:
+            self.abort(f"{name} died at t = {self.t:g} s, before it had joined", now)
+        else:
+            self._note(name, f"{name} died at t = {self.t:g} s; {STAYS}")
+        if self.phase == "preparing":  # nobody can get ready to hear the dead
+            self._prepare(now)
+
+    def _close_if_alone(self) -> None:
+        if self.phase == "closing" and self._all_have_gone():
+            self._be_over()
+
+    # ---------------------------------------------------------------- messages
+
+    def _used(self, message: AnyMessage, now: float) -> None:
+        self._barrier.heard(message.sender, message.seq, now)
+
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        if self.phase != "ticking" or state.seq != self.tick or not self._barrier.awaits(state.sender):
+            kind = "stale" if state.seq <= self.tick else "unexpected"
+            raise RejectedError(kind, f"State({state.seq}) of {state.sender} at tick {self.tick} ({self.phase})")
+        self._barrier.came(state.sender)
+        self._note_state(state)
+        if is_usable(self._links, state, payload, state.t, self.admission):
+            self._states[state.sender] = state
+
+    def _on_ready(self, ready: Ready, payload: bytes, now: float) -> None:
+        if self.phase != "preparing" or ready.seq != self._roster_number:
+            raise RejectedError("stale", f"Ready({ready.seq}) of {ready.sender} in phase {self.phase}")
+        self._barrier.came(ready.sender)
+
+    # ---------------------------------------------------------------- the roster
+
+    def _gather(self, now: float) -> None:
+        """Begin, if all are there."""
+        if self.phase == "gathering" and not self.missing():
+            self._reporter.collect()
+            self._prepare(now)
+            assert set(self._roster) == set(self.config.agents)
+
+    def _prepare(self, now: float) -> None:
+        """Send the next roster: all who are there."""
+        self._roster = tuple(name for name in self._everyone if self.members.instance(name))
+        self._roster_number += 1
+        self._roster_changed = False
+        self.phase = "preparing"
+        self._barrier.wait_for(dict.fromkeys(self._roster, f"Ready({self._roster_number})"), now)
+        prepare = Prepare(
+            sender=PLANT,
+            incarnation=self.config.incarnation,
+            seq=self._roster_number,
+            t=self.t,
+            roster=self._roster,
+            instances=tuple(self.members.instance(name) for name in self._roster),
+        )
+        self._publish(self.keys.control, encode(prepare))
+
+    def _let_leave_and_join(self, now: float) -> None:
+        """Let leave who leaves at this tick, and begin to wait for who joins."""
+        leave, join, die = self._schedule.take(self.tick)
+        when = f"at t = {self.t:g} s, as the scenario says"
+        for name in leave:
+            self._dismiss(name, f"{name} leaves {when}")
+            self._connect(name, False, now)
+        for name in die:
+            self._dismiss(name, f"{name} dies {when}; {STAYS}")
+        joining = tuple(name for name in join if not self.members.instance(name))
+        for name in joining:
+            self._note(name, f"{name} joins {when}")
+        if joining and not self.outcome:
+            self._joining, self.phase = joining, "joining"
+            self._barrier.renew(now)
+            self._report(final=False, missing_agents=joining)
+
+    def _dismiss(self, name: str, text: str) -> None:
+        """Tell an agent's process, if there is one, to close; it takes part no more."""
+        self._note(name, text)
+        self._roster_changed = True
+        instance = self.members.instance(name)
+        if instance:
+            self.members.dismiss(name)
+            self.stop(self.keys.dismissal(name, instance), text)
+
+    def _note(self, name: str, text: str) -> None:
+        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=name, text=text))
+
+    def _connect(self, name: str, on: bool, now: float) -> None:
+        """Put an inverter on the network, or take it off."""
+        if self.outcome:
+            return
+        try:
+            self._plant.connect(name, on)
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(f"plant at t = {self.t:g} s: {error}", now)
+        else:
+            self._reporter.collect()
+
+    # ---------------------------------------------------------------- ticks
+
+    def work(self, now: float) -> bool:
+        """Go on if all that is awaited is here: a roster, or one tick of the plant. Whether anything was done."""
+        if self.phase not in ("preparing", "ticking", "joining") or not self._barrier.is_open:
+            return False
+        ticked = self.phase == "ticking"
+        if ticked:
+            self._finish_tick(now)
+            if self.phase == "ticking":
+                self._let_leave_and_join(now)
+        if self.phase == "joining":
+            if self.missing():
+                return ticked
+            joined, self._joining, self._roster_changed = self._joining, (), True
+            for name in joined:  # their inverters are on the network, at no load
+                self._connect(name, True, now)
+        if self.phase in ("preparing", "ticking", "joining"):
+            if self._roster_changed:
+                self._prepare(now)
+            else:
+                self._grant(now)
+        return True
+
+    def _grant(self, now: float) -> None:
+        """Send every agent its measurement, and with it the grant of this tick."""
+        t, tick, roster, incarnation = self.t, self.tick, self._roster, self.config.incarnation
+        self.phase = "ticking"
+        self._barrier.wait_for(dict.fromkeys(roster, f"State({tick})"), now)
+        readings = self._plant.measure()
+        for name in roster:
+            measurement = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
+            self._publish(self._measurement_keys[name], encode(measurement))
+        if tick == 0:
+            self._report(final=False)
+
+    def _finish_tick(self, now: float) -> None:
+        """Hold the set-points and advance."""
+        self._states.update((state.sender, state) for state in self._late_states(self.t))
+        for name in self._roster:
+            if (state := self._states.get(name)) is not None:
+                self._plant.hold(name, state.P_set, state.V_set)
+        self._states = {}
+        try:
+            self._plant.advance()
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(str(error), now)
+            return
+        self.tick += 1
+        self._reporter.collect()
+        if self.tick == self._end_tick:
+            self._close("end of the scenario", now)
+        elif self.tick % TELEMETRY_TICKS == 0:
+            self._report(final=False)
+            if self.tick % LINK_TICKS == 0:
+                self._report_links()
+
+    # ---------------------------------------------------------------- telemetry and the end
+
+    def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
+        self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents)
+
+    def _close(self, reason: str, now: float) -> None:
+        self._tell_the_end(reason)
+        self.phase = "closing"
+        self._barrier.wait_for({}, now)
+        self._barrier.until = now + CLOSING
+        self._close_if_alone()
+
+    def _be_over(self) -> None:
+        self._send_the_last()
+        self.phase = "over"
+        self._barrier.rest()

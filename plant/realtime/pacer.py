@@ -1,0 +1,118 @@
+"""How well steps keep to their due times in wall-clock time. Times are arguments: s on the driver's clock."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from wire.messages import Pacing
+
+TOLERATED = 0.01
+"""Part of the steps that may be more than one control period late before it is said that pace is not kept."""
+
+HOPELESS = 10
+"""Control periods behind which the schedule is put off: what is made up for in a rush is not real time either."""
+
+FIRST = 100
+"""Steps before which nothing is judged."""
+
+_KEPT = 5_000
+"""Delays that are remembered, the latest, for the percentiles of a run that stays."""
+
+
+class RealTimePacer:
+    """Due times of the plant's steps, and the delays behind them.
+
+    Parameters
+    ----------
+    period : float
+        Control period in wall time (s).
+    now : float
+        When step 0 is due (s).
+
+    Examples
+    --------
+    >>> pacer = RealTimePacer(0.02, now=5.0)
+    >>> pacer.due
+    5.0
+    >>> pacer.note(5.0); pacer.note(5.03)
+    0.0
+    0.0
+    >>> pacer.due, pacer.report().late
+    (5.04, 0)
+    """
+
+    def __init__(self, period: float, now: float) -> None:
+        self.period = period
+        self.steps = self.late = 0
+        self._start = now
+        self._delays: deque[float] = deque(maxlen=_KEPT)
+        self._worst = self._slipped = 0.0
+        self._failed = False
+
+    @property
+    def due(self) -> float:
+        """When the next step is due (s)."""
+        return self._start + self._slipped + self.steps * self.period
+
+    def note(self, now: float) -> float:
+        """Note that the due step is made now; by how much the schedule had to be put off for it (s)."""
+        delay = max(0.0, now - self.due)
+        self.steps += 1
+        self.late += delay > self.period
+        self._delays.append(delay)
+        self._worst = max(self._worst, delay)
+        if delay <= HOPELESS * self.period:
+            return 0.0
+        self._slipped += delay
+        return delay
+
+    def take_failure(self, of: int | None) -> bool:
+        """Whether it is clear now, and was not before, that pace cannot be kept.
+
+        Parameters
+        ----------
+        of : int or None
+            Steps of the whole run, of which `TOLERATED` may be late; without an end those made so far count.
+        """
+        judged = of is not None or self.steps >= FIRST
+        fails = judged and self.late > TOLERATED * (self.steps if of is None else of)
+        news, self._failed = fails and not self._failed, self._failed or fails
+        return news
+
+    def report(self) -> Pacing:
+        """Percentiles of the delays so far."""
+        ordered = sorted(self._delays) or [0.0]
+
+        def percentile(part: float) -> float:
+            return ordered[min(len(ordered) - 1, int(part * len(ordered)))]
+
+        return Pacing(
+            steps=self.steps,
+            late=self.late,
+            p50=percentile(0.5),
+            p95=percentile(0.95),
+            p99=percentile(0.99),
+            worst=self._worst,
+            slipped=self._slipped,
+        )
+
+    def __str__(self) -> str:
+        return sentence(self.report(), self.period)
+
+
+def sentence(pacing: Pacing, period: float) -> str:
+    """How pace was kept, for a person.
+
+    Examples
+    --------
+    >>> sentence(Pacing(steps=350, late=1, p50=1e-4, p95=5e-4, p99=2e-3, worst=0.021, slipped=0.0), 0.02)
+    '1 of 350 steps (0.3 %) more than a control period (20 ms) late; delay p50 0.1, p95 0.5, p99 2.0, worst 21.0 ms'
+    """
+    share = 100.0 * pacing.late / max(1, pacing.steps)
+    ms = 1e3
+    text = (
+        f"{pacing.late} of {pacing.steps} steps ({share:.1f} %) more than a control period ({period * ms:g} ms) late; "
+        f"delay p50 {pacing.p50 * ms:.1f}, p95 {pacing.p95 * ms:.1f}, p99 {pacing.p99 * ms:.1f}, "
+        f"worst {pacing.worst * ms:.1f} ms"
+    )
+    return text + (f"; the schedule was put off by {pacing.slipped:.2f} s in all" if pacing.slipped else "")

@@ -1,0 +1,485 @@
+"""The plant under real time: the clock decides when it advances. Pure.
+
+Step k is due at start + k T_c / speed. `expire` then measures and publishes to every agent that is present; `work`
+holds the set-points heard until then and advances the plant to k + 1: ahead of time, so that what is published at the
+next due time is ready. A state thus takes effect at the first step after it came, as it would on a real inverter;
+nothing is applied to a time that is past.
+
+**Phases.** *gathering*: until all agents and recorders of the configuration are there, or `wait_for_agents` is over.
+*running*. *closing*: the last telemetry is out, and `Stop`, until all tokens are gone. *over*.
+
+**Agents** come and go. A token and a nameplate: its inverter is put on the network, if it is not there, and its agent
+is sent measurements. `Leave`: its inverter is taken off. A token gone without `Leave`: the agent died, and its inverter
+stays on primary droop at its last set-points. Whom the scenario lets leave is asked to; telemetry tells, once, that
+whoever joins is missing, and the run goes on meanwhile.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from plant.config import PlantConfig
+from plant.interface import LivePlant
+from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
+from plant.realtime.kept_telemetry import KeptTelemetry
+from plant.realtime.link_command_sender import LinkCommandSender
+from plant.realtime.pacer import RealTimePacer
+from plant.realtime.run_commands import RunCommands
+from plant.realtime.silence_detector import SilenceDetector
+from plant.reporting import measurement_of
+from wire.admission import FASTER
+from wire.clock import time_of
+from wire.codec import encode
+from wire.links import Links, is_usable
+from wire.messages import (
+    PLANT,
+    AgentStatus,
+    Command,
+    Leave,
+    LinkAnswer,
+    LinkOrder,
+    LinkReport,
+    Nameplate,
+    PlantEvent,
+    State,
+    Waiting,
+)
+from wire.node import ANYBODY, Route
+from wire.rate_limit import RateLimit
+from wire.timer import Timer
+
+Phase = Literal["gathering", "running", "closing", "over"]
+
+TELEMETRY = 0.2
+"""Time (s, wall) between two telemetry messages."""
+
+LEAD = 0.25
+"""Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
+
+AGAIN = 1.0
+"""Time (s, wall) between two questions for the nameplates that have not come: a question dies with its link."""
+
+HEARD = 1.0
+"""Time (s, wall) after its last state for which an agent is on the roster, as one that the plant hears."""
+
+RECORDING = 15.0
+"""Longest time (s, wall) that an ended run stays for a recorder that has not got all of it: it may have stood still."""
+
+WAITING = 0.5
+"""Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
+
+REFUSALS = 20
+"""Refused processes that are logged: anybody may hold tokens."""
+
+WANTED = 1 << 30
+"""While it runs, messages wait for the next step; only tokens and words wake the plant before."""
+
+
+class RealtimePlant(PlantNode):
+    """The plant under real time.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        Names the agents to wait for, the control period, the speed and the end.
+    plant : LivePlant
+        The plant at t = 0.
+    links : Links, optional
+        What the links to the plant do to its messages.
+    """
+
+    def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
+        if not config.speed > 0.0:
+            raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
+        super().__init__(config, plant, links, rate=FASTER / config.T_c)
+        self.phase: Phase = "gathering"
+        self.plant = plant
+        self.pacer = RealTimePacer(config.T_c / config.speed, 0.0)
+        self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
+        self._refusals = 0
+        self._came: dict[str, float] = {}
+        """When the last state of each agent came off the wire (s, driver's clock)."""
+        self._states: dict[str, State] = {}
+        """States that the links let through and that are not held yet."""
+        self._silence = SilenceDetector(config.max_age, config.T_c, self.pacer.period)
+        self._step_due = False
+        self._deadline = 0.0
+        self._waiting_timer, self._ask_timer = Timer(WAITING, 0.0), Timer(AGAIN, 0.0)
+        self._warnings = RateLimit(burst=5)
+        self._commands = RunCommands(self)
+        self.kept = KeptTelemetry()
+        """What recorders can have again."""
+        self._lost_recorders: set[str] = set()
+        """Recorders whose token went while the run went on, and has not come back."""
+        self._stays = False
+        """Whether the end is kept back only for recorders."""
+        self.link_commands = LinkCommandSender(config.incarnation, self.keys, links, self._publish)
+        keys = self.keys
+        for name in plant.inverters:
+            self._routes[keys.state(name)] = self._routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
+            self._routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
+            self._routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
+            self._routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            self._routes[keys.obeyed(name)] = Route(name, (LinkAnswer,), self._on_link_answer)
+        self._routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        self.subscriptions = tuple(self._routes)
+        """Keys to subscribe to before the token is declared."""
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        inverters = self.plant.inverters
+        each = (*map(self.keys.measurement, inverters), *map(self.keys.order, inverters))
+        return self.keys.control, self.keys.telemetry, *each
+
+    @property
+    def over(self) -> bool:
+        """Whether the driver should close."""
+        return self.phase == "over"
+
+    @property
+    def wanted(self) -> int:
+        """Number of messages to be woken for."""
+        return WANTED if self.phase == "running" else 1
+
+    @property
+    def until(self) -> float:
+        """When the next step is due, or the present wait is over (s on the driver's clock)."""
+        if self.phase == "running":
+            return self.pacer.due
+        return min(self._deadline, self._waiting_timer.due) if self.phase == "gathering" else self._deadline
+
+    def start(self, now: float) -> None:
+        """Begin to wait for the agents."""
+        self._deadline = now + max(0.0, self.config.wait_for_agents)
+        self._waiting_timer, self._ask_timer = Timer(WAITING, now), Timer(AGAIN, now + AGAIN)
+        self._reporter.collect()
+        names = ", ".join(self.config.agents) or "nobody"
+        self._say(f"run {self.config.run}: waits up to {self.config.wait_for_agents:g} s for {names}")
+        self._gather(now)
+
+    def expire(self, now: float) -> None:
+        """Make the step that is due, or end the wait that is over."""
+        if now < self.until:
+            return
+        if self.phase == "gathering" and now >= self._deadline:
+            self._begin(now)
+        elif self.phase == "gathering":
+            self._waiting_timer.take(now)
+            self._tell_waiting()
+            self._ask_again(now)
+        elif self.phase == "closing":
+            self._send_the_last()
+            if self._stays or not self._awaits_recorders():
+                self.phase = "over"
+            else:
+                self._stays, self._deadline = True, now + RECORDING - CLOSING
+        elif self.phase == "running" and self.tick == self._end_tick:
+            self.close("end of the scenario", now)
+        elif self.phase == "running":
+            self._keep_pace(now)
+            if self.phase == "running":
+                self._let_leave_and_join()
+                self.link_commands.send(self.members.nameplates, now)
+                self._measure(now)
+                self._ask_again(now)
+
+    # ---------------------------------------------------------------- the end
+
+    def abort(self, reason: str, now: float) -> None:
+        """End the run because something went wrong."""
+        if self.phase not in ("closing", "over"):
+            self.outcome = reason
+            self.close(reason, now)
+
+    def interrupt(self, reason: str, now: float) -> None:
+        """Leave the run, which another plant may take up again: the agents are not told to close."""
+        if self.phase not in ("closing", "over"):
+            self.outcome = reason
+            self._report(final=True)
+            self.phase = "over"
+            self._publish_again(self.kept.take_all())
+
+    def close(self, reason: str, now: float) -> None:
+        """End the run and tell everybody."""
+        for line in self._warnings.left_out():
+            self._tell_warning(line)
+        self._say(f"ends: {reason}. {self.pacer}")
+        self._tell_the_end(reason)
+        self.phase = "closing"
+        self._publish_again(self.kept.take_all())
+        self._deadline = now + CLOSING
+        if self._all_have_gone():
+            self.phase = "over"
+
+    def _all_have_gone(self) -> bool:
+        """Whether all tokens have; a recorder that is out of reach may yet come for what it has not got."""
+        return super()._all_have_gone() and not self._lost_recorders
+
+    def _awaits_recorders(self) -> bool:
+        """Whether a recorder is out of reach, or has not left, which it does once it has the whole run."""
+        return not (self._recorders | self._lost_recorders).isdisjoint(self.config.recorders)
+
+    def _close_if_alone(self) -> None:
+        if self.phase == "closing" and (self._all_have_gone() or (self._stays and not self._awaits_recorders())):
+            self.phase = "over"
+
+    # ---------------------------------------------------------------- liveliness
+
+    def appeared(self, key: str, now: float) -> None:
+        """Note that a token appeared; whoever comes after the end did not hear that the others were told."""
+        parts = self.keys.parts(key)
+        if self.phase == "closing" and parts[:2] == ("alive", "agent"):
+            self._tokens.add(key)
+            self.stop(self.keys.dismissal(*parts[2:]), self.outcome or "the run has ended")
+        else:
+            super().appeared(key, now)
+
+    def _refusal(self, name: str, instance: str) -> str:
+        if name not in self.plant.inverters:
+            return f"{name}: no inverter of this name; inverters are {', '.join(self.plant.inverters)}"
+        if self._is_taken(name, instance):
+            reason = f"{name}: another agent of this name takes part in run {self.config.run} already; stop it"
+            return f"{reason} first (gridpeers stop {name}), or give this one another name"
+        return ""
+
+    def _refuse(self, name: str, instance: str, reason: str) -> None:
+        self._refusals += 1
+        if self._refusals <= REFUSALS:
+            more = "" if self._refusals < REFUSALS else "; further refusals are not logged"
+            self._say(f"refused {reason}{more}")
+        super()._refuse(name, instance, reason)
+
+    def _ask_again(self, now: float) -> None:
+        """Ask for the nameplates that have not come."""
+        if now >= self._ask_timer.due:
+            self._ask_timer.take(now)
+            for name, instance in self.members.unmet:
+                self._ask(name, instance)
+
+    def _recorder_came(self, name: str, now: float) -> None:
+        if name in self._lost_recorders:
+            self._lost_recorders.discard(name)
+            self._say(f"recorder {name} is back")
+        self._gather(now)
+
+    def _recorder_gone(self, name: str) -> None:
+        if self.phase == "running" and name in self.config.recorders:
+            self._lost_recorders.add(name)
+            self._say(f"recorder {name} is out of reach; what it misses is kept for a while")
+
+    def _met(self, nameplate: Nameplate, now: float) -> None:
+        name = nameplate.sender
+        if self.phase not in ("gathering", "running"):
+            return
+        self._silence.joined(name)
+        self._connect(name, True, now)
+        self._note(name, f"{name} joined")
+        self.link_commands.send(self.members.nameplates, now)
+        self._gather(now)
+
+    def _agent_gone(self, name: str, now: float) -> None:
+        self._forget(name)
+        if self.phase in ("gathering", "running"):
+            self._note(name, f"{name} died; {STAYS}")
+
+    def _forget(self, name: str) -> None:
+        self.link_commands.forget(name)
+        self._silence.forget(name)
+        self._came.pop(name, None)
+        self._states.pop(name, None)
+
+    # ---------------------------------------------------------------- messages
+
+    def _on_state(self, state: State, payload: bytes, now: float) -> None:
+        self.admission.take(state)
+        self._came[state.sender] = now
+        self._silence.heard(state.sender, failed=bool(state.fault))
+        self._note_state(state)
+        if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
+            self._states[state.sender] = state
+
+    def _on_status(self, status: AgentStatus, payload: bytes, now: float) -> None:
+        if status.sender in self.members.nameplates:  # one comes before its nameplate now and then
+            self.admission.check(status)
+            self._silence.reported(status)
+
+    def _on_link_answer(self, answer: LinkAnswer, payload: bytes, now: float) -> None:
+        self.link_commands.answered(answer)
+
+    def _on_leave(self, leave: Leave, payload: bytes, now: float) -> None:
+        name = leave.sender
+        instance = self.members.instance(name)
+        self.stop(self.keys.dismissal(name, instance), f"{name} has left")
+        self._forget_process(name, instance)
+        self._forget(name)
+        if self.phase in ("gathering", "running"):
+            self._connect(name, False, now)
+            self._note(name, f"{name} left; its inverter is off the network")
+
+    def _on_command(self, command: Command, payload: bytes, now: float) -> None:
+        answer = self._commands.answer(command, now)
+        self._publish(self.keys.answer(command.reply_to), encode(answer))
+        if answer.ok and command.verb == "link":
+            self.link_commands.send(self.members.nameplates, now)
+        elif answer.ok and command.verb == "links":
+            self.link_commands.ask(self.members.nameplates, self.t, command.reply_to)
+        if command.verb == "telemetry" and self.phase != "running":
+            self._publish_again(self.kept.take_all())
+        if answer.ok and command.verb == "down":
+            self.close("the run was ended by command", now)
+
+    def command_links(self, text: str, reply_to: str, now: float) -> tuple[LinkOrder, str, tuple[str, ...]]:
+        """Have links carry out a command, from one control period after the due tick on: till then all know it.
+
+        Returns
+        -------
+        tuple[LinkOrder, str, tuple[str, ...]]
+            As `LinkCommandSender.give` does.
+
+        Raises
+        ------
+        ValueError
+            If it is no command to links, or the run has no emulated links.
+        """
+        overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
+        t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
+        order, said, receivers = self.link_commands.give(text, t, reply_to)
+        noted = f"order {order.seq} to links: {said}" + (f", from t = {t:.2f} s on" if receivers else "")
+        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=noted))
+        return order, said, receivers
+
+    def _connect(self, name: str, on: bool, now: float) -> None:
+        """Put an inverter on the network, or take it off."""
+        try:
+            self.plant.connect(name, on)
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(str(error), now)
+
+    # ---------------------------------------------------------------- steps
+
+    def _gather(self, now: float) -> None:
+        """Begin, if all are there."""
+        agents, recorders = set(self.config.agents), set(self.config.recorders)
+        if self.phase == "gathering" and self.members.nameplates.keys() >= agents and self._recorders >= recorders:
+            self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        self.phase = "running"
+        self.pacer = RealTimePacer(self.pacer.period, now + LEAD)
+        absent = [name for name in self.config.agents if name not in self.members.nameplates]
+        if absent:
+            text = f"started without the agents of {', '.join(absent)}, which stay on primary droop until they come"
+            self._note(absent[0], text)
+        self._say(f"t = 0; speed {self.config.speed:g}")
+
+    def _tell_waiting(self) -> None:
+        """Tell the agents that the plant is there, and for whom they wait with it."""
+        absent = tuple(name for name in self.config.agents if name not in self.members.nameplates)
+        waiting = Waiting(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, waits_for=absent)
+        self._publish(self.keys.control, encode(waiting))
+
+    def _let_leave_and_join(self) -> None:
+        """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""
+        leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
+        for name in leave:
+            instance = self.members.instance(name)
+            if instance:
+                reason = f"{name} leaves at t = {self.t:.2f} s, as the scenario says"
+                self.stop(self.keys.dismissal(name, instance), reason)
+                self._say(reason)
+        if join:
+            self._say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
+            self._report(final=False, missing_agents=join)
+
+    def _keep_pace(self, now: float) -> None:
+        slipped = self.pacer.note(now)
+        if slipped:
+            self._warn(f"fell {slipped:.3f} s of wall time behind; all later steps are put off by as much", now)
+        if not self.pacer.take_failure(of=self._end_tick):
+            return
+        speed = self.config.speed
+        text = f"cannot keep pace at speed {speed:g}: {self.pacer}; give it a lower speed or more cores"
+        self._warn(text, now)
+        if self.config.strict:
+            self.abort(f"plant: {text}", now)
+
+    def _measure(self, now: float) -> None:
+        """Send every agent that is present its measurement, and who is heard."""
+        readings, t, tick, incarnation = self.plant.measure(), self.t, self.tick, self.config.incarnation
+        heard = tuple(name for name in self.plant.inverters if now - self._came.get(name, now - HEARD) < HEARD)
+        for name in self.members.nameplates:
+            message = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=heard)
+            self._publish(self.keys.measurement(name), encode(message))
+        self._step_due = True
+
+    def work(self, now: float) -> bool:
+        """Take the plant one step on, once its measurements are out. Whether anything was done."""
+        if not self._step_due:
+            return False
+        self._step_due = False
+        self._publish_again(self.kept.take())
+        self._states.update((state.sender, state) for state in self._late_states(now * self.config.speed))
+        states, self._states = self._states, {}
+        for state in states.values():
+            self.plant.hold(state.sender, state.P_set, state.V_set)
+        try:
+            self.plant.advance()
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(str(error), now)
+            return True
+        self.tick += 1
+        for name, text in self._silence.take(now):
+            self._note(name, text)
+        self._reporter.collect()
+        if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
+            self._report(final=False)
+        if self.tick % LINK_TICKS == 0:
+            self._report_links()
+        return True
+
+    # ---------------------------------------------------------------- what is told
+
+    @property
+    def events(self) -> tuple[PlantEvent, ...]:
+        """The latest events, oldest first."""
+        return tuple(self._reporter.latest)
+
+    def _note(self, subject: str, text: str) -> None:
+        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:.2f} s"))
+        self._say(f"{text}, at t = {self.t:.2f} s")
+
+    def _warn(self, text: str, now: float) -> None:
+        line = self._warnings.admit(text, now)
+        if line is not None:
+            self._tell_warning(line)
+
+    def _tell_warning(self, text: str) -> None:
+        self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
+        self._say(text)
+
+    def _publish(self, key: str, payload: bytes) -> None:
+        """Publish bytes; those for recorders are kept, and wait if others before them are published again."""
+        if key != self.keys.telemetry or self.kept.add(self._reporter.seq, payload):
+            super()._publish(key, payload)
+        elif self.phase != "running":
+            self._publish_again(self.kept.take_all())
+
+    def _publish_again(self, payloads: list[bytes]) -> None:
+        for payload in payloads:
+            super()._publish(self.keys.telemetry, payload)
+
+    def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
+        self._reporter.collect()
+        self._telemetry(
+            final=final,
+            reproducible=False,
+            missing_agents=missing_agents,
+            pacing=self.pacer.report(),
+            impaired=self.link_commands.impaired(self.t),
+            others=self.kept.others(self._reporter.seq),
+        )

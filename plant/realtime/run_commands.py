@@ -1,0 +1,103 @@
+"""Commands that people give to a running plant, and the answers. Pure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from wire.bounds import LIMIT
+from wire.messages import PLANT, Answer, Command
+from wire.printable import printable
+
+if TYPE_CHECKING:
+    from plant.realtime.realtime_plant import RealtimePlant
+
+
+class RunCommands:
+    """Carries commands out.
+
+    Parameters
+    ----------
+    node : RealtimePlant
+        The plant that is asked.
+    """
+
+    def __init__(self, node: RealtimePlant) -> None:
+        self._node = node
+
+    def answer(self, command: Command, now: float) -> Answer:
+        """Carry a command out, but for "down", which is the plant's own; return its outcome."""
+        node = self._node
+        try:
+            if node.phase not in ("gathering", "running") and command.verb != "telemetry":
+                raise ValueError("the run is ending")
+            text, ok = self._do(command, now), True
+        except ValueError as error:
+            text, ok = str(error), False
+        return Answer(
+            sender=PLANT,
+            incarnation=node.config.incarnation,
+            seq=command.seq,
+            t=node.t,
+            ok=ok,
+            text=printable(text, LIMIT),
+        )
+
+    def _do(self, command: Command, now: float) -> str:
+        node, verb, argument = self._node, command.verb, command.argument
+        if verb in ("link", "links"):
+            return msgspec.json.encode(self._command_links(command, now)).decode()
+        if verb == "status":
+            return msgspec.json.encode(self.status()).decode()
+        if verb == "telemetry":
+            if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
+                raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
+            return str(node.kept.again_from(int(argument)))
+        if verb == "down":
+            return f"run {node.config.run} ends at t = {node.t:.2f} s"
+        if verb == "stop":
+            instance = node.members.instance(argument)
+            if not instance:
+                running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
+                raise ValueError(f'no agent "{argument}" is running; running are: {running}')
+            node.stop(node.keys.dismissal(argument, instance), "stopped by command")
+            return f"{argument} was asked to leave at t = {node.t:.2f} s"
+        if verb == "synchronise":
+            node.plant.switch(argument, "close", synchronised=True)
+            return f"switch {argument}: close in step at t = {node.t:.2f} s"
+        if node.plant.switch(argument, verb):
+            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already at t = {node.t:.2f} s"
+        return f"switch {argument}: {verb} at t = {node.t:.2f} s"
+
+    def _command_links(self, command: Command, now: float) -> dict[str, Any]:
+        """Return the command's number, from when on it holds (s), what it does, and the agents that are sent it."""
+        node = self._node
+        agents = self._agents(present=True)
+        if command.verb == "link":
+            order, said, receivers = node.command_links(command.argument, command.reply_to, now)
+            return {"number": order.seq, "t": order.t, "asked": agents, "said": said, "receivers": receivers}
+        assert node.link_commands.links is not None  # a run without any is an error
+        return {"number": 0, "t": node.t, "asked": agents}
+
+    def _agents(self, *, present: bool) -> list[str]:
+        met = self._node.members.nameplates
+        return [name for name in self._node.plant.inverters if (name in met) == present]
+
+    def status(self) -> dict[str, Any]:
+        """Return the run's status: times in s, delays in s of wall time."""
+        node = self._node
+        return {
+            "run": node.config.run,
+            "phase": node.phase,
+            "t": node.t,
+            "tick": node.tick,
+            "end": node.config.end,
+            "speed": node.config.speed,
+            "pacing": node.pacer.report(),
+            "agents": self._agents(present=True),
+            "absent": self._agents(present=False),
+            "events": list(node.events),
+            "impaired": list(node.link_commands.impaired(node.t)),
+            "rejected": sum(node.rejects.counts.values()),
+        }

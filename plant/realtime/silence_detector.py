@@ -1,0 +1,159 @@
+"""Agents that take part and are not heard: not by the plant, or not by a neighbour. Pure.
+
+A frozen agent keeps its token for Zenoh's lease of 2 s, and two hosts that lose the path between them may both keep
+theirs to the plant. The neighbours leave such a state out after `max_age`, so the run is another one from then on. The
+plant sees the first by the age of the agent's last state, and is told the second by the ages in `AgentStatus`.
+
+Ages are counted in time for which the plant itself listened: while it stood still, states came that it has not read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from wire.messages import AgentStatus
+
+SETTLING = 0.1
+"""Time (s, wall) for which a neighbour must be reported as not heard before that is told: if it is frozen, the plant
+itself finds out meanwhile."""
+
+ACQUAINTANCE = 1.0
+"""Time (s, wall) after a join in which agents may not have heard each other yet."""
+
+LISTENED = 2.0
+"""Control periods between two steps of the plant that count as time in which it listened; what is beyond it slept."""
+
+RECENT = 3.0
+"""Control periods within which an agent must have been heard here, if it is told that a neighbour does not hear it."""
+
+
+class SilenceDetector:
+    """When each agent was heard last, and the spells in which one is not.
+
+    Parameters
+    ----------
+    max_age : float
+        Age (s of run time) beyond which a state is not used.
+    T_c : float
+        Control period (s of run time).
+    period : float
+        The same in wall time (s).
+
+    Examples
+    --------
+    >>> silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
+    >>> silence.joined("inv2"); list(silence.take(now=5.0))
+    []
+    >>> [told for step in range(1, 14) for told in silence.take(now=5.0 + 0.02 * step)]
+    [('inv2', 'inv2 is silent: no state for 0.25 s, nothing comes from it')]
+    >>> silence.heard("inv2"); list(silence.take(now=5.28))
+    [('inv2', 'inv2 is heard again')]
+    >>> list(silence.take(now=9.0))
+    []
+    """
+
+    def __init__(self, max_age: float, T_c: float, period: float) -> None:
+        self._max_age, self._period = max_age, period
+        self._limit = max_age * period / T_c
+        """The same in wall time (s)."""
+        self._clock = 0.0
+        """Time (s, wall) for which the plant has listened."""
+        self._now: float | None = None
+        """When that was last brought up to date (s)."""
+        self._joined: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+        """When each agent was heard last, or joined."""
+        self._holding: set[str] = set()
+        """Agents that say that they have no measurement."""
+        self._failed: set[str] = set()
+        """Agents whose law has failed: they say nothing more."""
+        self._silent: set[str] = set()
+        self._unheard: dict[str, dict[str, float]] = {}
+        """Of each agent the neighbours that it does not hear, and from when on that is to be told."""
+        self._told: dict[str, set[str]] = {}
+        """Those of whom it has been told."""
+
+    def joined(self, name: str) -> None:
+        """Note that an agent takes part from now on."""
+        self._joined[name] = self._last[name] = self._clock
+
+    def heard(self, name: str, *, failed: bool = False) -> None:
+        """Note a state that came off the wire, perhaps the last, by which an agent says that its law has failed."""
+        (self._failed.add if failed else self._failed.discard)(name)
+        self._last[name] = self._clock
+        self._holding.discard(name)
+
+    def forget(self, name: str) -> None:
+        """Note that an agent does not take part any more."""
+        for known in (self._joined, self._last, self._unheard, self._told):
+            known.pop(name, None)
+        self._silent.discard(name)
+        self._holding.discard(name)
+        self._failed.discard(name)
+        for unheard in self._unheard.values():
+            unheard.pop(name, None)
+        for told in self._told.values():
+            told.discard(name)
+
+    def reported(self, status: AgentStatus) -> None:
+        """Note what an agent says of its neighbours; while it does not tick, it uses nobody's state anyway."""
+        if status.sender not in self._joined:
+            return
+        if status.phase != "running":
+            if self._clock >= self._joined[status.sender] + SETTLING:  # before, it waits for its first measurement
+                self._holding.add(status.sender)
+            return
+        unheard: dict[str, float] = {}
+        before = self._unheard.get(status.sender, {})
+        for name, age in zip(status.neighbours, status.ages, strict=False):
+            if 0.0 <= age <= self._max_age or name not in self._joined:
+                continue
+            since = self._clock + SETTLING
+            if age < 0.0:  # never heard since one of the two joined, or since the agent last stood still
+                since = max(since + self._limit, self._acquainted(status.sender, name))
+            unheard[name] = before.get(name, since)
+        # a neighbour that is no longer named has lost its token there: it is not heard either
+        named = set(status.neighbours)
+        self._unheard[status.sender] = {name: at for name, at in before.items() if name not in named} | unheard
+
+    def take(self, now: float) -> Iterator[tuple[str, str]]:
+        """Whose silence began or ended by a step of the plant at this time (s, wall), each with a sentence."""
+        self._clock += 0.0 if self._now is None else min(max(0.0, now - self._now), LISTENED * self._period)
+        self._now = now
+        for name, last in self._last.items():
+            if self._clock - last > self._limit:
+                if name not in self._silent:
+                    self._silent.add(name)
+                    yield name, f"{name} is silent: no state for {self._max_age:g} s, {self._why(name)}"
+            elif name in self._silent:
+                self._silent.discard(name)
+                yield name, f"{name} is heard again"
+        for name in self._unheard:
+            yield from self._take_unheard(name)
+
+    def _why(self, name: str) -> str:
+        if name in self._failed:
+            return "as its law has failed"
+        return "it says that it has no measurement" if name in self._holding else "nothing comes from it"
+
+    def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
+        """Neighbours whom an agent has ceased to hear, or hears again. Whom nobody hears is told of as silent."""
+        unheard = {other: at for other, at in self._unheard[name].items() if other in self._last}
+        told = self._told.setdefault(name, set())
+        back = sorted(other for other in told if other not in unheard and other in self._last)
+        told.intersection_update(unheard)
+        recent = self._clock - RECENT * self._period
+        news = [
+            other
+            for other, at in unheard.items()
+            if at <= self._clock and other not in told and other not in self._silent and self._last[other] >= recent
+        ]
+        told.update(news)
+        if back:
+            yield name, f"{name} hears {', '.join(back)} again"
+        if news:
+            others = ", ".join(news)
+            yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, though one came here"
+
+    def _acquainted(self, *names: str) -> float:
+        return max(self._joined[name] for name in names) + ACQUAINTANCE

@@ -1,0 +1,113 @@
+"""One agent under simulated time, with everything around it played by the test."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.config import Control, GraphRule
+from agents.lockstep_agent import LockstepAgent
+from tests.toy.toy_configs import agent_config
+from wire.actions import Fetch, Listen, Publish
+from wire.codec import decode, encode
+from wire.keys import Keys
+from wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
+
+KEYS = Keys("toy")
+
+
+def nameplate(name: str, epoch: int = 1) -> Nameplate:
+    """Nameplate of an agent of the toy."""
+    return Agent(replace(agent_config(name), incarnation=epoch)).nameplate
+
+
+class Lab:
+    """inv1, whose process is "me"; the process of any other agent is its name, unless the test says otherwise."""
+
+    def __init__(self, graph: GraphRule = "full", **changes: Any) -> None:
+        config = replace(agent_config("inv1", Control(secondary="all", graph=graph)), **changes)
+        self.node = LockstepAgent(config, "me")
+        self.done: list[tuple[str, str]] = []
+        """("listen", name), ("ask", process) and ("ready", number), in the order of the actions."""
+        self.decided: list[State] = []
+        self.node.start(0.0)
+        self.node.appeared(KEYS.alive_plant(1), 0.0)
+        self.do()
+
+    def do(self) -> None:
+        """Take the actions."""
+        for action in self.node.take_actions():
+            if isinstance(action, Listen):
+                self.done.append(("listen", KEYS.parts(action.key)[1]))
+            elif isinstance(action, Fetch):
+                self.done.append(("ask", KEYS.parts(action.key)[2]))
+            elif isinstance(action, Publish):
+                message = decode(action.payload)
+                if isinstance(message, Ready):
+                    self.done.append(("ready", str(message.seq)))
+                elif isinstance(message, State):
+                    self.decided.append(message)
+
+    def hear(self, key: str, message: Message, now: float = 0.0) -> None:
+        """A message comes in."""
+        self.node.received(key, encode(message), now)
+        self.do()
+
+    def token(self, name: str, instance: str = "", *, gone: bool = False) -> None:
+        """A token comes or goes."""
+        key = KEYS.alive_agent(name, instance or name)
+        (self.node.vanished if gone else self.node.appeared)(key, 0.0)
+        self.do()
+
+    def answer(self, name: str, instance: str = "", *, epoch: int = 1, **changes: Any) -> None:
+        """A process answers for its nameplate."""
+        self.hear(KEYS.nameplate(name, instance or name), replace(nameplate(name, epoch), **changes))
+
+    def meet(self, *names: str) -> None:
+        """Agents come, are met, and prove that they hear the subscription to them."""
+        for name in names:
+            self.token(name)
+            self.answer(name)
+            self.answer(name)
+
+    def prepare(self, number: int, *names: str, **instances: str) -> None:
+        """A roster of inv1 and these."""
+        processes = {"inv1": "me"} | {name: name for name in names} | instances
+        roster, ids = tuple(processes), tuple(processes.values())
+        self.hear(KEYS.control, Prepare(sender="plant", incarnation=1, seq=number, t=0.0, roster=roster, instances=ids))
+
+    def measure(self, k: int, *names: str) -> None:
+        """The grant of tick k, for inv1 and these."""
+        message = Measurement(
+            sender="plant", incarnation=1, seq=k, t=round(0.02 * k, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
+            P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", *names),
+        )  # fmt: skip
+        self.hear(KEYS.measurement("inv1"), message)
+
+    def state(self, name: str, k: int, P_set: float = 5e4) -> None:
+        """A neighbour's state of tick k."""
+        state = State(sender=name, incarnation=1, seq=k, t=round(0.02 * k, 9), P_set=P_set, V_set=277.0, Q=0.0)
+        self.hear(KEYS.state(name), state)
+
+    def take(self) -> list[tuple[str, str]]:
+        """What was done since last asked."""
+        done, self.done = self.done, []
+        return done
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """Who is awaited, and for what."""
+        return [(what, who) for what, who in self.node.missing()]
+
+
+def ticking(*names: str, tick: int = 0) -> Lab:
+    """An agent with these neighbours that has done the tick before this one."""
+    lab = Lab()
+    lab.meet(*names)
+    lab.prepare(0, *names)
+    lab.measure(tick - 1 if tick else 0, *names)
+    lab.decided.clear()
+    lab.take()
+    return lab

@@ -1,0 +1,119 @@
+"""One free-running agent on a fake clock, with everything around it played by the test."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.laws.law import Law
+from agents.realtime.realtime_agent import RealtimeAgent
+from tests.toy.toy_configs import agent_config
+from wire.actions import Fetch, Listen, Publish, Say
+from wire.codec import decode, encode
+from wire.keys import Keys
+from wire.messages import AgentStatus, Measurement, Message, State
+
+KEYS = Keys("toy")
+T_C = 0.02
+
+
+class Lab:
+    """inv1 on a fake clock, with everything around it played by the test."""
+
+    def __init__(self, law: Law | None = None, **changes: Any) -> None:
+        config = replace(agent_config("inv1"), clock="wall", **changes)
+        self.now = 100.0
+        self.side = RealtimeAgent(config, "me", law=law)
+        self.listened: list[str] = []
+        self.fetched: list[str] = []
+        self.said: list[str] = []
+        self.published: list[Message] = []
+        self.keys: list[str] = []
+        """Of what was published."""
+        self.side.start(self.now)
+        self.do()
+
+    def do(self) -> None:
+        """Take the actions."""
+        for action in self.side.take_actions():
+            if isinstance(action, Publish):
+                self.published.append(decode(action.payload))
+                self.keys.append(action.key)
+            elif isinstance(action, Fetch):
+                self.fetched.append(action.key)
+            elif isinstance(action, Listen):
+                self.listened.append(action.key)
+            else:
+                assert isinstance(action, Say)
+                self.said.append(action.text)
+
+    def token(self, name: str, instance: str = "a", *, gone: bool = False, epoch: int = 1) -> None:
+        """A token comes or goes; that of the plant has an epoch."""
+        key = KEYS.alive_plant(epoch) if name == "plant" else KEYS.alive_agent(name, instance)
+        (self.side.vanished if gone else self.side.appeared)(key, self.now)
+        self.do()
+
+    def plate(self, name: str, instance: str = "a", *, life: int = 1) -> None:
+        """Answer the query for a nameplate."""
+        key = KEYS.nameplate(name, instance)
+        assert key in self.fetched
+        self.hear(key, replace(Agent(agent_config(name)).nameplate, incarnation=life))
+
+    def hear(self, key: str, message: Message) -> None:
+        """A message comes in."""
+        self.side.received(key, encode(message), self.now)
+        self.do()
+
+    def meet(self, *names: str) -> None:
+        """Agents are there, and known."""
+        for name in names:
+            self.token(name)
+            self.plate(name)
+
+    def measure(self, k: int, **changes: Any) -> None:
+        """The plant's measurement of tick k comes in."""
+        values: dict[str, Any] = dict(
+            sender="plant", incarnation=1, seq=k, t=round(k * T_C, 9), to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0,
+            P_set=50e3, V_set=277.0, grid_connected=False, island="inv1", roster=(),
+        )  # fmt: skip
+        self.hear(KEYS.measurement("inv1"), Measurement(**values | changes))
+
+    def state(self, name: str, seq: int, t: float = 0.0, **changes: Any) -> None:
+        """A neighbour's state comes in."""
+        values: dict[str, Any] = dict(
+            sender=name, incarnation=1, seq=seq, t=t, P_set=80e3, V_set=277.0, Q=0.0, island="inv1"
+        )
+        self.hear(KEYS.state(name), State(**values | changes))
+
+    def go(self, seconds: float) -> None:
+        """Time passes; the agent is woken only now."""
+        self.now += seconds + 1e-9  # sums of periods are not to fall short of their products
+        self.side.expire(self.now)
+        self.do()
+
+    def age(self, name: str) -> float:
+        """Age (s) of a neighbour's last state."""
+        return self.side.states.age(name, self.now)
+
+    def decided(self) -> list[State]:
+        """States published since last asked."""
+        states = [message for message in self.published if isinstance(message, State)]
+        self.published = [message for message in self.published if not isinstance(message, State)]
+        return states
+
+    def status(self) -> AgentStatus:
+        """The latest status."""
+        return [message for message in self.published if isinstance(message, AgentStatus)][-1]
+
+
+def running(*neighbours: str, **changes: Any) -> Lab:
+    """An agent that ticks, with these neighbours."""
+    lab = Lab(**changes)
+    lab.token("plant")
+    lab.meet(*neighbours)
+    lab.measure(0)
+    lab.go(0.0)
+    assert len(lab.decided()) == 1
+    return lab

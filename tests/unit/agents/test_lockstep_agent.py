@@ -1,0 +1,282 @@
+"""One agent under simulated time: how it gets ready in whatever order things come, and what its ticks wait for."""
+
+from __future__ import annotations
+
+import random
+from itertools import permutations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.agent import Agent
+from agents.config import Control, GraphRule
+from tests.toy.toy_configs import agent_config
+from tests.unit.agents.lockstep_lab import Lab, nameplate, ticking
+
+NAMES = ("inv1", "inv2", "inv3", "inv4")
+
+# ---------------------------------------------------------------- getting ready
+
+
+def test_a_subscription_goes_before_the_question_that_proves_it() -> None:
+    """On a link that keeps its order the second answer shows that the subscription has arrived."""
+    lab = Lab()
+    lab.token("inv2")
+    lab.answer("inv2")
+
+    assert lab.take() == [("ask", "inv2"), ("listen", "inv2"), ("ask", "inv2")]
+
+
+def test_who_is_no_neighbour_is_met_and_not_heard() -> None:
+    """Its nameplate is enough for being ready."""
+    lab = Lab("none")
+    lab.token("inv2")
+    lab.prepare(0, "inv2")
+    assert lab.missing == [("nameplate", "inv2")]
+
+    lab.answer("inv2")
+    assert lab.take() == [("ask", "inv2"), ("ready", "0")]
+
+
+def test_a_ring_waits_for_the_roster() -> None:
+    """Who stands beside whom shows only on the roster: before it nobody is listened to."""
+    lab = Lab("ring")
+    for name in NAMES[1:]:
+        lab.token(name)
+        lab.answer(name)
+    assert lab.take() == [("ask", name) for name in NAMES[1:]]
+
+    lab.prepare(0, *NAMES[1:])
+    assert lab.take() == [("listen", "inv2"), ("ask", "inv2"), ("listen", "inv4"), ("ask", "inv4")]
+    assert lab.missing == [("nameplate", "inv2"), ("nameplate", "inv4")]
+    lab.answer("inv2")
+    lab.answer("inv4")
+    assert lab.take() == [("ready", "0")]
+
+
+def test_a_roster_of_known_neighbours_is_confirmed_at_once() -> None:
+    """Nothing is asked again for a new roster, and what comes late is not confirmed twice."""
+    lab = Lab()
+    lab.meet("inv2", "inv3")
+    lab.take()
+    lab.prepare(0, "inv2", "inv3")
+    lab.prepare(1, "inv3")
+    lab.answer("inv3")
+
+    assert lab.take() == [("ready", "0"), ("ready", "1")]
+
+
+def test_a_new_process_of_a_neighbour_must_prove_itself_anew() -> None:
+    """Its name is listened to already."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(0, "inv2")
+    lab.token("inv2", gone=True)
+    lab.token("inv2", "again")
+    lab.prepare(1, inv2="again")
+    lab.take()
+
+    lab.answer("inv2", "again", epoch=2)
+    assert lab.take() == [("ask", "again")]
+    lab.answer("inv2", "again", epoch=2)
+    assert lab.take() == [("ready", "1")]
+
+
+def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
+    """A link that was cut may have lost the subscription."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(0, "inv2")
+    lab.token("inv2", gone=True)
+    lab.token("inv2")
+    lab.prepare(1, "inv2")
+    lab.take()
+
+    lab.answer("inv2")
+    assert lab.take() == [("ask", "inv2")]
+    lab.answer("inv2")
+    assert lab.take() == [("ready", "1")]
+
+
+def test_of_two_processes_of_a_name_the_one_on_the_roster_speaks() -> None:
+    """Whatever the other says of itself, before or after."""
+    lab = Lab()
+    for instance, epoch in (("early", 8), ("inv2", 5)):
+        lab.token("inv2", instance)
+        lab.answer("inv2", instance, epoch=epoch)
+    lab.prepare(0, "inv2")
+    for _ in range(2):
+        lab.answer("inv2", epoch=5)
+    lab.token("inv2", "late")
+    lab.answer("inv2", "late", epoch=9, P_rated=1.0)
+
+    assert lab.take()[-2:] == [("ready", "0"), ("ask", "late")]
+    assert lab.node.admission.epoch("inv2") == 5
+    lab.token("inv2", "late", gone=True)
+    lab.token("inv2", "early", gone=True)
+    assert lab.node.admission.epoch("inv2") == 5
+
+
+@pytest.mark.parametrize(
+    ("number", "roster", "kind"),
+    [
+        (3, {"inv1": "me", "inv2": "inv2"}, "stale"),
+        (4, {"inv1": "another"}, "unexpected"),
+        (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
+    ],
+)
+def test_a_roster_that_cannot_be_meant_changes_nothing(number: int, roster: dict[str, str], kind: str) -> None:
+    """One that is old, or without this process."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(3, "inv2")
+    lab.take()
+    lab.prepare(number, **roster)
+
+    assert lab.node.rejects.counts == {kind: 1}
+    assert lab.take() == []
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
+def test_whatever_comes_first_it_is_ready_in_the_end(seed: int, graph: GraphRule) -> None:
+    """Tokens and the roster in any order, answers in any order: one Ready, after a proof from each neighbour."""
+    rng, lab = random.Random(seed), Lab(graph)
+    events = [*NAMES[1:], ""]
+    rng.shuffle(events)
+    asked: list[str] = []
+    done: list[tuple[str, str]] = []
+    while events or asked:
+        if events and (not asked or rng.random() < 0.5):
+            name = events.pop()
+            lab.token(name) if name else lab.prepare(0, *NAMES[1:])
+        else:
+            lab.answer(asked.pop(rng.randrange(len(asked))))
+        new = lab.take()
+        asked += [name for what, name in new if what == "ask"]
+        done += new
+    rule = Agent(agent_config("inv1", Control(secondary="all", graph=graph)))
+    for name in NAMES[1:]:
+        rule.meet(nameplate(name))
+    neighbours = rule.in_neighbours(NAMES)
+
+    assert done[-1] == ("ready", "0")
+    assert done.count(("ready", "0")) == 1
+    assert sorted(name for what, name in done if what == "listen") == sorted(neighbours)
+    assert [done.count(("ask", name)) for name in NAMES[1:]] == [2 if name in neighbours else 1 for name in NAMES[1:]]
+
+
+# ---------------------------------------------------------------- ticks
+
+
+def test_the_first_tick_needs_the_measurement_alone() -> None:
+    """It is whichever tick the plant grants first."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(0, "inv2")
+    assert lab.missing == [("Measurement(0)", "plant")]
+
+    lab.measure(41, "inv2")
+    assert [state.seq for state in lab.decided] == [41]
+
+
+@pytest.mark.parametrize("order", list(permutations(("plant", "inv2", "inv3"))))
+def test_a_tick_is_done_with_whatever_comes_last(order: tuple[str, ...]) -> None:
+    """Measurement and states in any order: nothing before all are there, and `wanted` counts them down."""
+    lab, wanted = ticking("inv2", "inv3", tick=5), []
+    for sender in order:
+        assert lab.decided == []
+        wanted.append(lab.node.wanted)
+        lab.measure(5, "inv2", "inv3") if sender == "plant" else lab.state(sender, 4)
+
+    assert wanted == [3, 2, 1]
+    assert [state.seq for state in lab.decided] == [5]
+
+
+def test_a_state_that_comes_too_early_is_kept_for_its_tick() -> None:
+    """State(1) of a faster neighbour is not used at tick 1, and is at tick 2: the bytes are the same as in order."""
+    decided = []
+    for early in (True, False):
+        lab = ticking("inv2", tick=1)
+        lab.state("inv2", int(early), P_set=9e4 + early)
+        lab.state("inv2", int(not early), P_set=9e4 + (not early)) if early else lab.measure(1, "inv2")
+        lab.measure(1, "inv2") if early else lab.state("inv2", 1, P_set=9e4 + 1)
+        lab.measure(2, "inv2")
+        decided.append(lab.decided)
+
+    assert [state.seq for state in decided[0]] == [1, 2]
+    assert decided[0] == decided[1]
+
+
+def test_of_what_came_before_the_first_measurement_only_its_own_tick_counts() -> None:
+    """A newcomer hears states before it knows which tick is its first."""
+    lab = Lab()
+    lab.meet("inv2", "inv3")
+    lab.prepare(0, "inv2", "inv3")
+    lab.state("inv2", 40)
+    lab.state("inv3", 41)
+    lab.measure(41, "inv2", "inv3")
+    lab.measure(42, "inv2", "inv3")
+
+    assert lab.missing == [("State(41)", "inv2")]
+
+
+def test_who_is_off_the_roster_is_not_awaited() -> None:
+    """The measurement's roster ends the wait, though the token may still be there."""
+    lab = ticking("inv2", "inv3", tick=5)
+    lab.state("inv2", 4)
+    lab.measure(5, "inv2")
+
+    assert [state.seq for state in lab.decided] == [5]
+
+
+def test_a_dead_neighbours_last_value_counts_once_more() -> None:
+    """The wait ends with the token of the process that is awaited, not with a namesake's."""
+    lab = ticking("inv2", tick=5)
+    lab.measure(5, "inv2")
+    lab.token("inv2", "impostor", gone=True)
+    assert lab.decided == []
+
+    lab.token("inv2", gone=True)
+    assert [state.seq for state in lab.decided] == [5]
+    assert not lab.node.failed
+
+
+def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
+    """First the measurement, then the states; and the deadline says it."""
+    lab = ticking("inv2", "inv3", tick=5)
+    assert lab.missing == [("Measurement(5)", "plant")]
+    lab.measure(5, "inv2", "inv3")
+    lab.state("inv3", 4)
+
+    assert lab.missing == [("State(4)", "inv2")]
+    lab.node.expire(100.0)
+    assert lab.node.failed.startswith("inv1: no State(4) from inv2 within 20 s; last heard of inv2: tick ")
+
+
+@pytest.mark.parametrize(("k", "kind"), [(4, "stale"), (6, "unexpected")])
+def test_a_measurement_of_another_tick_is_refused(k: int, kind: str) -> None:
+    """Ticks are granted one by one."""
+    lab = ticking("inv2", tick=5)
+    lab.measure(k, "inv2")
+
+    assert lab.node.rejects.counts == {kind: 1}
+
+
+def test_a_second_measurement_of_a_tick_is_refused() -> None:
+    """A tick is granted once."""
+    lab = ticking("inv2", tick=5)
+    lab.measure(5, "inv2")
+    lab.measure(5, "inv2")
+
+    assert lab.node.rejects.counts == {"stale": 1}
+
+
+@pytest.mark.parametrize(("k", "kind"), [(3, "stale"), (6, "unexpected")])
+def test_a_state_of_neither_tick_is_refused(k: int, kind: str) -> None:
+    """It must be of the tick before, or of this one."""
+    lab = ticking("inv2", tick=5)
+    lab.state("inv2", k)
+
+    assert lab.node.rejects.counts == {kind: 1}

@@ -1,0 +1,333 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from msgspec.structs import replace
+
+from agents.realtime.realtime_agent import RealtimeAgent
+from tests.toy.toy_configs import agent_config
+from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
+from wire.messages import Leave, Stop
+
+
+def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:
+    """Seeking, waiting, running: each is said once and stands in the status; no state is sent before."""
+    lab = Lab(deadline=0.0)
+    lab.go(0.5)
+    first = lab.status()
+    lab.token("plant")
+    lab.go(0.5)
+    second = lab.status()
+    assert lab.decided() == []
+    lab.now += 0.5
+    lab.measure(0, P_set=64.7e3)
+    lab.go(0.0)
+
+    assert (first.phase, first.waits_for) == ("seeking", "the plant of run toy")
+    assert (second.phase, second.waits_for) == ("waiting", "a measurement of inv1 from the plant")
+    assert (lab.status().phase, lab.status().waits_for) == ("running", "")
+    assert [state.P_set for state in lab.decided()] == [64.7e3]
+    assert len(lab.said) == 2
+
+
+def test_without_any_plant_it_gives_up_after_the_deadline() -> None:
+    """The message says which run was sought and how long."""
+    lab = Lab(deadline=3.0)
+    lab.go(2.9)
+    assert not lab.side.over
+    lab.go(0.2)
+
+    assert lab.side.over
+    assert lab.side.failed == "inv1: no plant of run toy within 3 s"
+
+
+def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
+    """Due times are n T_c / speed from the middle between two measurements; a late wake does one tick, not many."""
+    lab = running(speed=2.0)
+    start = 100.005
+    lab.go(0.015)
+    assert lab.side.until == pytest.approx(start + 0.020)
+    lab.go(0.037)
+
+    assert len(lab.decided()) == 2
+    assert lab.side.statistics.missed == 2
+    assert lab.side.until == pytest.approx(start + 0.050)
+
+
+def test_a_silent_neighbour_is_out_after_max_age_and_back_with_its_next_state() -> None:
+    """Age counts from the arrival, on the own clock; a frozen process keeps its token."""
+    lab = running("inv2")
+    lab.state("inv2", 0)
+    lab.measure(1)
+    lab.go(T_C)
+    pulled = lab.decided()[0].P_set
+    for k in range(2, 20):
+        lab.measure(k)
+        lab.go(T_C)
+    aged = lab.decided()
+    lab.state("inv2", 1, t=0.38)
+    lab.go(T_C)
+
+    assert pulled > 50e3
+    steps = [b.P_set - a.P_set for a, b in pairwise(aged)]
+    moving = sum(step > 0.0 for step in steps)
+    assert 0.25 / T_C - 4 <= moving <= 0.25 / T_C
+    assert all(step == 0.0 for step in steps[moving:])
+    assert lab.decided()[0].P_set > aged[-1].P_set
+
+
+def test_a_state_that_was_long_on_its_way_is_old_when_it_comes() -> None:
+    """After a cut, buffered states arrive in a bunch: their run time tells."""
+    lab = running("inv2")
+    lab.measure(100)
+    lab.state("inv2", 7, t=1.0)
+    lab.go(T_C)
+
+    assert lab.decided()[0].P_set == 50e3
+
+
+def test_a_neighbour_in_another_island_is_left_out() -> None:
+    """Its state says where it stands; the status shows it as a neighbour that is not used."""
+    lab = running("inv2", "inv3")
+    for k in range(1, 30):
+        lab.measure(k)
+        lab.state("inv2", k, t=k * T_C, island="inv2")
+        lab.state("inv3", k, t=k * T_C, P_set=50e3)
+        lab.go(T_C)
+
+    assert {state.P_set for state in lab.decided()} == {50e3}
+    assert lab.status().neighbours == ("inv2", "inv3")
+    assert lab.status().used == ("inv3",)
+
+
+def test_a_lost_token_takes_a_neighbour_out_at_once() -> None:
+    """Leaving and dying are seen alike."""
+    lab = running("inv2")
+    lab.state("inv2", 0)
+    lab.token("inv2", gone=True)
+    lab.measure(1)
+    lab.go(T_C)
+
+    assert lab.decided()[0].P_set == 50e3
+
+
+def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
+    """A new process counts from 0 again; what its former life still sends is dropped."""
+    lab = running("inv2")
+    lab.state("inv2", 500)
+    lab.token("inv2", gone=True)
+    lab.token("inv2", "b")
+    lab.plate("inv2", "b", life=2)
+    lab.state("inv2", 501, P_set=0.0)
+    lab.measure(1)
+    lab.go(T_C)
+    ghost = lab.decided()[0].P_set
+    lab.state("inv2", 0, incarnation=2)
+    lab.measure(2)
+    lab.go(T_C)
+
+    assert ghost == 50e3
+    assert lab.decided()[0].P_set > 50e3
+    assert lab.side.rejects.counts["ghost"] == 1
+
+
+def test_a_second_process_of_a_name_waits_until_the_first_is_gone() -> None:
+    """Somebody that only claims a neighbour's name does not push it out."""
+    lab = running("inv2")
+    lab.token("inv2", "b")
+    lab.plate("inv2", "b", life=2)
+    lab.state("inv2", 0)
+    lab.measure(1)
+    lab.go(T_C)
+    assert lab.decided()[0].P_set > 50e3
+    lab.state("inv2", 1, incarnation=2)
+    assert lab.side.rejects.counts["ghost"] == 1
+
+    lab.token("inv2", "a", gone=True)
+    lab.state("inv2", 2, incarnation=2)
+    assert lab.side.rejects.counts["ghost"] == 1
+
+
+def test_it_holds_while_no_measurement_comes_and_returns_from_what_the_plant_holds() -> None:
+    """No state goes out on old readings; the return starts from the set-points of the measurement."""
+    lab = running()
+    for k in range(1, 5):
+        lab.measure(k, f=59.7)
+        lab.go(T_C)
+    before = lab.decided()[-1]
+    for _ in range(30):
+        lab.go(T_C)
+    held = lab.decided()
+    lab.measure(60, P_set=70e3, f=60.0)
+    lab.go(T_C)
+
+    assert len(held) <= 0.25 / T_C
+    assert held[-1].P_set > before.P_set
+    assert [state.P_set for state in lab.decided()] == [70e3]
+    assert [line.split(" at ")[0] for line in lab.said[-2:]] == [
+        "inv1: no measurement of late; holds",
+        "inv1: goes on",
+    ]
+
+
+def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
+    """Nothing is decided between; the new plant begins at t = 0 with other set-points, the old one is a ghost."""
+    lab = running()
+    lab.measure(500)
+    lab.token("plant", gone=True)
+    lab.go(T_C)
+    assert lab.decided() == []
+    lab.go(0.5)
+    assert lab.status().phase == "seeking"
+    lab.token("plant", epoch=2)
+    lab.measure(0, incarnation=2, P_set=33e3)
+    lab.measure(501)
+    lab.go(T_C)
+
+    assert [state.P_set for state in lab.decided()] == [33e3]
+    assert lab.side.rejects.counts["ghost"] == 1
+
+
+def test_woken_late_it_drops_what_it_knew() -> None:
+    """After SIGCONT what lies in the inbox is seconds old, though it comes in now."""
+    lab = running("inv2")
+    lab.now += 3.0
+    lab.measure(1)
+    lab.state("inv2", 0)
+    lab.go(0.0)
+    assert lab.decided() == []
+    lab.measure(160, P_set=61e3)
+    lab.go(T_C)
+
+    assert [state.P_set for state in lab.decided()] == [61e3]
+
+
+def test_it_leaves_properly() -> None:
+    """Leave goes out, of itself or at the plant's word; it closes when the plant answers; refused, it just closes."""
+    asked, stopped, refused = running(), running(), Lab()
+    refused.token("plant")
+    asked.side.leave("asked to leave: SIGTERM")
+    asked.do()
+    stop = Stop(sender="plant", incarnation=1, seq=0, t=0.0, reason="inv1 was stopped by command")
+    stopped.hear(KEYS.dismissal("inv1", "me"), stop)
+    refused.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1: another agent", refused=True))
+
+    assert [lab.side.over for lab in (asked, stopped, refused)] == [False, False, True]
+    for lab in (asked, stopped):
+        lab.go(T_C)
+        assert lab.decided()[1:] == []
+        lab.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1 has left"))
+
+    assert asked.side.over
+    assert stopped.side.over
+    assert [lab.side.stopped for lab in (asked, stopped)] == ["asked to leave: SIGTERM", stop.reason]
+    assert refused.side.failed == "inv1: another agent"
+    leaves = [[m for m in lab.published if isinstance(m, Leave)] for lab in (asked, stopped, refused)]
+    assert [len(leave) for leave in leaves] == [1, 1, 0]
+
+
+def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
+    """A plant that is frozen keeps nobody; where there is none, nothing is waited for."""
+    frozen, alone = running(), Lab()
+    frozen.side.leave("asked to leave: SIGTERM")
+    alone.side.leave("asked to leave: SIGTERM")
+    assert alone.side.over
+    for _ in range(50):
+        assert not frozen.side.over
+        frozen.go(T_C)
+
+    assert frozen.side.stopped == "asked to leave: SIGTERM"
+
+
+def test_gaps_in_the_numbers_are_counted_as_lost() -> None:
+    """Zenoh drops silently; the numbers tell."""
+    lab = running("inv2")
+    for seq in (0, 1, 4):
+        lab.state("inv2", seq)
+    lab.measure(3)
+
+    assert lab.side.statistics.lost == 2 + 2
+
+
+def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
+    """A question can die with the link it went over, though the other's token stays; the answer ends the asking."""
+    lab = running()
+    lab.token("inv2")
+    lab.go(0.5)
+    lab.go(0.5)
+    lab.plate("inv2")
+    lab.go(0.5)
+
+    assert lab.fetched.count(KEYS.nameplate("inv2", "a")) == 3
+    assert lab.listened == [KEYS.state("inv2")]
+
+
+def test_a_plant_whose_clock_lags_is_followed_once_the_old_token_is_gone() -> None:
+    """Its epoch is lower than its predecessor's, whose last words count for nothing from then on."""
+    lab = Lab()
+    lab.token("plant", epoch=900)
+    lab.measure(500, incarnation=900)
+    lab.go(0.0)
+    lab.token("plant", epoch=40)
+    lab.measure(0, incarnation=40, P_set=33e3)
+    lab.measure(501, incarnation=900)
+    lab.go(T_C)
+    before = [state.P_set for state in lab.decided()]
+    lab.token("plant", epoch=900, gone=True)
+    lab.measure(502, incarnation=900)
+    lab.measure(1, incarnation=40, P_set=33e3)
+    lab.go(T_C)
+
+    assert before == [50e3, 50e3]
+    assert [state.P_set for state in lab.decided()] == [33e3]
+    assert lab.side.rejects.counts == {"ghost": 2}
+
+
+def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
+    """A ghost's Stop, or one in an epoch that no token has, is dropped under either key."""
+    lab = running()
+    for key in (KEYS.control, KEYS.dismissal("inv1", "me")):
+        for epoch in (0, 2):
+            lab.hear(key, Stop(sender="plant", incarnation=epoch, seq=0, t=0.0, reason="enough", refused=True))
+        lab.hear(key, Stop(sender="inv2", incarnation=1, seq=0, t=0.0, reason="enough", refused=True))
+    lab.go(T_C)
+
+    assert not lab.side.over
+    assert lab.side.rejects.counts == {
+        "ghost": 4,
+        "foreign": 2,
+    }
+    assert len(lab.decided()) == 1
+
+
+def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
+    """The last line of defence: an error of ours is counted and logged once, with its traceback; the agent goes on."""
+    lab = running("inv2")
+
+    def broken(*_: object) -> None:
+        raise KeyError("\x1b[31m")
+
+    lab.side._routes[KEYS.state("inv2")] = lab.side._routes[KEYS.state("inv2")]._replace(handle=broken)
+    for k in range(1, 4):
+        lab.state("inv2", k)
+    lab.measure(1)
+    lab.go(T_C)
+    (line,) = lab.side.rejects.take_lines()
+
+    assert lab.side.rejects.counts == {"failed": 3}
+    assert "KeyError" in line
+    assert "Traceback (most recent call last)" in line
+    assert "in broken" in line
+    assert "\x1b" not in line
+    assert len(lab.decided()) == 1
+
+
+def test_a_token_that_no_plant_can_hold_is_no_plant() -> None:
+    """Anybody may hold a token alive/plant/x; whoever sees it goes on seeking."""
+    side = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "a")
+    side.start(0.0)
+    side.appeared("gridpeers/toy/alive/plant/x", 0.0)
+
+    assert side.phase == "seeking"
+    assert not side.plant_seen

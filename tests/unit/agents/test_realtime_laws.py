@@ -1,0 +1,84 @@
+"""Laws in wall-clock time: one that does not tell its neighbours, and one that fails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+from tests.unit.agents.realtime_lab import KEYS, T_C, running
+from wire.messages import State
+
+
+class Quiet(Law):
+    """Counts up, and tells nobody after the first step; shares its count."""
+
+    def start(self, own: Own) -> None:
+        """Count from zero."""
+        self.steps = 0
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Count."""
+        self.steps += 1
+        return SetPoints(0.5, 1.0, {"steps": float(self.steps)}, send=self.steps == 1)
+
+
+class Divides(Law):
+    """Fails at its second step."""
+
+    def start(self, own: Own) -> None:
+        """Count from zero."""
+        self.steps = 0
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Divide by what is left."""
+        self.steps += 1
+        return SetPoints(0.5 / (2 - self.steps), 1.0)
+
+
+def test_who_does_not_tell_tells_the_plant_alone_and_gives_a_sign_before_it_counts_as_silent() -> None:
+    """Neighbours drop a state after 0.25 s: at half of that they are told, and which numbers they did not miss."""
+    lab = running(law=Quiet())
+    for k in range(1, 14):
+        lab.measure(k)
+        lab.go(T_C)
+    states = lab.decided()
+    told = [state for state in states if not state.quiet]
+
+    assert [state.shared["steps"] for state in states] == [float(i) for i in range(2, 15)]
+    assert [round(state.t, 2) for state in told] == [0.14]
+    assert told[0].skipped == 6
+    keys = [key for key in lab.keys if key in (KEYS.state("inv1"), KEYS.set_points("inv1"))]
+    assert (
+        keys
+        == [KEYS.state("inv1")] + [KEYS.set_points("inv1")] * 6 + [KEYS.state("inv1")] + [KEYS.set_points("inv1")] * 6
+    )
+
+
+def test_what_was_not_told_does_not_count_as_lost() -> None:
+    """Six numbers that the neighbour skipped are no gap; two more are."""
+    lab = running("inv2")
+    lab.state("inv2", 0)
+    lab.state("inv2", 7, t=0.14, skipped=6)
+    before = lab.side.statistics.lost
+    lab.state("inv2", 12, t=0.24, skipped=2)
+
+    assert (before, lab.side.statistics.lost) == (0, 2)
+
+
+def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None:
+    """The plant hears why in a last state, which nobody uses; the log has it too.
+
+    That the plant does not hear it from then on is no reason for a new session.
+    """
+    lab = running("inv2", law=Divides())
+    for k in range(1, 300):
+        lab.measure(k, roster=("inv1", "inv2") if k < 10 else ("inv2",))
+        lab.state("inv2", k, k * T_C)
+        lab.go(T_C)
+    said: list[State] = lab.decided()
+
+    assert [state.idle for state in said] == [True]
+    assert said[0].fault == "law consensus: step at t = 0.02 s raised ZeroDivisionError: float division by zero"
+    assert lab.said[-1].startswith("inv1: law consensus: step at t = 0.02 s raised ZeroDivisionError")
+    assert not lab.side.over
+    assert not lab.side.session_broken

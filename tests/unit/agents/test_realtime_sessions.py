@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import pytest
+
+from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
+from wire.messages import State, Waiting
+
+
+def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:
+    """A link half renewed after a cut can mislead messages for good; before the first measurement one waits."""
+    lab = Lab()
+    lab.token("plant")
+    for _ in range(20):
+        lab.go(0.5)
+    assert not lab.side.over
+
+    lab.measure(1)
+    lab.go(T_C)
+    assert lab.side.phase == "running"
+    for _ in range(8):
+        lab.go(0.5)
+    assert not lab.side.over
+    lab.go(0.5)
+    assert lab.side.session_broken
+    assert lab.side.over
+    assert lab.side.failed == ""
+
+
+def test_messages_under_anothers_key_open_no_session_as_long_as_their_sender_is_heard() -> None:
+    """Anybody may publish them, dozens at once: what proves a confused session is that the true ones are missing."""
+    lab = running("inv2", "inv3")
+    for k in range(1, 300):
+        lab.measure(k, roster=("inv1", "inv2", "inv3"))
+        for name, other in (("inv2", "inv3"), ("inv3", "inv2")):
+            lab.state(name, k, k * T_C)
+            for extra in range(12):
+                said = State(sender=other, incarnation=1, seq=k + extra, t=k * T_C, P_set=0.0, V_set=277.0, Q=0.0)
+                lab.hear(KEYS.state(name), said)
+                lab.hear(KEYS.measurement("inv1"), said)
+        lab.go(T_C)
+
+    assert not lab.side.over
+    assert lab.status().used == ("inv2", "inv3")
+
+
+def test_messages_under_anothers_key_prove_a_confused_session_once_their_sender_is_silent() -> None:
+    """Then it need not be waited for any longer: the plant hears inv3, and its states come here under inv2's key."""
+    lab = running("inv2", "inv3")
+    k = 0
+    while not lab.side.over and k < 400:
+        k += 1
+        lab.measure(k, roster=("inv1", "inv2", "inv3"))
+        lab.state("inv2", k, k * T_C)
+        lab.hear(KEYS.state("inv2"), State(sender="inv3", incarnation=1, seq=k, t=0.0, P_set=0.0, V_set=277.0, Q=0.0))
+        lab.go(T_C)
+
+    assert lab.side.session_broken
+    assert lab.said[-1] == "inv1: messages of inv3 come under the key of inv2; opens a new session"
+    assert k * T_C < 1.2
+
+
+@pytest.mark.parametrize(
+    ("roster", "heard", "why"),
+    [
+        (("inv1", "inv2", "inv3"), ("inv2",), "the plant hears inv3, but nothing comes from it here"),
+        (("inv1", "inv2", "inv7"), ("inv2", "inv3"), "the plant hears inv7, but nothing comes from it here"),
+        (("inv2", "inv3"), ("inv2", "inv3"), "the plant is heard, but does not hear this agent"),
+    ],
+)
+def test_whoever_hears_less_than_the_plant_opens_a_new_session(
+    roster: tuple[str, ...], heard: tuple[str, ...], why: str
+) -> None:
+    """The plant hears a neighbour, met or not, and the agent does not; or the plant does not hear the agent."""
+    lab = running("inv2", "inv3")
+    k = 0
+    while not lab.side.over and k < 400:
+        k += 1
+        lab.measure(k, roster=roster)
+        for name in heard:
+            lab.state(name, k, k * T_C)
+        lab.go(T_C)
+
+    assert lab.side.session_broken
+    assert lab.said[-1] == f"inv1: {why}; opens a new session"
+    assert 3.4 < k * T_C < 4.7
+
+
+def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_session() -> None:
+    """Who is frozen, dead or waiting is silent for everybody."""
+    lab = running("inv2", "inv3")
+    for k in range(1, 400):
+        lab.measure(k, roster=("inv1", "inv2"))
+        lab.state("inv2", k, k * T_C)
+        lab.go(T_C)
+
+    assert not lab.side.over
+
+
+def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_then() -> None:
+    """A half renewed link can hide a plant that is there; each new session is given twice the time, up to a minute."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    lasted = []
+    for _ in range(6):
+        began = lab.now
+        while not lab.side.over:
+            lab.go(0.5)
+        lasted.append(lab.now - began)
+        lab.side.start(lab.now)
+
+    assert lab.side.phase == "seeking"
+    assert lasted == pytest.approx([4.5, 7.0, 14.0, 28.0, 56.0, 60.0], abs=1.1)
+    assert lab.said[-1] == "inv1: nothing comes from the plant; opens a new session"
+
+
+def test_a_session_that_once_was_whole_is_no_reason_for_more_patience() -> None:
+    """Every cut that heals badly is mended as soon as the first; nothing is remembered of those that were mended."""
+    lab = running("inv2")
+    k, lasted = 0, []
+    for _ in range(4):
+        lab.token("plant")
+        lab.meet("inv2")
+        for _ in range(10):
+            k += 1
+            lab.measure(k, roster=("inv1", "inv2"))
+            lab.state("inv2", k, k * T_C)
+            lab.go(T_C)
+        began = lab.now
+        while not lab.side.over:
+            lab.go(T_C)
+        lasted.append(lab.now - began)
+        lab.side.start(lab.now)
+
+    assert lasted == pytest.approx([4.5] * 4, abs=0.1)
+
+
+def test_an_agent_that_has_never_had_a_plant_keeps_its_session() -> None:
+    """Nothing says that one is there."""
+    lab = Lab()
+    for _ in range(20):
+        lab.go(0.5)
+
+    assert not lab.side.session_broken
+
+
+def test_a_plant_that_says_it_waits_is_not_silent() -> None:
+    """A new plant measures nothing until all are there: agents keep their sessions and tell for whom it waits."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    lab.go(2.0)
+    lab.token("plant", epoch=2)
+    for _ in range(40):
+        lab.hear(KEYS.control, Waiting(sender="plant", incarnation=2, seq=0, t=0.0, waits_for=("inv3", "inv4")))
+        lab.go(0.5)
+    assert not lab.side.over
+    assert lab.status().waits_for == "a measurement of inv1 from the plant, which waits for inv3, inv4"
+
+    for _ in range(9):
+        lab.go(0.5)
+    assert lab.side.session_broken
+
+
+def test_a_plant_that_has_appeared_has_time_to_speak() -> None:
+    """Of a session that is closed just as a new plant has come it would say that its agent died."""
+    lab = Lab()
+    lab.token("plant")
+    lab.measure(1)
+    lab.go(T_C)
+    lab.token("plant", gone=True)
+    for _ in range(8):
+        lab.go(0.5)
+    lab.token("plant")
+    for _ in range(8):
+        lab.go(0.5)
+
+    assert not lab.side.over

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from agents.realtime.tick_timer import CONVINCED, EARLIEST, LATEST, TickTimer
+
+T = 0.020
+
+
+def phases(timer: TickTimer, first: float, count: int, *, drift: float = 0.0, jitter: float = 0.0) -> list[float]:
+    """Where between two measurements each of so many ticks is (periods); the first measurement comes at `first`."""
+    rng, seen, k = random.Random(1), [], 0
+    at = first
+    while len(seen) < count:
+        if at <= timer.due:
+            timer.measured(at)
+            k += 1
+            at = first + k * T * (1.0 + drift) + rng.uniform(0.0, jitter)
+        else:
+            now = timer.due
+            timer.take(now)
+            seen.append(math.fmod(now - first, T * (1.0 + drift)) / T)
+    return seen
+
+
+@pytest.mark.parametrize("offset", [i / 16 for i in range(1, 17)])
+def test_from_the_second_tick_on_an_agent_keeps_to_the_middle_between_two_measurements(offset: float) -> None:
+    """Wherever in the period it happens to begin; and it ticks once a period, not more, not less."""
+    timer = TickTimer(T)
+    timer.start(5.0)
+    seen = phases(timer, 5.0 - offset * T, 200)
+
+    assert all(EARLIEST - 1e-6 <= phase <= LATEST + 1e-6 for phase in seen[1:])
+    assert 5.0 + 198.4 * T <= timer.due - T <= 5.0 + 199.6 * T
+
+
+def test_a_clock_that_drifts_against_the_plants_is_led_back_to_the_middle() -> None:
+    """50 ppm of drift and a few milliseconds of jitter bring no tick to the time at which measurements come."""
+    timer = TickTimer(T)
+    timer.start(5.0)
+    seen = phases(timer, 4.995, 20_000, drift=5e-5, jitter=0.003)
+
+    assert min(seen[1:]) > EARLIEST - 0.05
+    assert max(seen[1:]) < LATEST + 0.20
+    assert max(seen[1:]) - min(seen[1:]) > 0.2, "it drifts"
+
+
+def test_one_late_measurement_moves_nothing() -> None:
+    """A plant that was late once is no reason to change the time of the ticks."""
+    timer = TickTimer(T)
+    timer.start(5.0)
+    for k in range(10):
+        timer.measured(4.990 + k * T)
+        timer.take(timer.due)
+    due = timer.due
+    for k in range(CONVINCED - 1):
+        timer.measured(due + k * T - 0.001)
+        timer.take(timer.due)
+
+    assert timer.due == pytest.approx(due + (CONVINCED - 1) * T)
+
+
+def test_a_clock_that_is_to_drift_drifts() -> None:
+    """The ticks of an emulated drifting clock are left alone: the drift is what is studied."""
+    timer = TickTimer(T, keeps_clear=False)
+    timer.start(5.0)
+    seen = phases(timer, 4.999, 3000, drift=1e-3)
+
+    assert min(seen) < 0.05
+    assert max(seen) > 0.95

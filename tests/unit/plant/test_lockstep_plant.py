@@ -1,0 +1,307 @@
+"""The plant under simulated time: who may take part, what each phase waits for, who comes and goes."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from plant.config import Move
+from plant.lockstep_plant import LockstepPlant
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_plant import ToyPlant
+from wire.actions import Fetch, Publish
+from wire.codec import decode, encode
+from wire.keys import Keys
+from wire.messages import Measurement, Message, PlantEvent, Prepare, Ready, State, Stop, Telemetry
+
+KEYS = Keys("toy")
+NAMES = ("inv1", "inv2", "inv3", "inv4")
+STAYS = "its inverter stays on primary droop at its last set-points"
+
+
+class Lab:
+    """The toy plant with all agents played by the test; the process of an agent is its name."""
+
+    def __init__(
+        self,
+        *moves: tuple[float, str, Literal["leave", "join", "die"]],
+        n: int = 4,
+        spares: tuple[str, ...] = (),
+        **changes: Any,
+    ) -> None:
+        config, _ = toy_configs(n, spares=spares)
+        config = replace(
+            config, **changes, moves=tuple(Move(t=t, inverter=name, action=action) for t, name, action in moves)
+        )
+        self.toy = ToyPlant(config)
+        self.node = LockstepPlant(config, self.toy)
+        self.now = 0.0
+        self.sent: list[tuple[str, Message]] = []
+        self.asked: list[tuple[str, ...]] = []
+        self.node.start(self.now)
+        self.do()
+
+    def do(self) -> None:
+        """Take the actions, and let it work."""
+        while True:
+            for action in self.node.take_actions():
+                if isinstance(action, Publish):
+                    self.sent.append((action.key, decode(action.payload)))
+                elif isinstance(action, Fetch):
+                    self.asked.append(KEYS.parts(action.key)[1:])
+            if not self.node.work(self.now):
+                return
+
+    def token(self, name: str, instance: str = "", *, gone: bool = False) -> None:
+        """A token of an agent comes or goes."""
+        key = KEYS.alive_agent(name, instance or name)
+        (self.node.vanished if gone else self.node.appeared)(key, self.now)
+        self.do()
+
+    def recorder(self, name: str) -> None:
+        """A recorder comes."""
+        self.node.appeared(KEYS.alive_recorder(name), self.now)
+        self.do()
+
+    def hear(self, key: str, message: Message) -> None:
+        """A message comes in."""
+        self.node.received(key, encode(message), self.now)
+        self.do()
+
+    def join(self, *names: str) -> None:
+        """Agents come, and answer for their nameplates."""
+        for name in names:
+            self.token(name)
+            self.hear(KEYS.nameplate(name, name), Agent(agent_config(name)).nameplate)
+
+    def ready(self, number: int, *names: str) -> None:
+        """Agents are ready for a roster."""
+        for name in names:
+            self.hear(KEYS.ready(name), Ready(sender=name, incarnation=1, seq=number, t=0.0))
+
+    def state(self, k: int, *names: str) -> None:
+        """States of tick k."""
+        for name in names:
+            state = State(sender=name, incarnation=1, seq=k, t=round(0.02 * k, 9), P_set=5e4, V_set=277.0, Q=0.0)
+            self.hear(KEYS.state(name), state)
+
+    def tick(self, count: int) -> None:
+        """Let the whole roster do ticks."""
+        for _ in range(count):
+            self.state(self.node.tick, *self.last(Prepare).roster)
+
+    def last(self, kind: type[Any]) -> Any:
+        """The last message of a type."""
+        return [message for _, message in self.sent if isinstance(message, kind)][-1]
+
+    def stopped(self) -> dict[tuple[str, ...], tuple[str, bool]]:
+        """Processes that were told to close: why, and whether they were refused."""
+        stops = [(KEYS.parts(key), message) for key, message in self.sent if isinstance(message, Stop)]
+        return {parts[1:]: (message.reason, message.refused) for parts, message in stops if parts[0] == "dismissal"}
+
+    def events(self) -> list[str]:
+        """What was noted of agents, once the run has been ended."""
+        self.node.abort("enough", self.now)
+        self.do()
+        telemetry = [message for _, message in self.sent if isinstance(message, Telemetry)]
+        noted: list[PlantEvent] = [event for message in telemetry for event in message.events]
+        return [event.text for event in noted if event.kind == "roster"]
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """Who is awaited, and for what."""
+        return [(what, who) for what, who in self.node.missing()]
+
+
+def ticking(*moves: tuple[float, str, Literal["leave", "join", "die"]], **changes: Any) -> Lab:
+    """A plant that ticks with everybody of its configuration."""
+    lab = Lab(*moves, **changes)
+    names = lab.node.config.agents
+    lab.join(*names)
+    lab.ready(0, *names)
+    assert lab.node.phase == "ticking"
+    return lab
+
+
+# ---------------------------------------------------------------- who takes part
+
+
+def test_of_two_processes_of_a_name_the_first_takes_part() -> None:
+    """The other is refused."""
+    lab = Lab()
+    lab.token("inv1", "a")
+    lab.token("inv1", "b")
+
+    assert lab.asked == [("inv1", "a")]
+    reason, refused = lab.stopped()["inv1", "b"]
+    assert refused
+    assert "another agent of this name takes part" in reason
+
+
+def test_who_may_come_depends_on_the_time() -> None:
+    """A stranger never, a spare only when the tick is held for it, anybody else only before the start."""
+    lab = Lab((0.1, "inv4", "join"), spares=("inv4",))
+    lab.token("inv9")
+    lab.token("inv4")
+    assert lab.stopped()["inv9", "inv9"][0].endswith("only for inv1, inv2, inv3, inv4")
+    assert "join later" in lab.stopped()["inv4", "inv4"][0]
+
+    lab.join("inv1", "inv2", "inv3")
+    lab.ready(0, "inv1", "inv2", "inv3")
+    lab.token("inv3", gone=True)
+    lab.token("inv4", "early")
+    lab.token("inv3", "again")
+    assert "the run has begun, at t = 0 s" in lab.stopped()["inv4", "early"][0]
+    assert "the run has begun, at t = 0 s" in lab.stopped()["inv3", "again"][0]
+    lab.state(0, "inv1", "inv2")
+    lab.ready(1, "inv1", "inv2")
+    lab.tick(4)
+    assert lab.node.phase == "joining"
+    lab.token("inv4", "now")
+    assert ("inv4", "now") not in lab.stopped()
+
+
+def test_the_roster_is_in_the_order_of_the_configuration() -> None:
+    """Not in that of arrival: sums over it must round alike in every run."""
+    lab = Lab()
+    lab.join(*reversed(NAMES))
+
+    prepare = lab.last(Prepare)
+    assert (prepare.seq, prepare.roster, prepare.instances) == (0, NAMES, NAMES)
+
+
+# ---------------------------------------------------------------- what it waits for
+
+
+def test_before_the_start_agents_and_recorders_are_awaited() -> None:
+    """Tokens before nameplates, recorders last."""
+    lab = Lab(n=3, recorders=("fleet",))
+    lab.token("inv1")
+    lab.join("inv3")
+    assert lab.missing == [("token", "inv2"), ("nameplate", "inv1"), ("token", "fleet")]
+
+    lab.recorder("fleet")
+    assert lab.missing == [("token", "inv2"), ("nameplate", "inv1")]
+
+
+def test_everybody_must_be_ready_for_this_roster() -> None:
+    """Word on an earlier one is stale; whoever dies after the beginning is not awaited."""
+    lab = ticking((0.02, "inv1", "die"))
+    lab.state(0, *NAMES)
+    assert lab.missing == [("Ready(1)", name) for name in NAMES[1:]]
+
+    lab.ready(0, "inv2")
+    assert lab.node.rejects.counts == {"stale": 1}
+    lab.ready(1, "inv2")
+    lab.token("inv3", gone=True)  # nobody can get ready to hear the dead: the next roster is without it
+    lab.ready(2, "inv2", "inv4")
+    assert lab.node.phase == "ticking"
+
+
+def test_one_state_of_everybody_is_awaited_at_a_tick() -> None:
+    """`wanted` counts down to one, and what is missing is named in the order of the roster."""
+    lab = ticking()
+    assert lab.missing == [("State(0)", name) for name in NAMES]
+    assert lab.node.wanted == 4
+    lab.state(0, "inv1", "inv4", "inv3")
+    assert (lab.missing, lab.node.wanted) == ([("State(0)", "inv2")], 1)
+
+    lab.state(0, "inv2")
+    assert lab.node.tick == 1
+    assert lab.last(Measurement).seq == 1
+
+
+@pytest.mark.parametrize(("k", "kind"), [(3, "stale"), (4, "stale"), (5, "unexpected")])
+def test_a_state_that_is_not_awaited_is_refused(k: int, kind: str) -> None:
+    """One of another tick, and a second one of this tick."""
+    lab = ticking()
+    lab.tick(4)
+    lab.state(4, "inv1")
+    lab.state(k, "inv1")
+
+    assert lab.node.rejects.counts == {kind: 1}
+
+
+def test_the_deadline_names_who_is_missing() -> None:
+    """Who, what, for how long, and the last sign of life; then the run is over for all."""
+    lab = ticking()
+    lab.now = 3.0
+    lab.state(0, "inv1", "inv3", "inv4")
+    lab.node.expire(lab.node.until or 0.0)
+    lab.do()
+
+    assert lab.node.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.0 s ago"
+    assert lab.node.phase == "closing"
+
+
+# ---------------------------------------------------------------- leaving, joining, dying
+
+
+def test_who_leaves_is_told_before_its_inverter_goes_off() -> None:
+    """All leave, then some die, whose inverters stay; then those who join are announced and awaited."""
+    lab = ticking((0.1, "inv1", "die"), (0.1, "inv4", "join"), (0.1, "inv2", "leave"), spares=("inv4",))
+    lab.tick(5)
+
+    left, died = "inv2 leaves at t = 0.1 s, as the scenario says", "inv1 dies at t = 0.1 s, as the scenario says"
+    assert {process: reason for process, (reason, _) in lab.stopped().items()} == {
+        ("inv2", "inv2"): left,
+        ("inv1", "inv1"): f"{died}; {STAYS}",
+    }
+    assert (lab.node.phase, lab.missing) == ("joining", [("token", "inv4")])
+    assert lab.last(Telemetry).awaited == ("inv4",)
+    lab.token("inv4")
+    assert lab.missing == [("nameplate", "inv4")]
+    lab.join("inv4")
+    assert lab.last(Prepare).roster == ("inv3", "inv4")
+    readings = lab.toy.measure()
+    assert (readings["inv2"].P, readings["inv1"].P > 0.0) == (0.0, True)
+    assert lab.events() == [left, f"{died}; {STAYS}", "inv4 joins at t = 0.1 s, as the scenario says"]
+
+
+def test_who_is_there_is_not_awaited_though_it_is_to_join() -> None:
+    """An agent that leaves and joins at one tick is awaited anew; one that has never left is not."""
+    lab = ticking((0.1, "inv1", "join"), (0.1, "inv2", "leave"), (0.1, "inv2", "join"))
+    lab.tick(5)
+
+    assert lab.missing == [("token", "inv2")]
+
+
+def test_who_is_dismissed_after_its_death_has_no_process_to_be_told() -> None:
+    """Its inverter goes off all the same."""
+    lab = ticking((0.1, "inv2", "leave"))
+    lab.token("inv2", gone=True)
+    lab.state(0, "inv1", "inv3", "inv4")
+    lab.ready(1, "inv1", "inv3", "inv4")
+    lab.tick(4)
+
+    assert lab.stopped() == {}
+    assert lab.toy.measure()["inv2"].P == 0.0
+
+
+def test_a_death_before_the_first_tick_breaks_the_run() -> None:
+    """It would be another run; so is one without the newcomer for whom the tick is held."""
+    lab = Lab()
+    lab.join(*NAMES)
+    lab.token("inv1", gone=True)
+    assert lab.node.outcome == "inv1 died before the run began"
+
+    lab = ticking((0.1, "inv4", "join"), spares=("inv4",))
+    lab.tick(5)
+    lab.token("inv4")
+    lab.token("inv4", gone=True)
+    assert lab.node.outcome == "inv4 died at t = 0.1 s, before it had joined"
+
+
+def test_a_death_while_the_run_goes_on_is_told() -> None:
+    """The run goes on without the dead, and is not reproducible."""
+    lab = ticking()
+    lab.tick(10)
+    lab.token("inv2", gone=True)
+    lab.state(10, "inv1", "inv3", "inv4")
+
+    assert lab.last(Prepare).roster == ("inv1", "inv3", "inv4")
+    assert not lab.node.reproducible
+    assert lab.events() == [f"inv2 died at t = 0.2 s; {STAYS}"]

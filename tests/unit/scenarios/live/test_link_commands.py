@@ -1,0 +1,361 @@
+"""Orders to emulated links, from the plant's core to the agent's, on fake clocks; and what is typed and written."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from agents.realtime.link_command_receiver import LinkCommandReceiver
+from agents.realtime.realtime_agent import RealtimeAgent
+from netem.spec.change import Heal, schedule_of
+from netem.spec.fault import Fault
+from netem.spec.netem import Netem
+from netem.spec.node import NodeFault
+from netem.spec.pattern import Link, links_among
+from plant.realtime.link_command_sender import LinkCommandSender
+from plant.realtime.realtime_plant import RealtimePlant
+from scenarios.drivers import misfortunes
+from scenarios.drivers.misfortunes import Misfortunes
+from scenarios.emulation.links import EmulatedLinks
+from scenarios.emulation.orders import EVERYTHING, Order
+from scenarios.emulation.report import decode_stands
+from scenarios.emulation.setup import Setup
+from scenarios.live.book import replay_of
+from scenarios.spec import load_scenario
+from scenarios.spec.netem import netem_of, setup_of
+from scenarios.spec.writing import to_toml
+from tests.command_line import invoke
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_plant import ToyPlant
+from tests.unit.agents import realtime_lab as agent_side
+from tests.unit.plant import test_realtime_plant as plant_side
+from wire.codec import decode
+from wire.messages import LinkAnswer, LinkOrder, Measurement
+
+SETUP = Setup(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
+CUT = Order(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
+
+
+def agent_lab() -> agent_side.Lab:
+    """The agent of inv1, which ticks and hears inv2, behind links without a fault."""
+    lab = agent_side.Lab()
+    lab.side = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "me", EmulatedLinks("inv1", SETUP))
+    lab.side.start(lab.now)
+    lab.token("plant")
+    lab.meet("inv2")
+    return lab
+
+
+def order(lab: agent_side.Lab, number: int, t: float, text: str = CUT, life: int = 1) -> None:
+    """An order of the plant comes in."""
+    message = LinkOrder(sender="plant", incarnation=life, seq=number, t=t, text=text, reply_to="z1")
+    lab.hear(agent_side.KEYS.order("inv1"), message)
+
+
+def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
+    """What the agent has answered so far."""
+    return [(m.seq, m.ok, m.text) for m in lab.published if isinstance(m, LinkAnswer)]
+
+
+@given(st.integers(0, 10_000))
+def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
+    """Whatever is lost on either way, and however often the agent's process is a new one."""
+    rng, taken, now = random.Random(seed), list[str](), 0.0
+    wire: list[LinkOrder] = []
+
+    class Note:
+        def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
+            return text, ()
+
+        def order(self, text: str, t: float) -> str:
+            return text
+
+    class Taking(Note):
+        def order(self, text: str, t: float) -> str:
+            taken.append(text)
+            return text
+
+    def publish(key: str, payload: bytes) -> None:
+        message = decode(payload)
+        if key == plant_side.KEYS.order("inv1") and isinstance(message, LinkOrder):
+            wire.append(message)
+
+    plant = LinkCommandSender(1, plant_side.KEYS, Note(), publish)  # type: ignore[arg-type]
+    agent: Any = LinkCommandReceiver("inv1", 1, Taking())  # type: ignore[arg-type]
+    given_so_far = 0
+    for step in range(60):
+        loss = 0.5 if step < 45 else 0.0
+        now += 0.4
+        if rng.random() < 0.3 and step < 45:
+            given_so_far += 1
+            plant.give(str(given_so_far), now, "z1")
+        if rng.random() < 0.05 and step < 45:
+            plant.forget("inv1")
+            agent = LinkCommandReceiver("inv1", 1, Taking())  # type: ignore[arg-type]
+            taken.clear()
+        plant.send(("inv1",), now)
+        sent, wire[:] = list(wire), []
+        for command in sent:
+            answer = agent.take(command, now) if rng.random() >= loss else None
+            if answer is not None and rng.random() >= loss:
+                plant.answered(answer)
+    plant.send(("inv1",), now + 10.0)
+
+    assert taken == [str(number + 1) for number in range(given_so_far)]
+    assert wire == []
+
+
+def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_measurement() -> None:
+    """The plant tells everybody in the wake in which it hears of it; who joins later hears all before he measures."""
+    lab = plant_side.Lab(2)
+    config, _ = toy_configs(2, end=2.0)
+    lab.side = RealtimePlant(replace(config, clock="wall"), lab.toy, EmulatedLinks("plant", SETUP))
+    lab.side.start(lab.now)
+    lab.join("inv1")
+    lab.join("inv2")
+    lab.step(3)
+    lab.sent.clear()
+    lab.now = lab.side.until
+    answer = lab.ask("link", CUT)
+    lab.step()
+    kinds = [type(message) for key, message in lab.sent if key.endswith("/inv1")]
+    orders = lab.take(LinkOrder)
+    lab.token("inv2", gone=True)
+    lab.join("inv2", instance="b", life=2)
+    lab.step()
+    again = [(key, m.seq) for key, m in lab.sent if isinstance(m, LinkOrder)]
+
+    assert answer.ok
+    assert json.loads(answer.text) == {
+        "number": 1, "t": 0.08, "asked": ["inv1", "inv2"], "said": "inv2 -> inv1: cut", "receivers": ["inv1"]
+    }  # fmt: skip
+    assert kinds == [LinkOrder, Measurement]
+    assert {(m.seq, m.t, m.text) for m in orders} == {(1, 0.08, CUT)}
+    assert again == [(plant_side.KEYS.order("inv2"), 1)]
+    assert not lab.ask("link", Order(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_text()).ok
+    assert [event.text for event in lab.events("link")] == ["order 1 to links: inv2 -> inv1: cut, from t = 0.08 s on"]
+
+
+def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
+    """Of all links the cut one is healed, once; a fault that the scenario has for later is none, and still comes."""
+    later = Fault(on="inv1 -> plant", delay=0.1, from_s=5.0)
+    setup = replace(SETUP, netem=Netem(links=(later,)))
+    lab = plant_side.Lab(2)
+    config, _ = toy_configs(2, end=9.0)
+    links = EmulatedLinks("plant", setup)
+    lab.side = RealtimePlant(replace(config, clock="wall"), ToyPlant(config), links)
+    lab.side.start(lab.now)
+    lab.join("inv1", "inv2")
+    lab.ask("link", CUT)
+    lab.step()
+    heal = Order(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()
+    first = json.loads(lab.ask("link", heal).text)
+    lab.step()
+    again = json.loads(lab.ask("link", heal).text)
+    lab.step()
+
+    assert (first["said"], first["receivers"]) == ("inv2 -> inv1: healed", ["inv1"])
+    assert (again["said"], again["receivers"]) == ("all links: no link has a fault, nothing to heal", [])
+    assert [event.text.partition(", from")[0] for event in lab.events("link")[1:]] == [
+        "order 2 to links: inv2 -> inv1: healed",
+        "order 3 to links: all links: no link has a fault, nothing to heal",
+    ]
+    assert (links.impaired(4.9), links.impaired(5.0)) == ((), ("inv1",))
+
+
+def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> None:
+    """What stands in `link show` is impaired now or was, though messages over other links are counted as well."""
+    fault = Fault(on="inv2 -> inv1", loss=0.5, from_s=2.0, to_s=3.0)
+    links = EmulatedLinks("inv1", replace(SETUP, netem=Netem(links=(fault,))))
+    for k in range(200):
+        links.offer("inv2", k, 0.02 * k, 0.02 * k, b"state")
+
+    assert [set(decode_stands(links.standing(t))) for t in (1.9, 2.0, 4.0)] == [set(), {"inv2"}, {"inv2"}]
+
+
+def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() -> None:
+    """A lost message costs a second, not the order."""
+    lab = plant_side.Lab(2)
+    config, _ = toy_configs(2, end=9.0)
+    lab.side = RealtimePlant(replace(config, clock="wall"), ToyPlant(config), EmulatedLinks("plant", SETUP))
+    lab.side.start(lab.now)
+    lab.join("inv1", "inv2")
+    lab.ask("link", CUT)
+    answer = LinkAnswer(sender="inv2", incarnation=1, seq=1, t=0.0, ok=True, text="", reply_to="z1")
+    lab.hear(plant_side.KEYS.obeyed("inv2"), answer)
+    passed_on = [message for key, message in lab.sent if key == plant_side.KEYS.answer("z1")]
+    lab.step()
+    lab.sent.clear()
+    lab.step(60)
+
+    assert answer in passed_on
+    assert [key for key, m in lab.sent if isinstance(m, LinkOrder)] == [plant_side.KEYS.order("inv1")]
+
+
+def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
+    """What was sent before counts, what was sent from then on does not; healed, it does again."""
+    lab = agent_lab()
+    lab.measure(0)
+    lab.state("inv2", 0, 0.0, P_set=60e3)
+    order(lab, 1, 0.02)
+    lab.measure(1)
+    lab.state("inv2", 1, 0.02, P_set=90e3)
+    lab.go(0.0)
+    before = lab.age("inv2")
+    order(lab, 2, 0.04, Order(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
+    lab.measure(2)
+    lab.state("inv2", 2, 0.04, P_set=70e3)
+    lab.go(0.02)
+
+    assert (before, lab.age("inv2")) == (0.02, 0.0)
+    assert answers(lab) == [(1, True, "inv2 -> inv1"), (2, True, "inv2 -> inv1")]
+
+
+def test_before_the_plant_has_spoken_nothing_of_a_neighbour_is_used() -> None:
+    """An agent that is started again might otherwise hear through a link that was cut meanwhile."""
+    lab = agent_lab()
+    lab.state("inv2", 0, 3.0, P_set=90e3)
+    order(lab, 1, 2.0)
+    lab.measure(150)
+    lab.state("inv2", 1, 3.0, P_set=90e3)
+    lab.go(0.0)
+
+    assert lab.age("inv2") == float("inf")
+    assert lab.status().impaired == ("inv2",)
+
+
+def test_another_plant_begins_without_the_orders_of_the_former() -> None:
+    """Its run starts at 0: what held from 30 s on would come again; and what its ghost orders is refused."""
+    lab = agent_lab()
+    order(lab, 1, 0.0)
+    lab.measure(0)
+    lab.go(0.0)
+    first = lab.status().impaired
+    lab.token("plant", gone=True)
+    lab.token("plant", epoch=2)
+    lab.measure(0, incarnation=2)
+    order(lab, 2, 0.0, life=1)
+    lab.go(0.5)
+    order(lab, 1, 0.0, Order(fault=Fault(on="inv3 -> inv1", cut=True)).to_text(), life=2)
+    lab.measure(1, incarnation=2)
+    lab.go(0.5)
+
+    assert (first, lab.status().impaired) == (("inv2",), ("inv3",))
+    assert lab.side.rejects.counts["ghost"] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["set", "inv1", "inv4"], "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
+        (["set", "inv1 -> inv4", "--loss", "20"], "--loss: a loss is a probability from 0 to 1, got 20; did you"),
+        (["set", "inv1", "inv4", "--delay", "100"], "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
+        (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: 0.2 s is more than the delay"),
+        (["set", "inv1", "inv4", "--jitter", "0.2"], "--jitter: is around a delay; give --delay too"),
+        (["set", "inv1", "inv4", "--profile", "lt"], '--profile: there is no profile "lt"; did you mean "lte"?'),
+        (["set", "inv1", "inv4", "--loss", "0.1", "--for", "-1"], "--for: a time of the run must be above 0, got -1 s"),
+        (["cut", "inv1"], 'LINKS: "inv1" names no links; write "inv4 <-> inv7"'),
+        (["cut", "inv1", "inv4", "inv7"], 'LINKS: "inv1 inv4 inv7" is neither two names nor one pattern'),
+        (["heal", "inv1", "-"], 'LINKS: the shell took the arrow for a redirection; put the pattern in quotes'),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_meant_is_told_before_a_run_is_sought(words: list[str], said: str) -> None:
+    """Exit code 2, under the option that was typed, with what would be right."""
+    code, text = invoke("link", *words)
+
+    assert code == 2
+    assert said in text
+
+
+def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path: Path) -> None:
+    """Written and read again, every link has at every time what scenario and orders gave it."""
+    text = (
+        "[time]\nend_s = 2.0\n[case.IV]\nsecondary = 'all'\ngraph = 'full'\n"
+        "[[case.IV.link]]\non = 'MG1 -> MG2'\ndelay = 0.1\n[[partition]]\nalone = 'inv5'\nfrom_s = 1.0\nto_s = 1.5\n"
+    )
+    (tmp_path / "mine.toml").write_text(text)
+    scenario, feeder = load_scenario(tmp_path / "mine.toml")
+    setup = setup_of(netem_of(scenario, "IV"), scenario, feeder, real_nodes=True)
+    changes = [
+        Order(fault=Fault(on="* -> inv4", profile="lte", delay=0.3), for_s=1.0).at(0.62),
+        Order(fault=Fault(on="inv4 <-> plant", cut=True)).at(1.2),
+        Order(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
+        Order(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
+    ]
+    (tmp_path / "again.toml").write_text(to_toml(replay_of(scenario, feeder, changes, 7.33), {}))
+    again, _ = load_scenario(tmp_path / "again.toml")
+    netem = netem_of(again, "IV")
+
+    assert (again.name, again.time.end_s) == ("again", 7.36)
+    for link in links_among([name for name in setup.microgrids if name != "inv10"]):
+        live = schedule_of(link, setup.netem, changes, setup.microgrids)
+        planned = schedule_of(Link(*link), netem, (), setup.microgrids)
+        for t in (0.0, 0.6, 0.62, 1.1, 1.3, 1.45, 1.6, 1.62, 7.32, 7.34, 7.5):
+            was, is_now = ({k: s.model for k, s in one.at(t).active.items()} for one in (live, planned))
+            gates = [{"cut" if kind == "partition" else kind for kind in found} for found in (was, is_now)]
+            assert gates[0] == gates[1], (link, t)
+            assert {k: m for k, m in was.items() if k in ("delay", "loss")} == {
+                k: m for k, m in is_now.items() if k in ("delay", "loss")
+            }
+
+
+def test_misfortunes_strike_in_turn_and_nobody_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the run time that telemetry tells, at any speed; who is not there cannot be hurt; at the end all go on."""
+    clock = [100.0]
+    monkeypatch.setattr(misfortunes, "monotonic", lambda: clock[0])
+    nodes = (
+        NodeFault(name="inv1", pause=True, from_s=2.0, to_s=4.0),
+        NodeFault(name="inv2", kill=True, from_s=3.0),
+        NodeFault(name="inv3", pause=True, from_s=5.0, to_s=99.0),
+        NodeFault(name="inv9", kill=True, from_s=1.0),
+    )
+    sent: list[tuple[float, str, str]] = []
+
+    class Victim:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def signal(self, number: Any) -> None:
+            sent.append((clock[0] - 100.0, self.name, number.name))
+
+    children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
+    struck = Misfortunes(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
+    struck.strike(children)
+    struck.heard(0.0, 100.0)
+    for _ in range(5):
+        clock[0] += struck.wait
+        struck.strike(children)
+    struck.end(children)
+
+    assert sent == [
+        (1.0, "inv1", "SIGSTOP"), (1.5, "inv2", "SIGKILL"), (2.0, "inv1", "SIGCONT"), (2.5, "inv3", "SIGSTOP"),
+        (2.5, "inv3", "SIGCONT"),
+    ]  # fmt: skip
+    assert struck.killed == {"inv2"}
+
+
+def test_what_links_drop_counts_as_lost() -> None:
+    """Whoever watches sees it while it lasts: the numbers of who sent them show only what the wire has lost."""
+    lab = agent_lab()
+    order(lab, 1, 0.0)
+    for k in range(1, 40):
+        lab.measure(k)
+        if k != 20:  # that one is lost before it comes to the link
+            lab.state("inv2", k, k * agent_side.T_C)
+        lab.go(agent_side.T_C)
+    lab.go(0.5)
+    during = lab.status().lost
+    lab.token("plant", gone=True)
+    lab.token("plant", epoch=2)
+    lab.measure(0, incarnation=2)
+    lab.go(0.5)
+
+    assert during == 39
+    assert lab.status().lost == 39

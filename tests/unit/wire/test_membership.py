@@ -1,0 +1,125 @@
+"""Which process speaks for a name, and what it has said it is."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from tests.toy.toy_configs import agent_config
+from wire.admission import Admission
+from wire.codec import RejectedError
+from wire.membership import Membership
+from wire.messages import Nameplate
+
+
+def nameplate(name: str = "inv2", epoch: int = 1) -> Nameplate:
+    """Nameplate of an agent of the toy."""
+    return Agent(replace(agent_config(name), incarnation=epoch)).nameplate
+
+
+def members(*instances: str) -> tuple[Membership, Admission]:
+    """Processes of inv2, each of an epoch of its own, all met."""
+    admission = Admission()
+    made = Membership(admission)
+    for number, instance in enumerate(instances):
+        made.appeared("inv2", instance)
+        made.meet(instance, nameplate(epoch=number + 1))
+    return made, admission
+
+
+def test_of_two_processes_of_a_name_the_first_counts_until_it_is_gone() -> None:
+    """Then the other speaks, in its own epoch, without being asked again."""
+    made, admission = members("a", "b")
+    assert (made.instance("inv2"), admission.epoch("inv2")) == ("a", 1)
+
+    assert made.vanished("inv2", "a")
+    assert (made.instance("inv2"), admission.epoch("inv2")) == ("b", 2)
+    assert made.nameplates["inv2"].incarnation == 2
+    assert made.vanished("inv2", "b")
+    assert (made.instance("inv2"), admission.epoch("inv2"), made.nameplates) == ("", None, {})
+
+
+def test_a_roster_says_which_of_two_processes_counts() -> None:
+    """Whichever came first, and also if its token comes later."""
+    made, admission = members("a", "b")
+    made.prefer("inv2", "b")
+    assert (made.instance("inv2"), admission.epoch("inv2")) == ("b", 2)
+
+    made.prefer("inv2", "c")
+    assert made.instance("inv2") == "b"
+    assert made.appeared("inv2", "c")
+    assert admission.epoch("inv2") is None
+    assert made.meet("c", nameplate(epoch=7))
+    assert admission.epoch("inv2") == 7
+
+
+def test_what_a_process_says_of_itself_never_changes() -> None:
+    """Another nameplate in its place is refused, and changes nothing."""
+    made, _ = members("a")
+
+    with pytest.raises(RejectedError, match="a nameplate never changes") as refused:
+        made.meet("a", replace(nameplate(), P_rated=1.0))
+    assert refused.value.kind == "implausible"
+    assert made.nameplates["inv2"] == nameplate()
+
+
+def test_a_nameplate_without_a_token_is_a_ghosts() -> None:
+    """Nobody is there for whom it could speak."""
+    made, _ = members("a")
+    made.vanished("inv2", "a")
+
+    with pytest.raises(RejectedError) as refused:
+        made.meet("a", nameplate())
+    assert refused.value.kind == "ghost"
+
+
+def test_a_dismissed_process_counts_no_more_but_may_still_speak() -> None:
+    """What it sends last is admitted until its token is gone; a successor takes its place at once."""
+    made, admission = members("a")
+    made.dismiss("inv2")
+    assert (made.instance("inv2"), made.nameplates, admission.epoch("inv2")) == ("", {}, 1)
+
+    assert made.appeared("inv2", "b")
+    assert made.meet("b", nameplate(epoch=5))
+    assert not made.vanished("inv2", "a")
+    assert (made.instance("inv2"), admission.epoch("inv2")) == ("b", 5)
+
+
+def test_a_dismissed_process_that_is_gone_speaks_no_more() -> None:
+    """Nobody speaks for its name then."""
+    made, admission = members("a")
+    made.dismiss("inv2")
+    made.vanished("inv2", "a")
+
+    assert admission.epoch("inv2") is None
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_process_that_counts_is_there_and_its_nameplate_is_its_own(seed: int) -> None:
+    """Whatever comes in whatever order: nameplate and epoch of a name are those of one process whose token is there."""
+    rng, admission = random.Random(seed), Admission()
+    made, there = Membership(admission), set[str]()
+    for _ in range(40):
+        instance = rng.choice("abc")
+        match rng.randrange(4):
+            case 0:
+                made.appeared("inv2", instance)
+                there.add(instance)
+            case 1:
+                made.vanished("inv2", instance)
+                there.discard(instance)
+            case 2:
+                made.prefer("inv2", instance)
+            case 3 if instance in there:
+                made.meet(instance, nameplate(epoch=ord(instance)))
+        counts = made.instance("inv2")
+        known = made.nameplates.get("inv2")
+
+        assert (counts in there) if there else counts == ""
+        assert known is None or known.incarnation == admission.epoch("inv2")
+        assert known is None or chr(known.incarnation) in there

@@ -1,0 +1,56 @@
+"""What a tick waits for, and the sentence when it waits too long."""
+
+from __future__ import annotations
+
+from wire.tick_barrier import Awaited, TickBarrier
+
+
+def barrier() -> TickBarrier:
+    """One that waits for two states since t = 5 s, at most 10 s."""
+    made = TickBarrier("plant", 10.0)
+    made.wait_for({"inv1": "State(4)", "inv2": "State(4)"}, now=5.0)
+    return made
+
+
+def test_it_opens_with_the_last_that_comes() -> None:
+    """The number of messages counts down, to one at the least: somebody else may speak."""
+    made = barrier()
+    counted = []
+    for name in ("inv2", "inv1"):
+        assert not made.is_open
+        counted.append(made.messages_needed)
+        made.came(name)
+
+    assert [*counted, made.messages_needed] == [2, 1, 1]
+    assert made.is_open
+
+
+def test_what_is_missing_is_named_in_the_order_of_the_wait() -> None:
+    """Each with what it should send."""
+    made = barrier()
+    assert made.missing() == (Awaited("State(4)", "inv1"), Awaited("State(4)", "inv2"))
+    made.came("inv1")
+
+    assert made.missing() == (Awaited("State(4)", "inv2"),)
+
+
+def test_the_deadline_counts_from_the_last_progress() -> None:
+    """A rest has none."""
+    made = barrier()
+    until = [made.until]
+    made.renew(7.0)
+    until.append(made.until)
+    made.rest()
+
+    assert [*until, made.until] == [15.0, 17.0, None]
+
+
+def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
+    """Also of who has never been heard."""
+    made = barrier()
+    made.heard("inv1", 3, 2.0)
+
+    assert made.complaint(made.missing(), 15.0) == (
+        "plant: no State(4) from inv1 within 10 s; last heard of inv1: tick 3, 13.0 s ago. "
+        "no State(4) from inv2 within 10 s; nothing was ever heard from inv2"
+    )

@@ -1,0 +1,138 @@
+"""Who takes part in a run: which process speaks for each name, and what it has said it is. Pure.
+
+A process is known by its liveliness token, `alive/agent/<name>/<instance>`. Of two that claim one name the first
+counts, until its token is gone; in simulated time the plant's roster may name another one. Whoever sees a token asks
+that process for its nameplate, once, and learns from the answer in which epoch it speaks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from wire.admission import Admission
+from wire.codec import RejectedError
+from wire.messages import Nameplate
+
+
+class Membership:
+    """Tokens and nameplates of the agents.
+
+    Parameters
+    ----------
+    admission : Admission
+        Is told in which epoch whoever counts for a name speaks.
+
+    Examples
+    --------
+    >>> members = Membership(Admission())
+    >>> members.appeared("inv2", "a"), members.appeared("inv2", "b")
+    (True, False)
+    >>> list(members.unmet)
+    [('inv2', 'a'), ('inv2', 'b')]
+    >>> members.vanished("inv2", "a"), members.instance("inv2")
+    (True, 'b')
+    """
+
+    def __init__(self, admission: Admission) -> None:
+        self._admission = admission
+        self._instances: dict[str, list[str]] = {}
+        """Processes of each name whose tokens are there, the one that counts first."""
+        self._preferred: dict[str, str] = {}
+        """Of some names the process that counts whenever its token is there."""
+        self._dismissed: dict[str, str] = {}
+        """Processes that count no more, though their tokens are there."""
+        self._answers: dict[tuple[str, str], Nameplate] = {}
+        """Nameplate of each process that has answered."""
+        self.nameplates: dict[str, Nameplate] = {}
+        """Those of the processes that count."""
+
+    def appeared(self, name: str, instance: str) -> bool:
+        """Note a token; whether its process counts."""
+        instances = self._instances.setdefault(name, [])
+        if instance not in instances:
+            instances.append(instance)
+            self._put_first(name)
+            if instances[0] == instance != instances[-1]:  # it takes the place of another one
+                self._believe(name)
+        return instances[0] == instance
+
+    def vanished(self, name: str, instance: str) -> bool:
+        """Note that a token is gone; whether its process counted."""
+        counted = self.instance(name) == instance
+        instances = self._instances.get(name, [])
+        if instance in instances:
+            instances.remove(instance)
+        if not instances:
+            self._instances.pop(name, None)
+        self._answers.pop((name, instance), None)
+        if counted or self._dismissed.get(name) == instance:
+            self._believe(name)
+        return counted
+
+    def dismiss(self, name: str) -> None:
+        """Have the process of a name count no more; its epoch holds until its token is gone or another one is met."""
+        self._dismissed[name] = self._instances[name].pop(0)
+        self.nameplates.pop(name, None)
+
+    def prefer(self, name: str, instance: str) -> None:
+        """Have one process of a name count, as soon as its token is there."""
+        self._preferred[name] = instance
+        self._put_first(name)
+        self._believe(name)
+
+    def instance(self, name: str) -> str:
+        """Process that counts for a name; empty if there is none."""
+        return next(iter(self._instances.get(name, ())), "")
+
+    def names(self) -> list[str]:
+        """Return the names that some process claims, in the order in which they appeared."""
+        return list(self._instances)
+
+    def meet(self, instance: str, nameplate: Nameplate) -> bool:
+        """Take the answer of a process; whether it is the first one of a process that counts.
+
+        Raises
+        ------
+        RejectedError
+            If the token of this process is not there, or it has said something else before.
+        """
+        name = nameplate.sender
+        if instance not in self._instances.get(name, ()):
+            raise RejectedError("ghost", f"the nameplate of {name}, whose token is gone")
+        known = self._answers.setdefault((name, instance), nameplate)
+        if known != nameplate:
+            raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+        if name in self.nameplates or instance != self.instance(name):
+            return False
+        self._believe(name)
+        return True
+
+    @property
+    def unmet(self) -> Iterator[tuple[str, str]]:
+        """Name and instance of the processes that have not answered."""
+        every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
+        return (process for process in every if process not in self._answers)
+
+    def clear(self) -> None:
+        """Forget everybody."""
+        for name in self.nameplates:
+            self._admission.release(name)
+        for known in (self._instances, self._preferred, self._dismissed, self._answers, self.nameplates):
+            known.clear()
+
+    def _put_first(self, name: str) -> None:
+        instances, preferred = self._instances.get(name, []), self._preferred.get(name)
+        if preferred in instances:
+            instances.remove(preferred)
+            instances.insert(0, preferred)
+
+    def _believe(self, name: str) -> None:
+        """Bring nameplate and epoch of a name up to date with the process that counts for it."""
+        self._dismissed.pop(name, None)
+        nameplate = self._answers.get((name, self.instance(name)))
+        if nameplate is None:
+            self.nameplates.pop(name, None)
+            self._admission.release(name)
+        else:
+            self.nameplates[name] = nameplate
+            self._admission.bind(name, nameplate.incarnation)
