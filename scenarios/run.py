@@ -119,7 +119,7 @@ def _logged(request: Request, progress: Progress) -> Report:
 
 
 def _run(request: Request, progress: Progress, log: TextIO) -> Report:
-    scenario, folder = request.scenario, request.folder
+    scenario, folder, place = request.scenario, request.folder, shown(request.folder)
     write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
     recorded, notes = {}, []
     links_sha256: dict[str, str] = {}
@@ -183,7 +183,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
         verdicts=(*judge(found, benchmark.claims), *(() if disturbed else judged(found, claims_of(scenario)))),
         benchmark=benchmark,
         notes=[*notes, *_notes(recorded, request.clock)],
-        folder=shown(folder) + "/" if request.lasting else "",
+        folder=place + "/" if request.lasting else "",
     )
     write_whole(folder / "report.txt", plain(report))
     set_status(folder, "complete")
