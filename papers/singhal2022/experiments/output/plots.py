@@ -97,7 +97,7 @@ def _plot(axes: Axes, curve: Curve) -> None:
         case "measured":
             axes.plot(curve.x, y, "-", color=colour, marker=marker, ms=_nested(curve, 7.0), lw=_nested(curve, 2.4))
         case "hollow":
-            axes.plot(curve.x, y, "", color=colour, marker=marker, ms=6.5, mfc="none", lw=0)
+            axes.plot(curve.x, y, "", color=colour, marker=marker, ms=9.0, mfc="none", lw=0)
         case "predicted":
             axes.plot(curve.x, y, color=colour, lw=1.6, linestyle=(2.3 * curve.style, (3, 1.6)))
         case "points":
