@@ -21,6 +21,7 @@ from scenarios.predict.times import predicted_times
 from scenarios.run import BrokenRunError
 from scenarios.spec import ScenarioError, model
 from scenarios.spec.law import PAPER, law_of
+from scenarios.spec.netem import is_calm, netem_of
 
 _LIMITS: dict[str, Kind] = {
     "agent to agent": "neighbours",
@@ -70,6 +71,8 @@ def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[
     for name, rule in spec.cases.items():
         islands = [(step, fleet_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps]
         title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
+        if not is_calm(netem_of(spec, name)):
+            title += "; without its faults of links and nodes, which these numbers leave out"
         found[name] = Prediction(title, fleet_of(spec, feeder, name), islands, plant)
     return found
 

@@ -19,12 +19,13 @@ import numpy as np
 import pyarrow as pa
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from scenarios.results.history import Floats
 from scenarios.results.plots import PAGE, case_style, save
 from scenarios.sweep.choice import Choice, choose, values
 from scenarios.sweep.statistics import Spread, spread_of
-from scenarios.sweep.words import LEAST, label_of
+from scenarios.sweep.words import LEAST, WORDS, label_of
 
 BINS = 12
 """Groups of equally many runs that a parameter drawn at random is cut into for its median."""
@@ -165,11 +166,19 @@ def _name_axis(panel: Axes, choice: Choice, x: str) -> None:
             panel.set_xscale("log")
         elif len(set(numbers)) <= MOST_TICKS and all(isinstance(number, int) for number in numbers):
             panel.set_xticks(sorted(set(numbers)))
+        else:
+            panel.xaxis.set_major_locator(MaxNLocator(5))  # more digits than whole numbers have do not fit else
 
 
 def _frame(panel: Axes, index: str) -> None:
-    """Let the axis of an index begin at 0, as all are magnitudes, and be long enough that rounding is no structure."""
-    panel.set_ylim(bottom=0.0, top=max(panel.get_ylim()[1], LEAST.get(index, 0.0)))
+    """Let the axis of an index begin at 0, as ours are magnitudes, and be long enough that rounding is no structure.
+
+    Metrics of somebody's own may be anything: a frequency, which 0 would flatten, or less than 0.
+    """
+    if index not in WORDS and not index.startswith("p."):
+        panel.ticklabel_format(axis="y", useOffset=False)
+        return
+    panel.set_ylim(bottom=0.0, top=max(panel.get_ylim()[1], 1.05 * panel.dataLim.y1, LEAST.get(index, 0.0)))
 
 
 def _legend(figure: Figure, panel: Axes, choice: Choice) -> None:

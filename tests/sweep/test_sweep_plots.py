@@ -42,6 +42,18 @@ CHOICES: list[tuple[dict[str, list[Any]], list[str], tuple[str, str] | None]] = 
 ]
 
 
+def test_an_axis_shows_all_of_a_metric_of_somebodys_own() -> None:
+    """0 neither flattens a frequency nor cuts off what is less; ours begin at 0, and their highest value is seen."""
+    own = {"f_min_Hz": [59.7, 59.8], "slope": [-2.0, 1.0], "V_error": [0.00208, 0.00209]}
+    figure = _curves(choose(table({"a": [0.1, 0.2]}, **own)), "event1", "a")
+
+    bounds = {panel.get_ylabel(): panel.get_ylim() for panel in figure.axes if panel.get_visible()}
+    assert 59.0 < bounds["f_min (Hz)"][0] < 59.7
+    assert bounds["slope"][0] < -2.0
+    assert bounds[label_of("V_error")][0] == 0.0
+    assert bounds[label_of("V_error")][1] > 0.00209 * 1.02
+
+
 @pytest.mark.parametrize(("parameters", "alone", "map_of"), CHOICES)
 def test_plots_are_chosen_by_what_is_varied(
     tmp_path: Path, parameters: dict[str, list[Any]], alone: list[str], map_of: tuple[str, str] | None

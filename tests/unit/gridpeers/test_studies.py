@@ -83,6 +83,14 @@ def test_all_mistakes_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario
         gp.sweep(scenario, {"gains.k_p": [0.001]}, cases=["I"], metrics=["MPSY"], jobs=1)
 
 
+def test_a_prediction_says_that_it_leaves_out_faults_of_links() -> None:
+    """Its times to restore are those of good links, whatever delays the scenario writes."""
+    late = gp.load("islanding").replace({"case.IV.link": [{"on": "* <-> *", "delay": 0.1}]})
+
+    assert "without its faults of links" in str(gp.predict(late, "IV", voltage=False))
+    assert "without its faults" not in str(gp.predict(gp.load("islanding"), "IV", voltage=False))
+
+
 def test_a_prediction_has_tables_and_the_words_of_the_command() -> None:
     """The frequency mode is kappa n_L/N, and what the command prints is its text."""
     found = gp.predict(gp.load("islanding"), "IV", voltage=False)
