@@ -82,7 +82,7 @@ class AgentNode(PlantFollower):
         return self.keys.any_alive
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether the driver should close."""
         return bool(self.stopped or self.failed)
 

@@ -92,21 +92,21 @@ class LockstepAgent(AgentNode):
         return self.keys.ready(self._name), self.keys.state(self._name), self.keys.report(self._name)
 
     @property
-    def wanted(self) -> int:
+    def messages_needed(self) -> int:
         """Number of messages without which the next tick cannot be computed."""
         return self._barrier.messages_needed
 
     @property
-    def until(self) -> float | None:
+    def deadline(self) -> float | None:
         """When the deadline of the present wait passes (s on the driver's clock); None if it has none."""
-        return self._barrier.until
+        return self._barrier.deadline
 
     def start(self, now: float) -> None:
         """Begin to wait for the plant, which is built first."""
         self._barrier.renew(now)
-        self._barrier.until = max(self._barrier.until or 0.0, now + self._config.plant_wait)
+        self._barrier.deadline = max(self._barrier.deadline or 0.0, now + self._config.plant_wait)
 
-    def missing(self) -> tuple[Awaited, ...]:
+    def missing_messages(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
         if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
@@ -114,18 +114,18 @@ class LockstepAgent(AgentNode):
             return (Awaited("Prepare", PLANT),)
         if not self._ready:
             return tuple(Awaited("nameplate", name) for name in self._unmet() or self._unproven())
-        missing = self._barrier.missing()  # without a measurement, the states do not matter yet
+        missing = self._barrier.missing_messages()  # without a measurement, the states do not matter yet
         return missing[:1] if self._barrier.awaits(PLANT) else missing
 
     def expire(self, now: float) -> None:
         """Give up if the deadline has passed."""
-        if self.over or self.until is None or now < self.until:
+        if self.finished or self.deadline is None or now < self.deadline:
             return
         if self._ending:
             self._report_the_last()
             self.stopped = self._ending
         else:
-            self.failed = self._barrier.complaint(self.missing(), now)
+            self.failed = self._barrier.complaint(self.missing_messages(), now)
 
     # ---------------------------------------------------------------- liveliness
 
@@ -136,7 +136,7 @@ class LockstepAgent(AgentNode):
     def _plant_gone(self, now: float) -> None:
         if self._ending:
             self.stopped = self._ending
-        elif not self.over:
+        elif not self.finished:
             tick = "" if self._tick is None else f" at tick {self._tick}"
             self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
 
@@ -171,7 +171,7 @@ class LockstepAgent(AgentNode):
             self.stopped = self._ending or reason
             return
         self._ending = reason
-        self._barrier.until = now + CLOSING
+        self._barrier.deadline = now + CLOSING
         self._compute(now)
 
     def _report_the_last(self) -> None:

@@ -82,26 +82,26 @@ class LockstepPlant(PlantNode):
         return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether the driver should close."""
         return self.phase == "over"
 
     @property
-    def wanted(self) -> int:
+    def messages_needed(self) -> int:
         """Number of messages without which the plant cannot go on."""
         return self._barrier.messages_needed
 
     @property
-    def until(self) -> float | None:
+    def deadline(self) -> float | None:
         """When the deadline of the present wait passes (s on the driver's clock)."""
-        return self._barrier.until
+        return self._barrier.deadline
 
     def start(self, now: float) -> None:
         """Begin to wait for the agents."""
         self._barrier.renew(now)
         self._gather(now)
 
-    def missing(self) -> tuple[Awaited, ...]:
+    def missing_messages(self) -> tuple[Awaited, ...]:
         """Who is awaited, and for what."""
         match self.phase:
             case "gathering":
@@ -110,15 +110,15 @@ class LockstepPlant(PlantNode):
             case "joining":
                 return self._unmet(self._joining)
             case "preparing" | "ticking":
-                return self._barrier.missing()
+                return self._barrier.missing_messages()
         return ()
 
     def expire(self, now: float) -> None:
         """End the run if the deadline has passed."""
-        if self.until is not None and now >= self.until:
+        if self.deadline is not None and now >= self.deadline:
             if self.phase == "closing":
                 self._be_over()
-            elif missing := self.missing():  # else the last that was awaited has just come
+            elif missing := self.missing_messages():  # else the last that was awaited has just come
                 self.abort(self._barrier.complaint(missing, now), now)
 
     def abort(self, reason: str, now: float) -> None:
@@ -199,7 +199,7 @@ class LockstepPlant(PlantNode):
 
     def _gather(self, now: float) -> None:
         """Begin, if all are there."""
-        if self.phase == "gathering" and not self.missing():
+        if self.phase == "gathering" and not self.missing_messages():
             self._reporter.collect()
             self._prepare(now)
             assert set(self._roster) == set(self.config.agents)
@@ -274,7 +274,7 @@ class LockstepPlant(PlantNode):
             if self.phase == "ticking":
                 self._let_leave_and_join(now)
         if self.phase == "joining":
-            if self.missing():
+            if self.missing_messages():
                 return ticked
             joined, self._joining, self._roster_changed = self._joining, (), True
             for name in joined:  # their inverters are on the network, at no load
@@ -329,7 +329,7 @@ class LockstepPlant(PlantNode):
         self._tell_the_end(reason)
         self.phase = "closing"
         self._barrier.wait_for({}, now)
-        self._barrier.until = now + CLOSING
+        self._barrier.deadline = now + CLOSING
         self._close_if_alone()
 
     def _be_over(self) -> None:

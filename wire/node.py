@@ -7,9 +7,9 @@ thread and does
     node.received(key, payload, now)                        a message, or the answer to a `Fetch`
     node.work(now)                                          at most one piece of work, if all is here for it
     for action in node.take_actions(): ...                  do it, in this order
-    node.expire(now)                                        when `node.until` has passed
+    node.expire(now)                                        when `node.deadline` has passed
 
-until `node.over`, the last actions included. `now` is the driver's clock (s).
+until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
 Every message takes one way: it is decoded, which bounds all that is in it; its sender and epoch are checked
 (`wire.admission`), and its type; then the handler of its route gets it. Whatever is wrong with a message, or goes wrong
@@ -72,7 +72,7 @@ class Node:
         self._actions: list[Action | Say] = []
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether the driver should close."""
         raise NotImplementedError
 
@@ -83,7 +83,7 @@ class Node:
 
     def received(self, key: str, payload: bytes, now: float) -> None:
         """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
-        if self.over:
+        if self.finished:
             return
         try:
             route = self._routes.get(key)

@@ -22,7 +22,7 @@ class TickBarrier:
     ----------
     who : str
         Who waits.
-    deadline : float
+    timeout : float
         Longest wait without progress (s on the driver's clock).
 
     Examples
@@ -30,18 +30,18 @@ class TickBarrier:
     >>> barrier = TickBarrier("plant", 10.0)
     >>> barrier.wait_for({"inv2": "State(41)", "inv3": "State(41)"}, now=2.0)
     >>> barrier.came("inv2"); barrier.heard("inv3", 40, now=2.0)
-    >>> barrier.is_open, barrier.until
+    >>> barrier.is_open, barrier.deadline
     (False, 12.0)
-    >>> barrier.complaint(barrier.missing(), now=12.0)
+    >>> barrier.complaint(barrier.missing_messages(), now=12.0)
     'plant: no State(41) from inv3 within 10 s; last heard of inv3: tick 40, 10.0 s ago'
     """
 
-    def __init__(self, who: str, deadline: float) -> None:
-        self._who, self._deadline = who, deadline
+    def __init__(self, who: str, timeout: float) -> None:
+        self._who, self._timeout = who, timeout
         self._awaited: dict[str, str] = {}
         """What each of those should send who have not yet."""
         self._last: dict[str, tuple[int, float]] = {}
-        self.until: float | None = None
+        self.deadline: float | None = None
         """When the present wait is over (s); None if it has no end."""
 
     @property
@@ -67,7 +67,7 @@ class TickBarrier:
         """Note that somebody has sent what was awaited, or never will."""
         self._awaited.pop(name, None)
 
-    def missing(self) -> tuple[Awaited, ...]:
+    def missing_messages(self) -> tuple[Awaited, ...]:
         """What is awaited, of whom."""
         return tuple(Awaited(what, who) for who, what in self._awaited.items())
 
@@ -77,11 +77,11 @@ class TickBarrier:
 
     def renew(self, now: float) -> None:
         """Note progress: the deadline counts from now."""
-        self.until = now + self._deadline
+        self.deadline = now + self._timeout
 
     def rest(self) -> None:
         """Wait without a deadline."""
-        self.until = None
+        self.deadline = None
 
     def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
         """One sentence for the end of the deadline: who is missing, its last tick and its last sign of life."""
@@ -92,5 +92,5 @@ class TickBarrier:
                 sign = f"last heard of {who}: tick {tick}, {now - at:.1f} s ago"
             else:
                 sign = f"nothing was ever heard from {who}"
-            parts.append(f"no {what} from {who} within {self._deadline:g} s; {sign}")
+            parts.append(f"no {what} from {who} within {self._timeout:g} s; {sign}")
         return f"{self._who}: " + ". ".join(parts)

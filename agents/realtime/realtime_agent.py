@@ -118,17 +118,17 @@ class RealtimeAgent(AgentNode):
         return tuple(key(name) for key in own)
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether the driver should close."""
-        return super().over or self.session_broken
+        return super().finished or self.session_broken
 
     @property
-    def wanted(self) -> int:
+    def messages_needed(self) -> int:
         """Number of messages to be woken for: messages wait for the tick."""
         return WANTED
 
     @property
-    def until(self) -> float:
+    def deadline(self) -> float:
         """When the next tick is due (s on the driver's clock)."""
         return self._timer.due
 
@@ -147,7 +147,7 @@ class RealtimeAgent(AgentNode):
     def expire(self, now: float) -> None:
         """Tick, if it is time."""
         late = now - self._timer.due
-        if late < 0.0 or self.over:
+        if late < 0.0 or self.finished:
             return
         skipped = self._timer.take(now)
         if self._leaving:
@@ -192,7 +192,7 @@ class RealtimeAgent(AgentNode):
 
     def leave(self, reason: str) -> None:
         """Leave properly: have the own inverter taken off the network, and close once the plant says that it is."""
-        if self.over or self._leaving:
+        if self.finished or self._leaving:
             return
         self._report_links(final=True)
         name, epoch = self._name, self._config.incarnation

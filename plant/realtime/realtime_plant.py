@@ -135,17 +135,17 @@ class RealtimePlant(PlantNode):
         return self.keys.control, self.keys.telemetry, *each
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether the driver should close."""
         return self.phase == "over"
 
     @property
-    def wanted(self) -> int:
+    def messages_needed(self) -> int:
         """Number of messages to be woken for."""
         return WANTED if self.phase == "running" else 1
 
     @property
-    def until(self) -> float:
+    def deadline(self) -> float:
         """When the next step is due, or the present wait is over (s on the driver's clock)."""
         if self.phase == "running":
             return self.pacer.due
@@ -162,7 +162,7 @@ class RealtimePlant(PlantNode):
 
     def expire(self, now: float) -> None:
         """Make the step that is due, or end the wait that is over."""
-        if now < self.until:
+        if now < self.deadline:
             return
         if self.phase == "gathering" and now >= self._deadline:
             self._begin(now)

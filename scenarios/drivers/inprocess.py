@@ -76,7 +76,7 @@ class Bus:
         for agent in self._agents:
             agent.start(0.0)
             self._start(agent)
-        while not plant.over:
+        while not plant.finished:
             self._do(plant, plant.take_actions())
             while self._queue:
                 to, key, payload = self._queue.popleft()
@@ -84,8 +84,8 @@ class Bus:
                 self._do(to, to.take_actions())
             self._end_the_stopped()
             self._start_the_awaited()
-            if not (plant.over or plant.work(0.0) or self._queue):
-                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing())
+            if not (plant.finished or plant.work(0.0) or self._queue):
+                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages())
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
         self._do(plant, plant.take_actions())
 
@@ -138,7 +138,7 @@ class Bus:
                 self._subscribers[action.key].append(side)
 
     def _end_the_stopped(self) -> None:
-        for agent in [agent for agent in self._agents if agent.over]:
+        for agent in [agent for agent in self._agents if agent.finished]:
             self._agents.remove(agent)
             self._nameplates.pop(agent.nameplate[0])
             for receivers in self._subscribers.values():

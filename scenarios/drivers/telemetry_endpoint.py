@@ -32,7 +32,7 @@ class TelemetryEndpoint(PlantFollower):
             self._routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether nothing more is taken: never, as what came before the session was closed is recorded too."""
         return False
 

@@ -79,12 +79,14 @@ class Links:
 
     def run(self, until_tick: int | None = None) -> None:
         """Step until the plant is over, or stands at a tick."""
-        while not self.plant.over and (until_tick is None or self.plant.tick < until_tick):
-            assert self.step(), f"stalled in phase {self.plant.phase} at tick {self.plant.tick}: {self.plant.missing()}"
+        while not self.plant.finished and (until_tick is None or self.plant.tick < until_tick):
+            assert self.step(), (
+                f"stalled in phase {self.plant.phase} at tick {self.plant.tick}: {self.plant.missing_messages()}"
+            )
 
     def step(self) -> bool:
         """Deliver one thing, or let the plant work; False if nothing is left to do."""
-        for agent in [agent for agent in self.agents if agent.over]:
+        for agent in [agent for agent in self.agents if agent.finished]:
             self._leave(agent)
         waiting = [link for link, deliveries in self._links.items() if deliveries and link[1] in self._living]
         if waiting and self._rng.random() < 0.95:

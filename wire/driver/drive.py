@@ -34,17 +34,17 @@ class Core(Protocol):
         ...
 
     @property
-    def over(self) -> bool:
+    def finished(self) -> bool:
         """Whether to close."""
         ...
 
     @property
-    def wanted(self) -> int:
+    def messages_needed(self) -> int:
         """Number of messages without which it cannot go on before `until`."""
         ...
 
     @property
-    def until(self) -> float | None:
+    def deadline(self) -> float | None:
         """When the deadline passes (s)."""
         ...
 
@@ -137,15 +137,15 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     now = monotonic()
     while True:
         perform(core.take_actions(), session, log)
-        if core.over:
+        if core.finished:
             for line in limit.left_out():
                 log.info("%s", line)
             break
         if core.work(now):
             now = monotonic()
             continue
-        until = core.until
-        events = take(core.wanted, None if until is None else max(0.0, until - now))
+        until = core.deadline
+        events = take(core.messages_needed, None if until is None else max(0.0, until - now))
         now = monotonic()
         for kind, key, payload, at in events:
             if kind == "message":
@@ -156,7 +156,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
-        until = core.until  # what came in may have put it off
+        until = core.deadline  # what came in may have put it off
         if until is not None and now >= until:  # also when the inbox never runs empty
             core.expire(now)
         if core.rejects.has_lines:

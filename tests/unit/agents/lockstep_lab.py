@@ -99,7 +99,7 @@ class Lab:
     @property
     def missing(self) -> list[tuple[str, str]]:
         """Who is awaited, and for what."""
-        return [(what, who) for what, who in self.node.missing()]
+        return [(what, who) for what, who in self.node.missing_messages()]
 
 
 def ticking(*names: str, tick: int = 0) -> Lab:

@@ -187,7 +187,7 @@ def test_a_tick_is_done_with_whatever_comes_last(order: tuple[str, ...]) -> None
     lab, wanted = ticking("inv2", "inv3", tick=5), []
     for sender in order:
         assert lab.decided == []
-        wanted.append(lab.node.wanted)
+        wanted.append(lab.node.messages_needed)
         lab.measure(5, "inv2", "inv3") if sender == "plant" else lab.state(sender, 4)
 
     assert wanted == [3, 2, 1]

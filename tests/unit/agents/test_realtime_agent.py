@@ -35,10 +35,10 @@ def test_without_any_plant_it_gives_up_after_the_deadline() -> None:
     """The message says which run was sought and how long."""
     lab = Lab(deadline=3.0)
     lab.go(2.9)
-    assert not lab.side.over
+    assert not lab.side.finished
     lab.go(0.2)
 
-    assert lab.side.over
+    assert lab.side.finished
     assert lab.side.failed == "inv1: no plant of run toy within 3 s"
 
 
@@ -47,12 +47,12 @@ def test_ticks_keep_their_schedule_and_missed_ones_are_counted() -> None:
     lab = running(speed=2.0)
     start = 100.005
     lab.go(0.015)
-    assert lab.side.until == pytest.approx(start + 0.020)
+    assert lab.side.deadline == pytest.approx(start + 0.020)
     lab.go(0.037)
 
     assert len(lab.decided()) == 2
     assert lab.side.statistics.missed == 2
-    assert lab.side.until == pytest.approx(start + 0.050)
+    assert lab.side.deadline == pytest.approx(start + 0.050)
 
 
 def test_a_silent_neighbour_is_out_after_max_age_and_back_with_its_next_state() -> None:
@@ -213,14 +213,14 @@ def test_it_leaves_properly() -> None:
     stopped.hear(KEYS.dismissal("inv1", "me"), stop)
     refused.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1: another agent", refused=True))
 
-    assert [lab.side.over for lab in (asked, stopped, refused)] == [False, False, True]
+    assert [lab.side.finished for lab in (asked, stopped, refused)] == [False, False, True]
     for lab in (asked, stopped):
         lab.go(T_C)
         assert lab.decided()[1:] == []
         lab.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1 has left"))
 
-    assert asked.side.over
-    assert stopped.side.over
+    assert asked.side.finished
+    assert stopped.side.finished
     assert [lab.side.stopped for lab in (asked, stopped)] == ["asked to leave: SIGTERM", stop.reason]
     assert refused.side.failed == "inv1: another agent"
     leaves = [[m for m in lab.published if isinstance(m, Leave)] for lab in (asked, stopped, refused)]
@@ -232,9 +232,9 @@ def test_who_leaves_and_is_not_answered_closes_after_a_second() -> None:
     frozen, alone = running(), Lab()
     frozen.side.leave("asked to leave: SIGTERM")
     alone.side.leave("asked to leave: SIGTERM")
-    assert alone.side.over
+    assert alone.side.finished
     for _ in range(50):
-        assert not frozen.side.over
+        assert not frozen.side.finished
         frozen.go(T_C)
 
     assert frozen.side.stopped == "asked to leave: SIGTERM"
@@ -293,7 +293,7 @@ def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
         lab.hear(key, Stop(sender="inv2", incarnation=1, seq=0, t=0.0, reason="enough", refused=True))
     lab.go(T_C)
 
-    assert not lab.side.over
+    assert not lab.side.finished
     assert lab.side.rejects.counts == {
         "ghost": 4,
         "foreign": 2,

@@ -80,5 +80,5 @@ def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None
     assert [state.idle for state in said] == [True]
     assert said[0].fault == "law consensus: step at t = 0.02 s raised ZeroDivisionError: float division by zero"
     assert lab.said[-1].startswith("inv1: law consensus: step at t = 0.02 s raised ZeroDivisionError")
-    assert not lab.side.over
+    assert not lab.side.finished
     assert not lab.side.session_broken

@@ -12,17 +12,17 @@ def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session(
     lab.token("plant")
     for _ in range(20):
         lab.go(0.5)
-    assert not lab.side.over
+    assert not lab.side.finished
 
     lab.measure(1)
     lab.go(T_C)
     assert lab.side.phase == "running"
     for _ in range(8):
         lab.go(0.5)
-    assert not lab.side.over
+    assert not lab.side.finished
     lab.go(0.5)
     assert lab.side.session_broken
-    assert lab.side.over
+    assert lab.side.finished
     assert lab.side.failed == ""
 
 
@@ -39,7 +39,7 @@ def test_messages_under_anothers_key_open_no_session_as_long_as_their_sender_is_
                 lab.hear(KEYS.measurement("inv1"), said)
         lab.go(T_C)
 
-    assert not lab.side.over
+    assert not lab.side.finished
     assert lab.status().used == ("inv2", "inv3")
 
 
@@ -47,7 +47,7 @@ def test_messages_under_anothers_key_prove_a_confused_session_once_their_sender_
     """Then it need not be waited for any longer: the plant hears inv3, and its states come here under inv2's key."""
     lab = running("inv2", "inv3")
     k = 0
-    while not lab.side.over and k < 400:
+    while not lab.side.finished and k < 400:
         k += 1
         lab.measure(k, roster=("inv1", "inv2", "inv3"))
         lab.state("inv2", k, k * T_C)
@@ -73,7 +73,7 @@ def test_whoever_hears_less_than_the_plant_opens_a_new_session(
     """The plant hears a neighbour, met or not, and the agent does not; or the plant does not hear the agent."""
     lab = running("inv2", "inv3")
     k = 0
-    while not lab.side.over and k < 400:
+    while not lab.side.finished and k < 400:
         k += 1
         lab.measure(k, roster=roster)
         for name in heard:
@@ -93,7 +93,7 @@ def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_
         lab.state("inv2", k, k * T_C)
         lab.go(T_C)
 
-    assert not lab.side.over
+    assert not lab.side.finished
 
 
 def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_then() -> None:
@@ -106,7 +106,7 @@ def test_an_agent_that_has_lost_its_plant_seeks_it_with_new_sessions_now_and_the
     lasted = []
     for _ in range(6):
         began = lab.now
-        while not lab.side.over:
+        while not lab.side.finished:
             lab.go(0.5)
         lasted.append(lab.now - began)
         lab.side.start(lab.now)
@@ -129,7 +129,7 @@ def test_a_session_that_once_was_whole_is_no_reason_for_more_patience() -> None:
             lab.state("inv2", k, k * T_C)
             lab.go(T_C)
         began = lab.now
-        while not lab.side.over:
+        while not lab.side.finished:
             lab.go(T_C)
         lasted.append(lab.now - began)
         lab.side.start(lab.now)
@@ -158,7 +158,7 @@ def test_a_plant_that_says_it_waits_is_not_silent() -> None:
     for _ in range(40):
         lab.hear(KEYS.control, Waiting(sender="plant", incarnation=2, seq=0, t=0.0, waits_for=("inv3", "inv4")))
         lab.go(0.5)
-    assert not lab.side.over
+    assert not lab.side.finished
     assert lab.status().waits_for == "a measurement of inv1 from the plant, which waits for inv3, inv4"
 
     for _ in range(9):
@@ -179,4 +179,4 @@ def test_a_plant_that_has_appeared_has_time_to_speak() -> None:
     for _ in range(8):
         lab.go(0.5)
 
-    assert not lab.side.over
+    assert not lab.side.finished

@@ -161,10 +161,10 @@ def test_a_plant_waits_at_its_end_for_a_recorder_that_is_out_of_reach() -> None:
             lab.token(name, gone=True)
         if not lost:
             lab.side.vanished(KEYS.alive_recorder("me"), lab.now)
-        ends.append(lab.side.over)
+        ends.append(lab.side.finished)
         for _ in range(2):  # what is waited for agents, then for recorders
-            lab.side.expire(lab.side.until)
-        ends.append(lab.side.over)
+            lab.side.expire(lab.side.deadline)
+        ends.append(lab.side.finished)
 
     assert ends == [False, True, True, True]
 

@@ -113,7 +113,7 @@ class Lab:
     @property
     def missing(self) -> list[tuple[str, str]]:
         """Who is awaited, and for what."""
-        return [(what, who) for what, who in self.node.missing()]
+        return [(what, who) for what, who in self.node.missing_messages()]
 
 
 def ticking(*moves: tuple[float, str, Literal["leave", "join", "die"]], **changes: Any) -> Lab:
@@ -205,9 +205,9 @@ def test_one_state_of_everybody_is_awaited_at_a_tick() -> None:
     """`wanted` counts down to one, and what is missing is named in the order of the roster."""
     lab = ticking()
     assert lab.missing == [("State(0)", name) for name in NAMES]
-    assert lab.node.wanted == 4
+    assert lab.node.messages_needed == 4
     lab.state(0, "inv1", "inv4", "inv3")
-    assert (lab.missing, lab.node.wanted) == ([("State(0)", "inv2")], 1)
+    assert (lab.missing, lab.node.messages_needed) == ([("State(0)", "inv2")], 1)
 
     lab.state(0, "inv2")
     assert lab.node.tick == 1
@@ -230,7 +230,7 @@ def test_the_deadline_names_who_is_missing() -> None:
     lab = ticking()
     lab.now = 3.0
     lab.state(0, "inv1", "inv3", "inv4")
-    lab.node.expire(lab.node.until or 0.0)
+    lab.node.expire(lab.node.deadline or 0.0)
     lab.do()
 
     assert lab.node.outcome == "plant: no State(0) from inv2 within 10 s; last heard of inv2: tick 0, 10.0 s ago"

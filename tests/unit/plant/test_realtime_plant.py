@@ -99,7 +99,7 @@ class Lab:
     def step(self, count: int = 1, delay: float = 0.0) -> None:
         """Make steps, each so late (s)."""
         for _ in range(count):
-            self.now = max(self.now, self.side.until + delay)  # in a rush after a late step, the next is due already
+            self.now = max(self.now, self.side.deadline + delay)  # in a rush after a late step, the next is due already
             self.side.expire(self.now)
             self.do()
 
@@ -128,12 +128,12 @@ def running(n: int = 3, **changes: Any) -> Lab:
 def test_it_begins_when_all_are_there() -> None:
     """Step 0 is due a moment later, and goes to every agent, without a roster."""
     lab = running()
-    assert lab.side.until == lab.now + LEAD
+    assert lab.side.deadline == lab.now + LEAD
     lab.step()
     measurements: list[Measurement] = lab.take(Measurement)
 
     assert [(m.to, m.seq, m.t, m.roster) for m in measurements] == [(f"inv{i}", 0, 0.0, ()) for i in (1, 2, 3)]
-    assert lab.side.until == pytest.approx(lab.now + T_C)
+    assert lab.side.deadline == pytest.approx(lab.now + T_C)
 
 
 def test_it_waits_only_as_long_as_told() -> None:
@@ -193,7 +193,7 @@ def test_the_run_lasts_end_over_speed_and_all_are_told() -> None:
     assert [stop.reason for stop in lab.take(Stop)] == ["end of the scenario"]
     for name in ("inv1", "inv2", "inv3"):
         lab.token(name, gone=True)
-    assert lab.side.over
+    assert lab.side.finished
     assert lab.side.outcome == ""
 
 
@@ -308,7 +308,7 @@ def test_an_interrupted_plant_leaves_its_agents_to_the_next_one() -> None:
     lab.side.interrupt("asked to leave: SIGTERM", 0.0)
     lab.do()
 
-    assert lab.side.over
+    assert lab.side.finished
     assert lab.take(Stop) == []
     assert lab.take(Telemetry)[-1].outcome == "asked to leave: SIGTERM"
 
@@ -338,10 +338,10 @@ def test_far_behind_it_puts_its_schedule_off_and_says_how_much() -> None:
     """A frozen plant does not rush through what it has missed; telemetry tells the slip."""
     lab = running()
     lab.step(3)
-    due = lab.side.until
+    due = lab.side.deadline
     lab.step(1, delay=3.0)
 
-    assert lab.side.until == pytest.approx(due + 3.0 + T_C)
+    assert lab.side.deadline == pytest.approx(due + 3.0 + T_C)
     assert lab.events("warning")[0].text.startswith("fell 3.000 s of wall time behind")
     assert lab.side.pacer.report().slipped == pytest.approx(3.0)
 
@@ -446,7 +446,7 @@ def test_an_ended_run_stays_for_a_recorder_that_stood_still() -> None:
 
     assert [message.seq for message in again] == list(range(len(again)))
     assert again[-1].final
-    assert lab.side.over
+    assert lab.side.finished
 
 
 def test_an_ended_run_does_not_stay_for_ever() -> None:
@@ -457,7 +457,7 @@ def test_an_ended_run_does_not_stay_for_ever() -> None:
     lab.step(10)
     ended = lab.now
     lab.ask("down")
-    while not lab.side.over:
+    while not lab.side.finished:
         lab.step()
 
     assert lab.now - ended < 15.1

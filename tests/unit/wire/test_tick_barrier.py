@@ -28,21 +28,21 @@ def test_it_opens_with_the_last_that_comes() -> None:
 def test_what_is_missing_is_named_in_the_order_of_the_wait() -> None:
     """Each with what it should send."""
     made = barrier()
-    assert made.missing() == (Awaited("State(4)", "inv1"), Awaited("State(4)", "inv2"))
+    assert made.missing_messages() == (Awaited("State(4)", "inv1"), Awaited("State(4)", "inv2"))
     made.came("inv1")
 
-    assert made.missing() == (Awaited("State(4)", "inv2"),)
+    assert made.missing_messages() == (Awaited("State(4)", "inv2"),)
 
 
 def test_the_deadline_counts_from_the_last_progress() -> None:
     """A rest has none."""
     made = barrier()
-    until = [made.until]
+    until = [made.deadline]
     made.renew(7.0)
-    until.append(made.until)
+    until.append(made.deadline)
     made.rest()
 
-    assert [*until, made.until] == [15.0, 17.0, None]
+    assert [*until, made.deadline] == [15.0, 17.0, None]
 
 
 def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
@@ -50,7 +50,7 @@ def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
     made = barrier()
     made.heard("inv1", 3, 2.0)
 
-    assert made.complaint(made.missing(), 15.0) == (
+    assert made.complaint(made.missing_messages(), 15.0) == (
         "plant: no State(4) from inv1 within 10 s; last heard of inv1: tick 3, 13.0 s ago. "
         "no State(4) from inv2 within 10 s; nothing was ever heard from inv2"
     )

@@ -70,7 +70,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
         plant.received(KEYS.state("inv2"), encode(said), now)
         while plant.work(now):
             pass
-        now = plant.until
+        now = plant.deadline
         plant.expire(now)
         plant.take_actions()
 

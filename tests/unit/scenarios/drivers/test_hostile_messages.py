@@ -150,7 +150,7 @@ class RealtimePlantScene(_Played):
         """Bring what is sent to it at tick k."""
         for name in NAMES:
             self.hear(KEYS.state(name), state(name, k))
-        self.now = self.side.until
+        self.now = self.side.deadline
         self.side.expire(self.now)
         self.take()
 
@@ -204,7 +204,7 @@ def test_nothing_raises_and_nothing_false_is_believed(make: Callable[[], _Played
     lines = flooded.side.rejects.take_lines()
 
     assert sent > 50_000
-    assert not flooded.side.over
+    assert not flooded.side.finished
     assert len(calm.done) > 100
     assert flooded.done == calm.done
     assert "failed" not in counts, lines
@@ -227,7 +227,7 @@ def test_tokens_of_anybody_change_nothing(make: Callable[[], _Played]) -> None:
             flooded.side.vanished(token, flooded.now)
     said = [action.text for action in flooded.done if isinstance(action, Say)]
 
-    assert not flooded.side.over
+    assert not flooded.side.finished
     assert _decided(flooded) == _decided(calm)
     assert all(text.isprintable() for text in said)
 

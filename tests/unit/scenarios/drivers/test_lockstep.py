@@ -159,7 +159,7 @@ def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
     torn = encode(ghost)[1:-4]
     sealed = torn + crc32(torn).to_bytes(4, "little")
     payloads = [rng.randbytes(40), sealed, b"x" * 70_000, encode(ghost), encode(late)]
-    while not run.plant.over:
+    while not run.plant.finished:
         run.step()
         for side in (run.plant, *run.agents):
             usable = payloads if run.telemetry else payloads[:3]

@@ -58,7 +58,7 @@ def test_an_agent_without_a_plant_says_so() -> None:
     agent = LockstepAgent(agent_config("inv1"), "a")
     agent.start(0.0)
     agent.expire(19.9)
-    assert not agent.over
+    assert not agent.finished
     agent.expire(20.0)
 
     assert agent.failed == "inv1: no sign of life from plant within 20 s; nothing was ever heard from plant"
@@ -70,7 +70,7 @@ def test_a_plant_that_is_built_slowly_is_waited_for() -> None:
     agent.start(0.0)
     agent.expire(599.9)
 
-    assert not agent.over
+    assert not agent.finished
     agent.expire(600.0)
     assert agent.failed.startswith("inv1: no sign of life from plant within ")
 
@@ -81,6 +81,6 @@ def test_a_plant_that_still_compiles_is_waited_for() -> None:
     agent.start(0.0)
     agent.appeared(agent.keys.alive_plant(1), 1.0)
 
-    assert agent.until is None
+    assert agent.deadline is None
     agent.vanished(agent.keys.alive_plant(1), 2.0)
     assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"
