@@ -9,5 +9,5 @@ from gridpeers.cli import app as cli
 
 def invoke(*words: str) -> tuple[int, str]:
     """Exit code of a command, and all that it printed."""
-    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False)
+    result = CliRunner().invoke(cli.app, list(words), catch_exceptions=False, env={"COLUMNS": "160"})
     return result.exit_code, result.output

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from xdist.remote import Producer
 
-from tests.side_by_side import RealTimeApart, give_way
+from tests.side_by_side import RealTimeApart, compile_once, give_way
 
 # A shell that runs its tests in the background, or nohup, has Ctrl-C ignored, and every process that a test starts
 # would inherit that; but what Ctrl-C does is what some of them are about.
@@ -23,6 +23,13 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working directory."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Prepare what all workers use, before there are any."""
+    if session.config.getoption("numprocesses", None):
+        compile_once()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> RealTimeApart:

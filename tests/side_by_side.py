@@ -12,12 +12,24 @@ REAL_TIME = ("tests/processes", "tests/schedules", "tests/netem_relay")
 """Folders of tests that keep real time: no two of them run at once, and what runs beside them gives way."""
 
 
+ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022")
+"""Folders whose tests look at the same runs of the catalogue: one worker has them all, and runs each case once."""
+
+SHORT = ("tests/unit", "tests/netem")
+"""Folders of tests of which each is short: they come last, so that no worker waits for another's long one."""
+
+
 class RealTimeApart(LoadFileScheduling):
     """A file of tests goes to any worker that is free, but one that keeps real time to the first worker alone."""
 
+    def _split_scope(self, nodeid: str) -> str:
+        file = super()._split_scope(nodeid)
+        return ONE_RUN[0] if _within(file, ONE_RUN) else str(file)
+
     def _assign_work_unit(self, node: WorkerController) -> None:
-        real_time = [file for file in self.workqueue if _keeps_real_time(file)]
-        others = [file for file in self.workqueue if not _keeps_real_time(file)]
+        real_time = [file for file in self.workqueue if _within(file, REAL_TIME)]
+        others = [file for file in self.workqueue if not _within(file, REAL_TIME)]
+        others.sort(key=lambda file: _within(file, SHORT) or not _within(file, ("tests",)))
         first = min(self.nodes, key=lambda each: int(each.gateway.id.removeprefix("gw")))
         choices = real_time or others if node is first else others
         if choices:
@@ -27,8 +39,16 @@ class RealTimeApart(LoadFileScheduling):
             node.shutdown()
 
 
-def _keeps_real_time(file: str) -> bool:
-    return any(PurePosixPath(file).is_relative_to(folder) for folder in REAL_TIME)
+def _within(file: str, folders: tuple[str, ...]) -> bool:
+    return any(PurePosixPath(file).is_relative_to(folder) for folder in folders)
+
+
+def compile_once() -> None:
+    """Compile the plant's inner loop in a fresh clone, before several processes do it side by side."""
+    from scenarios.operating_point import start_problem
+    from scenarios.spec import load_scenario
+
+    assert start_problem(*load_scenario("islanding")) == ""
 
 
 def give_way() -> None:

@@ -11,7 +11,6 @@ import importlib
 import sys
 from collections.abc import Callable
 from functools import cache
-from importlib import metadata
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from types import ModuleType
@@ -256,4 +255,6 @@ def _home(it: Any) -> tuple[str, str]:
 @cache
 def _entry_points(group: str) -> dict[str, str]:
     """References of a group's entry points, by name."""
+    from importlib import metadata  # a quarter of an agent's start, which resolves names of our own alone
+
     return {point.name: point.value for point in metadata.entry_points(group=group)}

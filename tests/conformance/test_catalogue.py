@@ -15,14 +15,12 @@ from tests.toy.runs import Rows, first_difference
 
 @pytest.mark.parametrize(
     ("name", "case"),
-    [("intermittency", "200kW"), ("reduced-communication", "link-failure"), ("unheard-switches", "frequency")],
+    [("intermittency", "200kW"), ("unheard-switches", "frequency")],
 )
 def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str) -> None:
-    """Available power that changes, a missing link, islands seen by frequency: the same history to the last bit."""
+    """Available power that changes, islands seen by frequency: the same history to the last bit."""
     scenario, feeder = load_scenario(name)
     events: tuple[Event, ...] = tuple(replace(event, t_s=0.1 + 0.1 * i) for i, event in enumerate(scenario.events[:2]))
-    if name == "reduced-communication":
-        events = events[:1]
     short = replace(scenario, events=events, time=replace(scenario.time, end_s=0.6))
     plant, agents = configs(short, feeder, case, endpoint(0))
     rows: dict[str, Rows] = {"alone": [], "together": []}

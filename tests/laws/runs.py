@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import gridpeers as gp
 
-SHORT = {"time.end_s": 2.0, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
-"""One second on the grid, and one of the islands that form then."""
+SHORT = {"time.end_s": 1.5, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
+"""One second on the grid, and half of one of the islands that form then."""
 
 
 Driver = Literal["inprocess", "processes"]

@@ -41,10 +41,15 @@ def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"fmu": build(cc, folder), "folder": str(folder)}
 
 
-@pytest.mark.parametrize("driver", ["inprocess", "processes"])
-@pytest.mark.parametrize("carrier", ["class", "program", "fmu"])
+@pytest.mark.parametrize(
+    ("carrier", "driver"),
+    [("class", "inprocess"), ("program", "inprocess"), ("fmu", "inprocess"), ("fmu", "processes")],
+)
 def test_every_carrier_of_a_law_gives_the_same_history(carrier: str, driver: Driver, fmu: dict[str, str]) -> None:
-    """The paper's law built in, as anybody's class, as a program and as an FMU: one hash, in one process and in ten."""
+    """The paper's law built in, as anybody's class, as a program and as an FMU: one hash, in one process and in ten.
+
+    Processes run a class in tests/unit/gridpeers/test_own_law.py, and a program in test_law_programs.py.
+    """
     laws: dict[str, Any] = {
         "class": "agents.laws.consensus:Consensus",
         "program": PROGRAM | PATIENT,

@@ -73,8 +73,8 @@ def test_the_voltage_law_delays_it_a_little(graph: str, event: LoadStep) -> None
 def test_the_plant_swings_beyond_the_limit_of_a_late_frequency_and_not_below() -> None:
     """Two control periods around the predicted limit part a swing that dies from one that stays."""
     limit = round(delay_limit(fleet("reduced"), "local loop") / T_C)
-    below = on_the_plant("reduced", measurement=limit - 1, frequency_only=True, end_s=12.0)
-    above = on_the_plant("reduced", measurement=limit + 2, frequency_only=True, end_s=12.0)
+    below = on_the_plant("reduced", measurement=limit - 1, frequency_only=True, end_s=9.0)
+    above = on_the_plant("reduced", measurement=limit + 2, frequency_only=True, end_s=9.0)
 
     assert below.f_error[-150:].max() < 0.02
     assert above.f_error[-150:].max() > 0.06
@@ -83,8 +83,8 @@ def test_the_plant_swings_beyond_the_limit_of_a_late_frequency_and_not_below() -
 def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
     """Agent-agent delay alone destabilises it beyond the predicted limit; around a follower the same delay does not."""
     ticks = round(delay_limit(fleet("star"), "neighbours") / T_C) + 10
-    leader = on_the_plant("star", link=ticks, end_s=20.0)
-    follower = on_the_plant("star around inv2", link=ticks, end_s=20.0)
+    leader = on_the_plant("star", link=ticks, end_s=16.0)
+    follower = on_the_plant("star around inv2", link=ticks, end_s=16.0)
 
     assert leader.f_error[-250:].max() > 0.04
     assert follower.f_error[-250:].max() < 0.02

@@ -13,8 +13,21 @@ from pathlib import Path
 from time import monotonic, sleep
 from types import TracebackType
 
+from tests.command_line import invoke
+
 DEADLINE = 40.0
 """Longest wait (s) for any line; on an idle machine all come within 3 s."""
+
+LIMIT = 512 * 1024
+"""Greatest size (bytes) of any file: the plant's compiled loop fits, the history of 7 s does not."""
+
+LIMITED = [
+    *(sys.executable, "-c"),
+    "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2);"
+    "os.execvp(sys.argv[2], sys.argv[2:])",
+    str(LIMIT),
+]
+"""Before a command, in whose files there is no more room."""
 
 
 class Terminal:
@@ -149,10 +162,9 @@ class Desk:
         self._terminals.append(terminal)
         return terminal
 
-    def type(self, *words: str, prefix: Sequence[str] = ()) -> tuple[int, str]:
-        """Run a command to its end; its exit status and what it printed."""
-        terminal = self.open(*words, prefix=prefix)
-        return terminal.end(), terminal.text
+    def type(self, *words: str) -> tuple[int, str]:
+        """Run a command to its end, in this process so that none need start; its exit status and what it printed."""
+        return invoke(*words, *self.options)
 
 
 def wait_for(file: Path, text: str) -> None:
@@ -161,3 +173,8 @@ def wait_for(file: Path, text: str) -> None:
     while not (file.exists() and text in file.read_text()):
         assert monotonic() < end, f"{file} has no {text!r}"
         sleep(0.02)
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes that the main thread of one has started."""
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]

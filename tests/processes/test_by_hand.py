@@ -6,12 +6,14 @@ import json
 import os
 import re
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from scenarios.drivers.rendezvous import rendezvous
-from tests.processes.terminals import Desk, Terminal, wait_for
+from tests.command_line import invoke
+from tests.commands.test_command import command
+from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of
 
 EVENTS = """
 [time]
@@ -39,17 +41,17 @@ def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:
     return plant
 
 
-def children_of(pid: int) -> list[int]:
-    """Processes that the main thread of one has started."""
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
 def test_terminals_in_the_order_of_people(desk: Desk) -> None:
-    """An agent before the plant, one after, one that is stopped and comes back, a switch, a look, and the end."""
+    """An agent before the plant, one after, one that is stopped and comes back, a switch, a look, and the end.
+
+    The plant says for whom it waits and how long, and starts without those who have not come.
+    """
     early = desk.open("agent", "inv2")
     early.expect("inv2: seeks the plant of run lab at tcp/127.0.0.1:")
     early.expect("inv2: no plant yet of run lab at .*; 2 of 60 s waited")
-    plant = plant_of(desk, "--out", "here")
+    plant = plant_of(desk, "--out", "here", wait=3.0)
+    plant.expect("inv2 joined")
+    plant.expect("started without the agents of inv1, inv3, inv4, ")
     early.expect("inv2: joins at t = ")
     late = desk.open("agent", "inv1")
     late.expect("inv1: joins at t = ")
@@ -91,162 +93,75 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
 
 
-def test_a_plant_waits_for_its_agents_as_long_as_told(desk: Desk) -> None:
-    """It says for whom and how long, and starts without those who have not come."""
-    first = desk.open("agent", "inv4")
-    first.expect("inv4: seeks the plant")  # before the plant's time runs: how long a process takes to start is not told
-    plant = plant_of(desk, wait=4.0)
+def test_what_befalls_an_agent_or_the_plant_is_told_in_the_terminals(desk: Desk) -> None:
+    """SIGSTOP, kill -9 and Ctrl-C of an agent, a spare one that comes, kill -9 and Ctrl-C of the plant.
 
-    plant.expect("inv4 joined")
-    plant.expect("started without the agents of inv1, inv2, inv3, inv5, ")
-    first.expect("inv4: joins at t = ")
-
-
-def test_ctrl_c_leaves_properly(desk: Desk) -> None:
-    """The agent's inverter is off the network; the plant's agents stay and seek it when the plant goes."""
+    Who is frozen is left out and welcome again; who was killed can be started again at once; who is asked to leave
+    takes its inverter off the network; agents stay when their plant goes, and join its next life.
+    """
     plant = plant_of(desk)
-    agents = [desk.open("agent", name) for name in ("inv1", "inv2")]
-    for agent in agents:
-        agent.expect("joins at t = ")
-
-    agents[1].signal(signal.SIGINT)
-    assert agents[1].end() == 130
-    plant.expect("inv2 left; its inverter is off the network")
-    plant.signal(signal.SIGINT)
-    assert plant.end() == 130
-    agents[0].expect("inv1: the plant is gone; holds, and seeks it again")
-
-
-def test_a_plant_killed_and_started_again_has_its_agents_back(desk: Desk) -> None:
-    """Kill -9 of the plant: the agents wait, visibly, and join its next life."""
-    plant = plant_of(desk)
-    agent = desk.open("agent", "inv1")
-    agent.expect("inv1: joins at t = ")
-
-    plant.signal(signal.SIGKILL)
-    agent.expect("inv1: the plant is gone; holds, and seeks it again")
-    plant_of(desk)
-    agent.expect("inv1: joins at t = ")
-
-
-def test_an_agent_killed_is_noticed_and_can_be_started_again(desk: Desk) -> None:
-    """Kill -9 of an agent: its inverter stays on droop, and a new agent takes over at once."""
-    plant = plant_of(desk)
-    agent = desk.open("agent", "inv2")
-    plant.expect("inv2 joined")
-
-    agent.signal(signal.SIGKILL)
-    plant.expect("inv2 died; its inverter stays on primary droop at its last set-points")
-    desk.open("agent", "inv2").expect("inv2: joins at t = ")
-    plant.expect("inv2 joined")
-
-
-def test_a_frozen_agent_is_left_out_and_welcome_again(desk: Desk) -> None:
-    """SIGSTOP: its neighbour goes on without it and `watch` says so; SIGCONT: it is heard again."""
-    plant_of(desk)
     first, second = desk.open("agent", "inv1"), desk.open("agent", "inv2")
     for agent in (first, second):
         agent.expect("joins at t = ")
     watch = desk.open("watch")
     watch.expect(r"inv1 .* inv2 ")
-
     second.signal(signal.SIGSTOP)
     watch.expect(r"inv1 .*without inv2|inv2 .*(silent for|no agent)")
     second.signal(signal.SIGCONT)
     watch.expect(r"inv1 .* inv2 ")
 
-
-def test_a_spare_inverter_comes_on_line_like_all_others(desk: Desk) -> None:
-    """inv10 is off until its agent comes; then the others hear it."""
-    plant = plant_of(desk)
-    desk.open("agent", "inv1").expect("inv1: joins at t = ")
+    second.signal(signal.SIGKILL)
+    plant.expect("inv2 died; its inverter stays on primary droop at its last set-points")
+    again = desk.open("agent", "inv2")
+    again.expect("inv2: joins at t = ")
+    plant.expect("inv2 joined")
     desk.open("agent", "inv10").expect("inv10: joins at t = ")
-
     plant.expect("inv10 connected")
-    watch = desk.open("watch")
-    watch.expect(r"inv1 .* inv10 ")
+    watch.expect(r"inv1 .* inv2,10 ")
+    again.signal(signal.SIGINT)
+    assert again.end() == 130
+    plant.expect("inv2 left; its inverter is off the network")
 
-
-def test_two_runs_side_by_side_do_not_meet(desk: Desk, tmp_path: Path) -> None:
-    """Each plant sees its own agents alone; a wrong name is told the right ones."""
-    plant_of(desk)
-    with Desk(tmp_path, "--run", "other", "--connect", rendezvous()) as elsewhere:
-        endpoint = elsewhere.options[-1]
-        other = elsewhere.open_bare("plant", "calm.toml", "--run", "other", "--listen", endpoint, "--wait", "0")
-        other.expect("t = 0; speed")
-        desk.open("agent", "inv1").expect("inv1: joins at t = ")
-        elsewhere.open("agent", "inv1").expect("inv1: joins at t = ")
-        elsewhere.open("agent", "inv2").expect("inv2: joins at t = ")
-        _, here = desk.type("status")
-        _, there = elsewhere.type("status")
-        mixed = elsewhere.open_bare("status", "--run", "lab", "--connect", endpoint, "--wait", "1")
-
-        assert re.search(r"\ninv2 .* no agent\n", here)
-        assert re.search(r"\ninv1 .* inv2 ", there)
-        assert mixed.end() == 2
-        assert f"no plant of run lab at {endpoint} within 1 s (runs there: other)" in mixed.text
+    plant.signal(signal.SIGKILL)
+    first.expect("inv1: the plant is gone; holds, and seeks it again")
+    plant = plant_of(desk)
+    first.expect("inv1: joins at t = ")
+    plant.signal(signal.SIGINT)
+    assert plant.end() == 130
+    first.expect("inv1: the plant is gone; holds, and seeks it again")
 
 
 def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
-    """An agent without inverter, a second one of a name, nobody to stop, no such switch, a port in use: exit 2."""
+    """An agent without inverter, a second one of a name, no such switch, no such run, one that is there: exit 2."""
     plant_of(desk)
     desk.open("agent", "inv2").expect("inv2: joins at t = ")
     endpoint = desk.options[-1]
-    tries = {
-        'no inverter "inv77" in run lab at .*; inverters are inv1, .*, inv9, inv10': ("agent", "inv77"),
-        "inv2: another agent of this name takes part in run lab already": ("agent", "inv2"),
-        'no agent "inv9" is running; running are: inv2': ("stop", "inv9"),
-        'switch "13-15": no such switch': ("event", "open", "13-15"),
+    agents = [desk.open("agent", name) for name in ("inv77", "inv2")]
+    second = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", endpoint)
+    said = {
+        'no inverter "inv77" in run lab at .*; inverters are inv1, .*, inv9, inv10': (agents[0].end(), agents[0].text),
+        "inv2: another agent of this name takes part in run lab already": (agents[1].end(), agents[1].text),
+        'no agent "inv9" is running; running are: inv2': desk.type("stop", "inv9"),
+        'switch "13-15": no such switch': desk.type("event", "open", "13-15"),
+        rf"no plant of run other at {endpoint} within 1 s \(runs there: lab\)": invoke(
+            "status", "--run", "other", "--connect", endpoint, "--wait", "1"
+        ),
     }
-    for said, words in tries.items():
-        code, text = desk.type(*words)
+    for what, (code, text) in said.items():
         errors = [line for line in text.splitlines() if line.startswith("gridpeers: ")]
 
         assert code == 2, text
         assert len(errors) == 1, text
-        assert re.search(said, errors[0])
+        assert re.search(what, errors[0])
         assert "Traceback" not in text
-    second = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", endpoint)
     assert second.end() == 2
     assert f"--listen: run lab is there already, at {endpoint}; gridpeers status --run lab " in second.text
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
-@pytest.mark.parametrize(
-    ("words", "log"),
-    [(("up", "--run", "lab", "--for", "4"), "log/plant.log"), (("run", "--clock", "wall"), "log/IV/plant.log")],
-    ids=["up", "run"],
-)
-def test_a_window_in_which_an_agent_was_frozen_does_not_pass_as_clean(
-    desk: Desk, words: tuple[str, ...], log: str
-) -> None:
-    """Frozen for less than Zenoh's lease, inv3 keeps its token; the window is flagged, and both ends are told."""
-    (desk.folder / "events.toml").write_text(EVENTS.replace("t_s = 0.6", "t_s = 3.0").replace("3600.0", "4.0"))
-    listen = ("--listen", desk.options[-1]) if words[0] == "up" else ()
-    command = desk.open_bare(words[0], "events.toml", *words[1:], *listen, "--out", "here")
-    told = desk.folder / "here" / log
-    wait_for(told, "t = 0; speed 1")
-    (inv3,) = [pid for pid in children_of(command.pid) if Path(f"/proc/{pid}/cmdline").read_text().endswith("inv3\0")]
-
-    os.kill(inv3, signal.SIGSTOP)
-    wait_for(told, "inv3 is silent: no state for 0.25 s, nothing comes from it")
-    os.kill(inv3, signal.SIGCONT)
-    wait_for(told, "inv3 is heard again")
-
-    assert command.end() == 0
-    command.expect(
-        "NOTE  case IV: early, late: not what the scenario means by it, which does not tell of: .* inv3 is sil"
-    )
-    metrics = json.loads((desk.folder / "here" / "metrics.json").read_text())
-    found = metrics["by_hand"] if words[0] == "up" else metrics["cases"]["IV"]
-    assert found["disturbed"] == ["early", "late"]
-    assert "inv3 is silent" in found["departures"][0]
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
-@pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGTERM", 143)])
 def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, status: int) -> None:
-    """The plant and nine agents at once; `down`, Ctrl-C or SIGTERM end them all, with numbers beside the history."""
+    """The plant and nine agents at once; `down` or SIGTERM ends them all, with numbers beside the history."""
     (desk.folder / "events.toml").write_text(EVENTS)
     up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
     for _ in range(9):
@@ -278,3 +193,27 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     early = metrics["cases"]["IV"]["early"]
     assert early["f_error_Hz"] is None  # 0.4 s after the event nothing is steady yet
     assert "last mean" in early["reasons"]["f_error_Hz"]
+
+
+def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> None:
+    """They serve until the run is ended, as if somebody read, and complain nowhere."""
+    endpoint = desk.options[-1]
+    reading, closed_pipe = os.pipe()
+    os.close(reading)
+    plant = ["plant", "calm.toml", "--run", "lab", "--listen", endpoint, "--wait", "0"]
+    agent = ["agent", "inv1", "--run", "lab", "--connect", endpoint]
+    started = [
+        subprocess.Popen(command(*words), cwd=desk.folder, stdout=closed_pipe, stderr=subprocess.PIPE, text=True)
+        for words in (plant, agent)
+    ]
+    os.close(closed_pipe)
+    try:
+        desk.open("watch", "--wait", f"{DEADLINE:g}").expect(r"inv1 +grid +\d")
+        code, text = desk.type("down")
+
+        assert code == 0, text
+        assert [(process.communicate(timeout=DEADLINE)[1], process.returncode) for process in started] == [("", 0)] * 2
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()

@@ -27,7 +27,7 @@ from wire.messages import (
 
 THREE = ("inv1", "inv2", "inv3")
 
-MESSAGES = 12_000
+MESSAGES = 6_000
 """As many as are published: some seconds."""
 
 

@@ -1,18 +1,24 @@
-"""The command that records a run stands still for longer than Zenoh's lease: the run goes on, the record is whole."""
+"""The command that records a run: it stands still for longer than Zenoh's lease, or its disk takes no more."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import signal
+from pathlib import Path
 
 import pytest
 
-from tests.processes.terminals import Desk, wait_for
+from tests.processes.terminals import LIMITED, Desk, children_of, wait_for
 
 SCENARIO = """
 [time]
 end_s = 14.0
+[[event]]
+label = "early"
+t_s = 0.2
+open = ["60-160"]
 [[event]]
 label = "late"
 t_s = 13.0
@@ -21,6 +27,8 @@ open = ["13-152"]
 secondary = "all"
 graph = "full"
 """
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
 
 
 @pytest.mark.parametrize(
@@ -32,14 +40,23 @@ graph = "full"
     ids=["up", "run"],
 )
 def test_a_recorder_that_stood_still_has_every_row(desk: Desk, words: tuple[str, ...], log: str) -> None:
-    """SIGSTOP until the plant has lost it, then SIGCONT: it comes back and gets all that it has missed."""
+    """SIGSTOP until the plant has lost it, then SIGCONT: it comes back and gets all that it has missed.
+
+    Meanwhile inv3 was frozen for less than the lease, and has kept its token: the window does not pass as clean, and
+    both ends are told.
+    """
     (desk.folder / "late.toml").write_text(SCENARIO)
     here = desk.folder / "here"
     listen = ("--listen", desk.options[-1]) if words[0] == "up" else ()
     command = desk.open_bare(*words, *listen, "--out", "here")
     wait_for(here / log, "t = 0; speed 2")
+    (inv3,) = [pid for pid in children_of(command.pid) if Path(f"/proc/{pid}/cmdline").read_text().endswith("inv3\0")]
 
     os.kill(command.pid, signal.SIGSTOP)
+    os.kill(inv3, signal.SIGSTOP)
+    wait_for(here / log, "inv3 is silent: no state for 0.25 s, nothing comes from it")
+    os.kill(inv3, signal.SIGCONT)
+    wait_for(here / log, "inv3 is heard again")
     wait_for(here / log, "is out of reach; what it misses is kept for a while")
     os.kill(command.pid, signal.SIGCONT)
     wait_for(here / log, "is back")
@@ -48,7 +65,37 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk, words: tuple[str,
     assert (here / "status.txt").read_text() == "complete\n"
     times = [float(line.split(",")[0]) for line in (here / "IV" / "history.csv").read_text().splitlines()[1:]]
     assert times == pytest.approx([0.01 * k for k in range(1401)])
+    command.expect("NOTE  case IV: early.*: not what the scenario means by it, which does not tell of: .* inv3 is sil")
     metrics = json.loads((here / "metrics.json").read_text())
     assert "missing" not in metrics.get("by_hand", {})
+    found = metrics["by_hand"] if words[0] == "up" else metrics["cases"]["IV"]
+    assert found["disturbed"][0] == "early"
+    assert "inv3 is silent" in found["departures"][0]
     measured = metrics["cases"]["IV"]["late"]
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
+
+
+def test_a_run_by_hand_goes_on_without_its_record_and_says_so(desk: Desk) -> None:
+    """At once: from when on and why. What happens is told to the end; then exit status 3, and no process left."""
+    (desk.folder / "late.toml").write_text(
+        '[time]\nend_s = 60.0\n[[event]]\nlabel = "late"\nt_s = 11.0\nopen = ["13-152"]\n'
+        '[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
+    )
+    words = ("up", "late.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
+    up = desk.open_bare(*words, "--speed", "4", "--for", "12", prefix=LIMITED)
+    for _ in range(9):
+        up.expect("inv[1-9] joined")
+    children = children_of(up.pid)
+    stopped = float(up.expect(r"the record ends at (.*) s: File too large; the run goes on without it")[1])
+    up.expect(r"11\.00 s  switch 13-152 opened")
+
+    assert up.end() == 3
+    assert "Traceback" not in up.text
+    assert re.search(r"ended at t = 12\.00 s; \d+ of 600 steps", up.text)
+    assert 0.0 < stopped < 11.0
+    why = up.expect(r"gridpeers: (the record ends at .* s: File too large)")[1]
+    assert (desk.folder / "here" / "status.txt").read_text() == f"broken: {why}\n"
+    assert len(children) == 10
+    for child in children:
+        with pytest.raises(ProcessLookupError):
+            os.kill(child, 0)

@@ -55,28 +55,8 @@ def desk(tmp_path: Path, router: Router) -> Iterator[Desk]:
         yield made
 
 
-def test_plant_agents_and_commands_meet_at_a_router(desk: Desk, router: Router) -> None:
-    """All know the router alone."""
-    router.start()
-    plant = desk.open("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0", "--wait", "0")
-    plant.expect("t = 0; speed")
-    for name in ("inv1", "inv2"):
-        desk.open("agent", name).expect(f"{name}: joins at t = ")
-    desk.open("watch").expect(r"inv1 .* inv2 ")
-    second, said = desk.type("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0")
-    code, _ = desk.type("stop", "inv2")
-
-    assert second == 2
-    assert f"--run: a plant of run site is there already, at {router.endpoint}; end it" in said
-
-    assert code == 0
-    plant.expect("inv2 left; its inverter is off the network")
-    assert desk.type("down")[0] == 0
-    assert plant.end() == 0
-
-
-def test_a_router_may_come_last_die_and_come_back(desk: Desk, router: Router) -> None:
-    """Who was there before it waits; while it is dead nobody is heard; when it is back all go on by themselves."""
+def test_all_meet_at_a_router_that_comes_last_dies_and_comes_back(desk: Desk, router: Router) -> None:
+    """All know the router alone. Who was there before it waits; while it is dead nobody is heard; then all go on."""
     agents = {name: desk.open("agent", name) for name in ("inv1", "inv4", "inv7")}
     for name, agent in agents.items():
         agent.expect(f"{name}: no plant yet")
@@ -87,6 +67,9 @@ def test_a_router_may_come_last_die_and_come_back(desk: Desk, router: Router) ->
         agent.expect(f"{name}: joins at t = ")
     watch = desk.open("watch")
     watch.expect(r"inv1 .* inv4,7 ")
+    second = desk.open("plant", "calm.toml", "--listen", "tcp/127.0.0.1:0")
+    assert second.end() == 2
+    assert f"--run: a plant of run site is there already, at {router.endpoint}; end it" in second.text
 
     router.stop()
     for name, agent in agents.items():
@@ -96,6 +79,9 @@ def test_a_router_may_come_last_die_and_come_back(desk: Desk, router: Router) ->
     for name, agent in agents.items():
         agent.expect(f"{name}: goes on at t = ")
     watch.expect(r"inv1 .* inv4,7 ")
+    code, text = desk.type("stop", "inv4")
+    assert code == 0, text
+    plant.expect("inv4 left; its inverter is off the network")
     code, text = desk.type("down")
 
     assert code == 0, text

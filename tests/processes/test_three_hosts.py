@@ -67,8 +67,8 @@ def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Pa
             agents[name].expect(f"{name}: goes on at t = ")
         watch.expect(r"inv1 .* inv2-9 ")
         watch.expect(r"inv9 .* inv1-8 ")
-        code, text = desk.type("down", prefix=hosts.at(3))
+        down = desk.open("down", prefix=hosts.at(3))
 
-        assert code == 0, text
+        assert down.end() == 0, down.text
         assert plant.end() == 0
         assert [agent.end() for agent in agents.values()] == [0] * 9

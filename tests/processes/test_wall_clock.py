@@ -6,7 +6,6 @@ Every wait is for a message, with a deadline.
 from __future__ import annotations
 
 import json
-import random
 import signal
 from itertools import pairwise
 from pathlib import Path
@@ -52,23 +51,11 @@ def settled(town: Town, of: tuple[int, ...] = (1, 2, 3)) -> Town:
     return town.until(at_rest, "60 Hz and equal set-points")
 
 
-def test_agents_killed_and_restarted_are_out_and_in_again(tmp_path: Path) -> None:
-    """Kill -9: reported, out of all sums, its inverter held; a new process of the name is a new life, and welcome."""
-    with Town(4, tmp_path).all() as town:
-        settled(town)
-        town.signal("inv2", signal.SIGKILL)
-        town.until_event("inv2", "inv2 died; its inverter stays on primary droop").together(OTHERS)
-        first = town.status["inv2"].incarnation
-        before = len(town.rows)
-        town.start("inv2").together(FOUR)
-        settled(town)
+def test_a_frozen_agent_and_a_killed_one_are_out_and_in_again(tmp_path: Path) -> None:
+    """SIGSTOP: neighbours drop it by age, long before its token is gone; SIGCONT: all use each other again.
 
-        assert town.status["inv2"].incarnation > first
-        assert largest_step(town.rows[before:], (1, 3, 4)) < 100.0
-
-
-def test_a_frozen_agent_is_out_within_half_a_second_and_welcome_when_it_wakes(tmp_path: Path) -> None:
-    """SIGSTOP for 3 s: neighbours drop it by age, long before its token is gone; SIGCONT: all use each other again."""
+    Kill -9: reported, out of all sums, its inverter held; a new process of the name is a new life, and welcome.
+    """
     with Town(4, tmp_path).all() as town:
         settled(town)
         frozen = monotonic()
@@ -76,8 +63,8 @@ def test_a_frozen_agent_is_out_within_half_a_second_and_welcome_when_it_wakes(tm
         town.together(OTHERS)
         noticed = monotonic() - frozen
         still = [key for key in town.tokens if "/inv2/" in key]
-        until, before = town.t + 3.0, len(town.rows)
-        town.until(lambda: town.t >= until, "3 s")
+        before = len(town.rows)
+        town.until(lambda: not any("/inv2/" in key for key in town.tokens), "its token is gone")
         town.signal("inv2", signal.SIGCONT)
         town.together(FOUR)
         settled(town)
@@ -87,47 +74,45 @@ def test_a_frozen_agent_is_out_within_half_a_second_and_welcome_when_it_wakes(tm
         assert largest_step(town.rows[before:], (1, 2, 3, 4)) < 100.0
         assert town.status["inv2"].phase == "running"
 
+        count = len(town.events)
+        town.signal("inv2", signal.SIGKILL)
+        town.until_event("inv2", "inv2 died; its inverter stays on primary droop", after=count).together(OTHERS)
+        first = town.status["inv2"].incarnation
+        before = len(town.rows)
+        town.start("inv2").together(FOUR)
+        settled(town)
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_who_is_asked_to_leave_leaves_properly(tmp_path: Path, number: int) -> None:
+        assert town.status["inv2"].incarnation > first
+        assert largest_step(town.rows[before:], (1, 3, 4)) < 100.0
+
+
+def test_who_is_asked_to_leave_leaves_properly(tmp_path: Path) -> None:
     """SIGTERM and Ctrl-C: its inverter is off the network, the others take over, and its exit status is 0."""
     others = ("inv1", "inv3", "inv4", "inv5", "inv6")
     with Town(6, tmp_path).all() as town:
         settled(town, of=(1, 2, 3, 4, 5, 6))
-        town.signal("inv2", number)
-        status = town.until_ended("inv2")
+        town.signal("inv2", signal.SIGTERM)
+        assert town.until_ended("inv2") == 0
         town.until_event("inv2", "inv2 disconnected").together(others)
         taken_over = settled(town, of=(1, 3, 4, 5, 6)).rows[-1]
         town.start("inv2").until_event("inv2", "inv2 connected").together((*others, "inv2"))
         settled(town, of=(1, 2, 3, 4, 5, 6))
+        count = len(town.events)
+        town.signal("inv2", signal.SIGINT)
+        assert town.until_ended("inv2") == 0
+        town.until_event("inv2", "inv2 disconnected", after=count).together(others)
 
-        assert status == 0
         assert P_outs(taken_over)[1] == 0.0
         assert P_outs(taken_over)[0] == pytest.approx(0.96 * 100e3, abs=300.0)
-        assert [event.subject for event in town.events if "left" in event.text] == ["inv2"]
+        assert [event.subject for event in town.events if "left" in event.text] == ["inv2", "inv2"]
         assert not any("died" in event.text for event in town.events)
 
 
-def test_a_plant_that_dies_is_held_out_for_and_its_successor_followed(tmp_path: Path) -> None:
-    """Kill -9 of the plant, which is the rendezvous too: agents hold and seek; a new plant has them all again."""
-    with Town(4, tmp_path).all() as town:
-        settled(town)
-        town.signal("plant", signal.SIGKILL)
-        town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")
-        held = {name: town.status[name].sent for name in FOUR}
-        town.until(lambda: all(town.status[name].received > 0 for name in FOUR), "news")
-        assert all(town.children[name].status is None for name in FOUR)
-        assert {name: town.status[name].sent for name in FOUR} == held
-        town.events.clear()
-        town.rows.clear()
-        town.start("plant").together(FOUR)
-        town.until_event("inv4", "inv4 joined")
+def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(tmp_path: Path) -> None:
+    """SIGSTOP: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was.
 
-        settled(town)
-
-
-def test_a_frozen_plant_puts_its_schedule_off_and_has_its_agents_again(tmp_path: Path) -> None:
-    """SIGSTOP of the plant: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was."""
+    Kill -9 of the plant, which is the rendezvous too: agents hold and seek; a new plant has them all again.
+    """
     with Town(4, tmp_path).all() as town:
         settled(town)
         town.signal("plant", signal.SIGSTOP)
@@ -143,35 +128,36 @@ def test_a_frozen_plant_puts_its_schedule_off_and_has_its_agents_again(tmp_path:
         assert town.telemetry.pacing.slipped > 1.0
         assert "s of wall time behind; all later steps are put off" in town.children["plant"].log.read_text()
 
+        town.signal("plant", signal.SIGKILL)
+        town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")
+        held = {name: town.status[name].sent for name in FOUR}
+        town.until(lambda: all(town.status[name].received > 0 for name in FOUR), "news")
+        assert all(town.children[name].status is None for name in FOUR)
+        assert {name: town.status[name].sent for name in FOUR} == held
+        town.events.clear()
+        town.rows.clear()
+        town.start("plant").together(FOUR)
+        town.until_event("inv4", "inv4 joined")
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_any_start_order_works(tmp_path: Path, seed: int) -> None:
+        settled(town)
+
+
+def test_a_start_order_works_in_which_the_plant_is_neither_first_nor_last(tmp_path: Path) -> None:
     """Agents wait for a plant; the plant waits for agents as long as told."""
-    order = ["plant", *FOUR]
-    random.Random(seed).shuffle(order)
     with Town(4, tmp_path) as town:
-        for name in order:
-            town.start(name)
+        town.start("inv3", "inv1", "plant", "inv4", "inv2")
         town.together(FOUR)
         settled(town)
 
         assert [event.subject for event in town.events if "joined" in event.text and event.t > 0.0] == []
 
 
-def test_a_plant_does_not_wait_for_ever(tmp_path: Path) -> None:
-    """Told to wait for nobody it starts alone; agents come when they come."""
-    with Town(3, tmp_path, wait_for_agents=0.0) as town:
+def test_a_plant_that_waits_for_nobody_has_its_agents_and_a_spare_one_as_they_come(tmp_path: Path) -> None:
+    """It starts alone; an agent nobody has heard of brings its inverter on line, and all share with it."""
+    with Town(4, tmp_path, spares=("inv4",), wait_for_agents=0.0) as town:
         town.start("plant").until(lambda: town.t > 0.3, "the plant runs")
         assert "started without the agents of inv1, inv2, inv3" in town.children["plant"].log.read_text()
         town.start("inv1", "inv2", "inv3").together(("inv1", "inv2", "inv3"))
-
-        settled(town)
-
-
-def test_a_spare_inverter_joins(tmp_path: Path) -> None:
-    """An agent nobody has heard of brings its inverter on line, and all share with it; nobody else is touched."""
-    with Town(4, tmp_path, spares=("inv4",)) as town:
-        town.all()
         settled_without = [event for event in town.events if event.subject == "inv4"]
         town.start("inv4").until_event("inv4", "inv4 connected").together(FOUR)
         settled(town)

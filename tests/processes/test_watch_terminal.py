@@ -29,41 +29,41 @@ def read_until(file: int, wanted: bytes, deadline: float = 40.0) -> bytes:
     return seen
 
 
-@pytest.mark.parametrize(("key", "status"), [(b"q", 0), (b"", 130)], ids=["q", "ctrl-c"])
-def test_watch_is_a_table_until_a_key_quits(tmp_path: Path, key: bytes, status: int) -> None:
+def test_watch_is_a_table_until_a_key_quits(tmp_path: Path) -> None:
     """The table is on the alternate screen; q and Ctrl-C leave it, and echo is on again."""
     (tmp_path / "calm.toml").write_text('[time]\nend_s = 1.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n')
     endpoint = rendezvous()
     with Desk(tmp_path, "--run", "lab") as desk:
         desk.open("plant", "calm.toml", "--listen", endpoint, "--wait", "0").expect("t = 0; speed")
-        master, slave = pty.openpty()
-        before = termios.tcgetattr(slave)
-        words = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "watch", "--run", "lab"]
-        watch = subprocess.Popen(
-            [*words, "--connect", endpoint],
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
-            start_new_session=True,
-            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "150", "LINES": "40"},
-        )
-        try:
-            seen = read_until(master, b"q: quit")
-            if key:
-                os.write(master, key)
-            else:
-                watch.send_signal(signal.SIGINT)
-            read_until(master, b"\x1b[?1049l")  # back from the alternate screen
-            code = watch.wait(20)
-        finally:
-            if watch.poll() is None:
-                watch.kill()
-                watch.wait()
-        after = termios.tcgetattr(slave)
-        os.close(slave)
-        os.close(master)
+        for key, status in ((b"q", 0), (b"", 130)):
+            master, slave = pty.openpty()
+            before = termios.tcgetattr(slave)
+            words = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "watch", "--run", "lab"]
+            watch = subprocess.Popen(
+                [*words, "--connect", endpoint],
+                stdin=slave,
+                stdout=slave,
+                stderr=slave,
+                start_new_session=True,
+                env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "150", "LINES": "40"},
+            )
+            try:
+                seen = read_until(master, b"q: quit")
+                if key:
+                    os.write(master, key)
+                else:
+                    watch.send_signal(signal.SIGINT)
+                read_until(master, b"\x1b[?1049l")  # back from the alternate screen
+                code = watch.wait(20)
+            finally:
+                if watch.poll() is None:
+                    watch.kill()
+                    watch.wait()
+            after = termios.tcgetattr(slave)
+            os.close(slave)
+            os.close(master)
 
-    assert code == status
-    assert b"\x1b[?1049h" in seen
-    assert b"inv10" in seen
-    assert after == before
+            assert code == status
+            assert b"\x1b[?1049h" in seen
+            assert b"inv10" in seen
+            assert after == before

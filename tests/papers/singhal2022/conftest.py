@@ -1,17 +1,15 @@
-"""The paper's experiments, each case run once for all tests of this folder."""
+"""The paper's experiments, each case run once for all tests of this folder and for the pinned histories."""
 
 from dataclasses import dataclass
 
 import pytest
 
 from papers.singhal2022.claims import CLAIMS
-from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings, Results, find
 from scenarios.results.history import History, Plates
 from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
-from wire.messages import Telemetry
+from tests.golden.catalogue.pins import ran
 
 
 @dataclass(frozen=True)
@@ -80,14 +78,9 @@ def experiment(name: str) -> Experiment:
     events = [(event.label, event.t_s) for event in scenario.events]
     histories = {}
     for case in scenario.cases:
-        rows: list[tuple[float, ...]] = []
-
-        def take(telemetry: Telemetry, rows: list[tuple[float, ...]] = rows) -> None:
-            rows.extend(telemetry.rows)
-
-        outcome = run_inprocess(*configs(scenario, feeder, case), take)
+        recorded, outcome = ran(name, case)
         assert not outcome.broke
         assert outcome.reproducible
-        histories[case] = History.of(plates.names, rows)
+        histories[case] = History.of(plates.names, recorded.rows)
     found = find(scenario, feeder, plates, histories, dict.fromkeys(histories, events))
     return Experiment(plates, histories, found)

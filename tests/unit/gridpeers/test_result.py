@@ -141,15 +141,17 @@ def test_what_is_no_folder_or_case_is_told_in_one_line(scenario: gp.Scenario, ru
         scenario.run([5])  # type: ignore[list-item]
 
 
-@pytest.mark.parametrize("name", ["IV/history.csv", "IV/events.csv", "report.txt"])
-def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path, name: str) -> None:
+def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path) -> None:
     """Removed, or bytes that are no text: one line with the file, whenever it is asked for."""
     folder = run.save(tmp_path / "run")
-    for spoilt in (b"\xff\x00\n", None):
-        (folder / name).unlink()
-        if spoilt is not None:
-            (folder / name).write_bytes(spoilt)
-        opened = gp.read(folder)
-        assert isinstance(opened, gp.Result)
-        with pytest.raises(gp.FolderError, match=f"{name}: cannot be read: .*; run the scenario again"):
-            _ = (opened.history, opened.events, opened.report)
+    for name in ("IV/history.csv", "IV/events.csv", "report.txt"):
+        whole = (folder / name).read_bytes()
+        for spoilt in (b"\xff\x00\n", None):
+            (folder / name).unlink()
+            if spoilt is not None:
+                (folder / name).write_bytes(spoilt)
+            opened = gp.read(folder)
+            assert isinstance(opened, gp.Result)
+            with pytest.raises(gp.FolderError, match=f"{name}: cannot be read: .*; run the scenario again"):
+                _ = (opened.history, opened.events, opened.report)
+        (folder / name).write_bytes(whole)

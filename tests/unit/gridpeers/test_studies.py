@@ -20,6 +20,12 @@ def scenario() -> gp.Scenario:
     return gp.load("islanding").replace({**changes, "case.II": None, "case.III": None})
 
 
+@pytest.fixture(scope="module")
+def runs(scenario: gp.Scenario) -> gp.Results:
+    """Both cases of it."""
+    return scenario.run()
+
+
 def test_a_sweep_is_a_row_per_run_with_the_metrics_asked_for(scenario: gp.Scenario) -> None:
     """Every combination of the grid, each case, and a history by each row."""
     table = gp.sweep(
@@ -116,9 +122,8 @@ def test_another_law_is_not_predicted_by_the_theory_of_the_papers() -> None:
         gp.predict(gp.load("islanding").replace({"case.IV.law": "dapi"}), "IV", voltage=False)
 
 
-def test_a_comparison_tells_what_differs(scenario: gp.Scenario, tmp_path: Path) -> None:
+def test_a_comparison_tells_what_differs(scenario: gp.Scenario, runs: gp.Results) -> None:
     """Changed keys, metrics of both with their difference, and a figure with a curve for each."""
-    runs = scenario.run()
     other = scenario.replace({"gains.k_p": 0.001}).run("IV")
 
     found = gp.compare(runs["IV"], other, names=("before", "after"))
@@ -154,12 +159,12 @@ def test_the_command_compare_prints_the_table_and_draws_both(
     assert text == "gridpeers: nowhere: this is no folder of a run, which has a file status.txt\n"
 
 
-def test_runs_without_a_common_case_are_not_compared(scenario: gp.Scenario) -> None:
+def test_runs_without_a_common_case_are_not_compared(runs: gp.Results) -> None:
     """What cannot be compared is told."""
-    runs = scenario.run()
+    others = gp.load("islanding").replace({"time.end_s": 0.2, "event": None, "paper": ""}).run(["II", "III"])
 
     with pytest.raises(gp.ScenarioError, match="no case in common: the first has I, IV, the second II, III; run one"):
-        gp.compare(runs, gp.load("islanding").replace({"time.end_s": 4.5}).run(["II", "III"]))
+        gp.compare(runs, others)
     with pytest.raises(gp.ScenarioError, match="needs results or folders of runs, got 3"):
         gp.compare(runs, 3)  # type: ignore[arg-type]
     with pytest.raises(gp.ScenarioError, match="two different words"):

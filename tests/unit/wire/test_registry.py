@@ -1,7 +1,7 @@
 """What is plugged in by an installed distribution: found by its entry point, like anybody's own."""
 
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint
+from importlib import metadata
 
 import pytest
 
@@ -14,10 +14,10 @@ from wire.plugin import Plugin, made, problems
 def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Two entry points in the group of graphs, one of which leads nowhere."""
     points = (
-        EntryPoint("round", "agents.graphs:ring", "gridpeers.graphs"),
-        EntryPoint("broken", "agents.graphs:nowhere", "gridpeers.graphs"),
+        metadata.EntryPoint("round", "agents.graphs:ring", "gridpeers.graphs"),
+        metadata.EntryPoint("broken", "agents.graphs:nowhere", "gridpeers.graphs"),
     )
-    monkeypatch.setattr(registry.metadata, "entry_points", lambda group: points if group == GRAPHS.group else ())
+    monkeypatch.setattr(metadata, "entry_points", lambda group: points if group == GRAPHS.group else ())
     registry._entry_points.cache_clear()
     yield
     registry._entry_points.cache_clear()

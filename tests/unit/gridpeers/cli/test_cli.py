@@ -141,8 +141,12 @@ def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch, module: str,
     assert not Path("runs").exists()
 
 
-def test_a_run_fills_its_folder(elsewhere: Path) -> None:
-    """Scenario as run, metrics, history, events, figures, log and report are there when the command ends."""
+def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -> None:
+    """Scenario as run, metrics, history, events, figures, log and report; `gridpeers run FOLDER/scenario.toml`.
+
+    metrics.json has exactly these keys, numbers where numbers are promised, null where nothing was restored or a reason
+    is told.
+    """
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--out", "here")
@@ -159,17 +163,10 @@ def test_a_run_fills_its_folder(elsewhere: Path) -> None:
     assert as_run["seed"] == 7
     assert as_run["as_run"].keys() >= {"driver", "gridpeers", "python", "eclipse-zenoh"}
 
-
-def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
-    """Exactly these keys, numbers where numbers are promised, null where nothing was restored or a reason is told."""
-    (elsewhere / "short.toml").write_text(SHORT)
-
-    invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
-
     found = json.loads((elsewhere / "here" / "metrics.json").read_text())
     assert {key: found[key] for key in ("scenario", "seed", "driver")} == {
         "scenario": "islanding",
-        "seed": 1,
+        "seed": 7,
         "driver": "inprocess",
     }
     assert found.keys() == {"scenario", "seed", "driver", "cases"}
@@ -184,16 +181,10 @@ def test_metrics_json_has_the_promised_layout(elsewhere: Path) -> None:
     assert nulls == {"t_restore_s", *(reasons.keys() & measures.keys())}
     assert all(isinstance(value, float) for name, value in measures.items() if name not in nulls)
 
+    code, text = invoke("run", "here/scenario.toml", "--driver", "inprocess", "--out", "again")
 
-def test_a_runs_copy_of_its_scenario_gives_the_same_bytes(elsewhere: Path) -> None:
-    """`gridpeers run FOLDER/scenario.toml` repeats the run."""
-    (elsewhere / "short.toml").write_text(SHORT)
-
-    invoke("run", "short.toml", "--driver", "inprocess", "--out", "a")
-    code, _ = invoke("run", "a/scenario.toml", "--driver", "inprocess", "--out", "b")
-
-    assert code == 0
-    assert Path("a/I/history.csv").read_bytes() == Path("b/I/history.csv").read_bytes()
+    assert code == 0, text
+    assert Path("here/I/history.csv").read_bytes() == Path("again/I/history.csv").read_bytes()
 
 
 def test_a_scenario_without_events_runs_and_measures_nothing(elsewhere: Path) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes.terminals import DEADLINE, Desk
-from tests.processes.test_command import command
+from tests.commands.test_command import command
+from tests.processes.terminals import DEADLINE
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def closed_pipe() -> Iterator[int]:
 
 @pytest.mark.parametrize(
     "words",
-    [["list"], ["doc", "scenario"], ["--help"], ["run", "calm.toml", "--driver", "inprocess", "--out", "here"]],
+    [["list"], ["run", "calm.toml", "--driver", "inprocess", "--out", "here"]],
     ids=lambda words: words[0],
 )
 def test_a_command_that_nobody_reads_ends_without_a_word(words: list[str], closed_pipe: int, tmp_path: Path) -> None:
@@ -55,24 +55,3 @@ def test_the_tools_of_netem_end_as_gridpeers_does(words: list[str], closed_pipe:
     )
 
     assert (done.returncode, done.stderr) == (141, "")
-
-
-def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk, closed_pipe: int) -> None:
-    """They serve until the run is ended, as if somebody read, and complain nowhere."""
-    endpoint = desk.options[-1]
-    plant = ["plant", "calm.toml", "--run", "lab", "--listen", endpoint, "--wait", "0"]
-    agent = ["agent", "inv1", "--run", "lab", "--connect", endpoint]
-    started = [
-        subprocess.Popen(command(*words), cwd=desk.folder, stdout=closed_pipe, stderr=subprocess.PIPE, text=True)
-        for words in (plant, agent)
-    ]
-    try:
-        desk.open("watch", "--wait", f"{DEADLINE:g}").expect(r"inv1 +grid +\d")
-        code, text = desk.type("down")
-
-        assert code == 0, text
-        assert [(process.communicate(timeout=DEADLINE)[1], process.returncode) for process in started] == [("", 0)] * 2
-    finally:
-        for process in started:
-            process.kill()
-            process.communicate()

@@ -1,0 +1,68 @@
+"""Runs in which the agents of some inverters are examples/foreign_agent.py, which knows our protocol from its page."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from agents.config import AgentConfig
+from plant.config import PlantConfig
+from scenarios.drivers.children import Children
+from scenarios.drivers.outcome import Outcome
+from scenarios.drivers.rendezvous import rendezvous
+from tests.toy.runs import FleetRun
+
+PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"
+
+
+class Mixed(FleetRun):
+    """A run in which the agents of some inverters are foreign; all logs lie in one folder."""
+
+    def __init__(
+        self, plant: PlantConfig, agents: Sequence[AgentConfig], log_dir: Path, foreign: Sequence[str]
+    ) -> None:
+        self.endpoint = rendezvous()
+        ours = [agent for agent in agents if agent.name not in foreign]
+        super().__init__(replace(plant, listen=(self.endpoint,)), ours, log_dir)
+        self._first = {agent.name: agent for agent in agents if agent.name in foreign}
+        self.foreigners: list[subprocess.Popen[bytes]] = []
+
+    def start(self, name: str) -> None:
+        """Start a foreign agent as a person would: told by the plant in real time, by a file in simulated time."""
+        wall = self.plant.clock == "wall"
+        with (self.log_dir / f"{name}-foreign-{len(self.foreigners)}.log").open("wb") as log:
+            options = [self.endpoint, self.plant.run, name] if wall else []
+            process = subprocess.Popen([sys.executable, PROGRAM, *options], stdin=subprocess.PIPE, stderr=log)
+        self.foreigners.append(process)
+        assert process.stdin is not None
+        with process.stdin as pipe:
+            if not wall:
+                pipe.write(msgspec.json.encode(replace(self._first[name], connect=(self.endpoint,))))
+
+    def _started(self, children: Children) -> None:
+        super()._started(children)
+        for name in self._first:
+            self.start(name)
+
+    def __call__(self, **more: Any) -> Outcome:
+        """Run, and wait for the foreign agents to end."""
+        try:
+            outcome = super().__call__(**more)
+            for process in self.foreigners:
+                process.wait(timeout=10.0)
+            return outcome
+        finally:
+            for process in self.foreigners:
+                process.kill()
+                process.wait()
+
+    def dropped(self) -> list[str]:
+        """Logs of ours that tell of a message that was dropped."""
+        ours = [log for log in self.log_dir.glob("*.log") if "-foreign-" not in log.name]
+        return [text for log in ours if "dropped" in (text := log.read_text())]
