@@ -31,7 +31,7 @@ def test_the_run_is_written_where_it_was_to_be_and_read_from_there(
 
     assert Path.cwd() == Path("/")
     assert (tmp_path / "here" / "status.txt").read_text() == "complete\n"
-    assert written.history.index[-1] == 2.0
+    assert written.history.index[-1] == 1.5
 
     monkeypatch.chdir(tmp_path)
     read = gp.read("here")
