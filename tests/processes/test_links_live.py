@@ -197,9 +197,11 @@ def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
     """What people type and read: set, cut, show, status, heal, mistakes; the record, and a scenario that can be run."""
     listen = desk.options[-1]
     kept = ("--out", "here", "--record", "again.toml")
+    agents = [desk.open("agent", name) for name in ("inv1", "inv4")]
+    for agent in agents:
+        agent.expect("seeks the plant of run lab")
     plant = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", listen, "--wait", "0", *kept)
     plant.expect("t = 0; speed")
-    agents = [desk.open("agent", name) for name in ("inv1", "inv4")]
     joined = max(float(agent.expect(r"joins at t = ([\d.]+)")[1]) for agent in agents)
 
     code, text = desk.type("link", "set", "inv1 -> inv4", "--delay", "0.1", "--jitter", "0.02", "--loss", "0.2")
