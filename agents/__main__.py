@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from agents.config import AgentConfig
-from agents.runtime import run_agent
+from agents.agent_config import AgentConfig
+from agents.agent_process import run_agent
 from wire.driver.process import main
 
 if __name__ == "__main__":

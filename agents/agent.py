@@ -11,13 +11,13 @@ from math import inf
 
 from msgspec.structs import replace
 
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
+from agents.degraded_communication import SaturationDetector, StalenessWeights
 from agents.graphs import GraphError
-from agents.handling import Follows, Worth
+from agents.island_detector import IslandDetector
 from agents.laws.call import LawError, begun, decided
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING, Law, Neighbour, Own
-from agents.slip import Slips
 from agents.topology import in_neighbours, rule_of
 from wire.codec import RejectedError, decode, encode
 from wire.messages import OFF, Measurement, Nameplate, State
@@ -83,7 +83,7 @@ class Agent:
     --------
     Where secondary control is not for this inverter, it keeps what the plant holds:
 
-    >>> from agents.config import Control
+    >>> from agents.agent_config import Control
     >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
     ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="none", graph="none"), deadline=10.0,
     ...     connect=()))
@@ -111,12 +111,12 @@ class Agent:
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.acts(config.name, config.kind)
         handling = config.control.handling
-        self._worth = Worth(handling)
+        self._worth = StalenessWeights(handling)
         self._silent_at_most = SPEAKS * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
         self._stops = handling.anti_windup == "conditional"
         self._is_told_islands = handling.islands == "switches"
-        self._slips = Slips(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
-        self._follows_P, self._follows_V = Follows(handling.T_sat), Follows(handling.T_sat)
+        self._slips = IslandDetector(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
+        self._follows_P, self._follows_V = SaturationDetector(handling.T_sat), SaturationDetector(handling.T_sat)
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
@@ -196,8 +196,8 @@ class Agent:
         measurement : Measurement
             What the own sensors read now; the own values are always fresh.
         neighbours : Sequence[str], optional
-            Whom to listen to. Of each the last state heard counts, for what `agents.handling` says it is worth; one
-            that was never heard, or stands in another island, is left out of the sums.
+            Whom to listen to. Of each the last state heard counts, for what `agents.degraded_communication` says it is
+            worth; one that was never heard, or stands in another island, is left out of the sums.
         ages : Mapping[str, float], optional
             Age of these states (s of run time), where the own clock knows more than the times written in them. Without
             it, from there to the own measurement.
@@ -267,7 +267,9 @@ class Agent:
             angle=None if self._slips is None else self._slips.angle,
         )
 
-    def _out_of_step(self, slips: Slips, measurement: Measurement, neighbours: Sequence[str]) -> frozenset[str]:
+    def _out_of_step(
+        self, slips: IslandDetector, measurement: Measurement, neighbours: Sequence[str]
+    ) -> frozenset[str]:
         """Neighbours that the frequency tells to stand in another island; on the grid nobody does."""
         t = measurement.t
         if measurement.grid_connected:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf
 
 from agents.agent import Agent, check_nameplate
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
 from agents.laws.law import Law
 from agents.neighbour_states import NeighbourStates
 from wire.actions import Listen

@@ -17,11 +17,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Protocol
 
 from wire.anybody import ANYTHING, named
-from wire.nearest import suggestion
 from wire.plugin import Plugin, made
 from wire.plugin_shape import callable_objection
 from wire.printable import printable
 from wire.registry import PluginError, Registry
+from wire.suggestion import suggestion
 
 
 class Member(Protocol):

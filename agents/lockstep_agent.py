@@ -23,8 +23,8 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from agents.agent import Agent
+from agents.agent_config import AgentConfig
 from agents.agent_node import REPORT_TICKS, AgentNode
-from agents.config import AgentConfig
 from agents.laws.law import Law
 from agents.topology import is_pairwise
 from wire.clock import time_of

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from agents.config import Control
+from agents.agent_config import Control
 from agents.graphs import (
     GFM_only,
     Graph,

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from plant.config import GflParameters, PlantSettings, SwitchEvent
 from plant.dynamics import PlantError
 from plant.feeder import Plant, raise_for_trip
 from plant.network import Network
+from plant.plant_config import GflParameters, PlantSettings, SwitchEvent
 from plant.tables import read_feeder
 
 FLEETS = {

@@ -25,7 +25,7 @@ from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.setup import Setup
+from scenarios.emulation.emulation_config import Setup
 from scenarios.results.record import Tape
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs

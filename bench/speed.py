@@ -29,8 +29,8 @@ import floor
 import wire.codec
 from agents.agent import Agent
 from plant.build import build_plant
-from scenarios.drivers.fleet import run_processes
 from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.process_driver import run_processes
 from scenarios.results.record import Recorder
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs

@@ -16,7 +16,7 @@ from ping import STAMP, StampedInbox, stamp_of
 
 from plant.equipment import F_NOM
 from scenarios.drivers.children import Child, Children
-from scenarios.live.setup import Wishes, set_up
+from scenarios.live.live_options import LiveOptions, set_up
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import load_scenario
 from wire.codec import decode, encode
@@ -39,7 +39,7 @@ BUILD = 600.0
 HOLD = 0.5
 """How long (s of run time) the bands must hold to count as restored; longer than noticing takes."""
 
-_AGENT = "scenarios.emulation.agent"
+_AGENT = "scenarios.emulation.emulated_agent"
 """Agents by hand stand behind emulated links, that somebody may hurt."""
 
 _ELSEWHERE = "import os, sys; os.execvp(sys.argv[1], sys.argv[1:])"
@@ -68,7 +68,7 @@ class Watched:
     def __init__(self, folder: Path, endpoint: str, listen: str, elsewhere: dict[str, tuple[str, list[str]]]) -> None:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
-        self.plant_config, agents = set_up(scenario, feeder, Wishes(run=RUN, case="IV", wait=PATIENCE), endpoint)
+        self.plant_config, agents = set_up(scenario, feeder, LiveOptions(run=RUN, case="IV", wait=PATIENCE), endpoint)
         self.names = self.plant_config.agents
         self._places = {name: elsewhere.get(name, (listen, [])) for name in self.names}
         self.agents = {
@@ -150,7 +150,12 @@ class Watched:
             log = self._folder / f"{name}-{len(self.children.lives(name))}.log"
             if name == PLANT:
                 child = Child(
-                    name, ["-m", "scenarios.emulation.plant"], self.plant_config, log, self._ended, lambda word: None
+                    name,
+                    ["-m", "scenarios.emulation.emulated_plant"],
+                    self.plant_config,
+                    log,
+                    self._ended,
+                    lambda word: None,
                 )
             else:
                 _, prefix = self._places[name]

@@ -22,25 +22,25 @@ from gridpeers.origin import check_origin
 check_origin()
 
 if TYPE_CHECKING:
-    from agents.carriers.registry import LAWS
+    from agents.carriers.law_registry import LAWS
     from agents.graphs import GRAPHS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
-    from gridpeers.runs.reading import read
     from gridpeers.runs.result import Result, Results
+    from gridpeers.runs.run_reading import read
     from gridpeers.scenario import Scenario, load
     from gridpeers.studies.comparison import Comparison, compare
     from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.sweeping import sweep
-    from netem.models.own import FAULTS, LinkFault
+    from netem.models.own_fault import FAULTS, LinkFault
     from plant.equipment import Feeder
     from scenarios.results.claims.claim import Claim
-    from scenarios.results.folder import FolderError
     from scenarios.results.own.claim_registry import CLAIMS
     from scenarios.results.own.metric import METRICS
     from scenarios.results.own.window_data import WindowData
+    from scenarios.results.run_files import FolderError
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
-    from scenarios.spec.mistakes import ScenarioError
+    from scenarios.spec.scenario_errors import ScenarioError
     from wire.parameters import Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
@@ -51,9 +51,9 @@ _HOME = {
     "Claim": "scenarios.results.claims.claim",
     "Comparison": "gridpeers.studies.comparison",
     "Feeder": "plant.equipment",
-    "FolderError": "scenarios.results.folder",
+    "FolderError": "scenarios.results.run_files",
     "Law": "agents.laws.law",
-    "LinkFault": "netem.models.own",
+    "LinkFault": "netem.models.own_fault",
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
@@ -61,7 +61,7 @@ _HOME = {
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
-    "ScenarioError": "scenarios.spec.mistakes",
+    "ScenarioError": "scenarios.spec.scenario_errors",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
     "WindowData": "scenarios.results.own.window_data",
@@ -69,12 +69,12 @@ _HOME = {
     "claim": "scenarios.results.own.claim_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",
-    "law": "agents.carriers.registry:LAWS.register",
-    "link_fault": "netem.models.own:FAULTS.register",
+    "law": "agents.carriers.law_registry:LAWS.register",
+    "link_fault": "netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
     "metric": "scenarios.results.own.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
-    "read": "gridpeers.runs.reading",
+    "read": "gridpeers.runs.run_reading",
     "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
@@ -120,7 +120,7 @@ if not TYPE_CHECKING:
 
             return version("gridpeers")
         if name not in _HOME:
-            from wire.nearest import suggestion
+            from wire.suggestion import suggestion
 
             raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
         module, _, attributes = _HOME[name].partition(":")

@@ -5,7 +5,7 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from scenarios.results.benchmarks import BENCHMARKS, Benchmark, benchmark_of
+from scenarios.results.benchmark_registry import BENCHMARKS, Benchmark, benchmark_of
 from scenarios.results.claims.claim import Claim, Judge, Verdict, judge
 from scenarios.results.findings import Findings, label
 from scenarios.results.metrics import F_BAND, MPSI_BAND, Steady

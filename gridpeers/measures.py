@@ -41,8 +41,8 @@ def plates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Plates:
     case : str, optional
         Leave out the inverters that have no agent in this case, as the sharing indices do.
     """
+    from scenarios.spec.agent_schedule import inverters_of
     from scenarios.spec.agentless import without_agent
-    from scenarios.spec.moves import inverters_of
 
     plates = Plates.of(inverters_of(spec, feeder))
     return plates.without(without_agent(spec, case)) if case else plates

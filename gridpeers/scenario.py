@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from gridpeers.values import plain
-from scenarios.spec import model
+from scenarios.spec import scenario_model as model
 from scenarios.spec.loading import check_tables, find_scenario, read_toml
-from scenarios.spec.mistakes import Mistakes, ScenarioError
+from scenarios.spec.scenario_errors import Mistakes, ScenarioError
 from scenarios.sweep.file.paths import PathError, Tree, put, remove
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class Scenario:
         >>> load("islanding").replace({"gains.k_p": "much", "case.VI.graph": "ring"})
         Traceback (most recent call last):
             ...
-        scenarios.spec.mistakes.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
+        scenarios.spec.scenario_errors.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
         replace: gains.k_p: must be a number, got "much"
         """
         if not isinstance(changes, Mapping) or not all(isinstance(path, str) for path in changes):
@@ -246,13 +246,13 @@ class Scenario:
     @property
     def inverters(self) -> tuple[str, ...]:
         """Names of the inverters, those that join later last."""
-        from scenarios.spec.moves import inverters_of
+        from scenarios.spec.agent_schedule import inverters_of
 
         return tuple(row.name for row in inverters_of(self._spec, self._feeder))
 
     @property
     def spec(self) -> model.Scenario:
-        """All keys as typed values, defaults included (`scenarios.spec.model`)."""
+        """All keys as typed values, defaults included (`scenarios.spec.scenario_model`)."""
         return self._spec
 
     @property
@@ -267,7 +267,7 @@ class Scenario:
 
     def to_toml(self) -> str:
         """Return the text of a scenario file with every key spelled out."""
-        from scenarios.spec.writing import to_toml
+        from scenarios.spec.scenario_writing import to_toml
 
         return to_toml(self._spec, {})
 

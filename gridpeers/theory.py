@@ -10,17 +10,17 @@ from msgspec.structs import replace
 from netem.spec.netem import Netem
 from plant.equipment import Feeder
 from plant.tables import read_feeder
-from scenarios.predict.fleet import Fleet, fleet_of
-from scenarios.predict.limits import delay_limit
-from scenarios.predict.loads import load_steps
-from scenarios.predict.model import Loop, Ticks
+from scenarios.predict.delay_limits import delay_limit
+from scenarios.predict.inverter_group import Fleet, fleet_of
+from scenarios.predict.linear_model import Loop, Ticks
+from scenarios.predict.load_steps import load_steps
 from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
 from scenarios.predict.var_response import VarResponse, var_growth, var_response
 from scenarios.predict.vars import var_delay_limit
 from scenarios.spec import Case
 from scenarios.spec import Scenario as Spec
-from scenarios.spec.changes import as_in
+from scenarios.spec.scenario_changes import as_in
 
 __all__ = [
     "Case",

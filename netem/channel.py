@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from netem.draws import Stream
-from netem.models.own import DROPPED_BY_OWN, Judge, judge_of
-from netem.schedule import GATES, Schedule
+from netem.fault_schedule import GATES, Schedule
+from netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
 from wire.plugin import Plugin
@@ -51,7 +51,7 @@ class Channel:
     link : Link
         Who sends and who receives.
     spans : Iterable[Span]
-        Its faults; see `netem.schedule.Schedule`.
+        Its faults; see `netem.fault_schedule.Schedule`.
     seed : int
         Seed of the run.
 

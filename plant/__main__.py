@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from plant.config import PlantConfig
-from plant.runtime import run_plant
+from plant.plant_config import PlantConfig
+from plant.plant_process import run_plant
 from wire.driver.process import main
 
 if __name__ == "__main__":

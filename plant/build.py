@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from plant.config import PlantConfig
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
-from plant.tables.changes import changed
+from plant.tables.feeder_changes import changed
 
 
 def build_plant(config: PlantConfig) -> Plant:

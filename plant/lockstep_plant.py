@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from plant.config import PlantConfig
-from plant.interface import PlantLike
+from plant.plant_config import PlantConfig
+from plant.plant_interface import PlantLike
 from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
-from plant.reporting import measurement_of
+from plant.telemetry_reporter import measurement_of
 from wire.codec import RejectedError, encode
 from wire.links import Links, is_usable
 from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, PlantEvent, Prepare, Ready, State

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import inf
 
-from plant.config import PlantConfig
-from plant.interface import PlantLike
-from plant.reporting import Reporter
+from plant.plant_config import PlantConfig
+from plant.plant_interface import PlantLike
 from plant.schedule import Schedule
+from plant.telemetry_reporter import Reporter
 from wire.clock import ticks_until, time_of
 from wire.codec import encode
 from wire.keys import check_name

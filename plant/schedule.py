@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from plant.config import PlantConfig
+from plant.plant_config import PlantConfig
 
 
 class Moves(NamedTuple):
@@ -35,7 +35,7 @@ class Schedule:
 
     Examples
     --------
-    >>> from plant.config import Move, PlantSettings
+    >>> from plant.plant_config import Move, PlantSettings
     >>> config = PlantConfig(run="demo", settings=PlantSettings(), agents=("inv1", "inv2"), T_c=0.02, end=5.0,
     ...     record_step=0.01, deadline=10.0, listen=(), moves=(Move(t=2.0, inverter="inv2", action="leave"),))
     >>> Schedule(config, ("inv1", "inv2")).take(100)

@@ -34,7 +34,7 @@ def field_docs(cls: type[msgspec.Struct]) -> tuple[FieldDoc, ...]:
 
     Examples
     --------
-    >>> from plant.config import SwitchEvent
+    >>> from plant.plant_config import SwitchEvent
     >>> [doc.name for doc in field_docs(SwitchEvent)]
     ['t', 'switch', 'action', 'synchronised']
     >>> field_docs(SwitchEvent)[0].text

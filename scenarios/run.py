@@ -16,33 +16,33 @@ from typing import Any, Literal, TextIO
 
 import msgspec
 
-from agents.config import AgentConfig
-from plant.config import PlantConfig
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
 from plant.realtime.pacer import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
-from scenarios.emulation.setup import Setup
+from scenarios.emulation.emulation_config import Setup
 from scenarios.live.numbers.departures import Compared, compare
-from scenarios.results.benchmarks import NO_BENCHMARK, benchmark_of
+from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.claims import judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
-from scenarios.results.folder import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.results.history import History, Plates
-from scenarios.results.links import LinkRecord
-from scenarios.results.messages import messages_saved
+from scenarios.results.joins_and_leaves import as_they_came, late_moves
+from scenarios.results.link_records import LinkRecord
+from scenarios.results.message_counts import messages_saved
 from scenarios.results.metrics import windows
-from scenarios.results.moves import as_they_came, late_moves
-from scenarios.results.numbers import Clock, Ran, metrics_json
-from scenarios.results.own.claim import judged
+from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
 from scenarios.results.own.measuring import own_measures
+from scenarios.results.own.own_claim import judged
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import Report, plain
+from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
+from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.agentless import with_agent
 from scenarios.spec.configs import configs
-from scenarios.spec.moves import inverters_of
-from scenarios.spec.own import claims_of
-from scenarios.spec.writing import to_toml
+from scenarios.spec.own_modules import claims_of
+from scenarios.spec.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
 
@@ -67,7 +67,7 @@ class BrokenRunError(RuntimeError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request(Ran):
+class Request(RunMetrics):
     """What is to be run; its folder is empty. Wall-clock time needs the driver "processes"."""
 
     driver: Driver
@@ -249,7 +249,7 @@ def _run_case(
 
                 outcome = run_inprocess(plant, agents, note, on_links=links)
             else:
-                from scenarios.drivers.fleet import run_processes
+                from scenarios.drivers.process_driver import run_processes
 
                 outcome = run_processes(plant, agents, request.folder / "log" / case, note, on_links=links)
             if outcome.broke:

@@ -24,7 +24,7 @@ class Listen(NamedTuple):
     key: str
 
 
-class Say(NamedTuple):
+class Log(NamedTuple):
     """Write a line to the log, for whoever watches the process."""
 
     text: str

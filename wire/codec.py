@@ -118,7 +118,7 @@ def _is_finite(value: Any) -> bool:
     return not isinstance(value, list) or all(map(_is_finite, value))
 
 
-class Rejects:
+class RejectedMessages:
     """Counts dropped messages by kind and keeps one log line per kind.
 
     Parameters

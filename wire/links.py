@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence, Set
 from typing import Protocol
 
 from wire.admission import Admission
-from wire.codec import RejectedError, Rejects, decode
+from wire.codec import RejectedError, RejectedMessages, decode
 from wire.messages import AnyMessage, Measurement, State
 
 
@@ -128,7 +128,7 @@ def is_usable(links: Links | None, message: State | Measurement, payload: bytes,
     return who.passes(message)
 
 
-def arrived(links: Links | None, now: float, rejects: Rejects, admission: Admission) -> Iterator[AnyMessage]:
+def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
     """What the links have let through by now (s of run time) and is of use.
 
     What they have garbled is counted and dropped; what was overtaken on the way, and what the dead once said, is only

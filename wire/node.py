@@ -23,9 +23,9 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from wire.actions import Action, Fetch, Publish, Say
+from wire.actions import Action, Fetch, Log, Publish
 from wire.admission import Admission
-from wire.codec import RejectedError, Rejects, decode
+from wire.codec import RejectedError, RejectedMessages, decode
 from wire.keys import Keys
 from wire.membership import Membership
 from wire.messages import AnyMessage, Message, Nameplate
@@ -64,19 +64,19 @@ class Node:
 
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         self.keys = Keys(run)
-        self.rejects = Rejects(name)
+        self.rejects = RejectedMessages(name)
         self.admission = Admission(rate)
         self.members = Membership(self.admission)
         self._name = name
         self._routes: dict[str, Route] = {}
-        self._actions: list[Action | Say] = []
+        self._actions: list[Action | Log] = []
 
     @property
     def finished(self) -> bool:
         """Whether the driver should close."""
         raise NotImplementedError
 
-    def take_actions(self) -> list[Action | Say]:
+    def take_actions(self) -> list[Action | Log]:
         """What is to be done now, in this order."""
         actions, self._actions = self._actions, []
         return actions
@@ -145,4 +145,4 @@ class Node:
 
     def _say(self, text: str) -> None:
         """Have a line logged."""
-        self._actions.append(Say(f"{self._name}: {text}"))
+        self._actions.append(Log(f"{self._name}: {text}"))

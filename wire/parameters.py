@@ -15,8 +15,8 @@ from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hint
 
 import msgspec
 
-from wire.nearest import suggestion
 from wire.printable import printable
+from wire.suggestion import suggestion
 
 REQUIRED = msgspec.NODEFAULT
 """Default of a parameter that must be given."""

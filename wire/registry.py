@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 T = TypeVar("T")
 

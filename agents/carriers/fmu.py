@@ -14,8 +14,8 @@ from tempfile import mkdtemp
 
 from msgspec.structs import replace
 
+from agents.agent_config import LawChoice
 from agents.carriers.program import ProgramLaw, Ready
-from agents.config import LawChoice
 from agents.laws.call import LawError
 from wire.printable import printable
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from wire.nearest import suggestion
 from wire.parameters import objections
 from wire.printable import printable
+from wire.suggestion import suggestion
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 """Inputs of the own inverter."""

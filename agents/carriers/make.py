@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
-from agents.carriers.registry import LAWS
+from agents.agent_config import Control, LawChoice
+from agents.carriers.law_registry import LAWS
 from agents.carriers.time_limit import make_limited
-from agents.config import Control, LawChoice
 from agents.laws.in_force import law_in_force
 from agents.laws.law import Law
 

@@ -15,9 +15,9 @@ from typing import Any, Literal
 
 import msgspec
 
+from agents.agent_config import LawChoice
 from agents.carriers.process_group import LEAVING, ProcessGroup
 from agents.carriers.time_limit import FIRST
-from agents.config import LawChoice
 from agents.laws.call import LawError
 from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints, limits_in
 from wire.printable import printable

@@ -54,7 +54,8 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   `tests/unit/agents/test_law.py` repeats the searches, for the paper's weights and for degree-normalised ones.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
-`agents.handling` has these and other ways, and other weights c_ij than 1; with any of them the law stays this.
+`agents.degraded_communication` has these and other ways, and other weights c_ij than 1; with any of them the law stays
+this.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ from collections.abc import Sequence
 from math import exp, inf
 from typing import Annotated, Any
 
-from agents.config import Gains
+from agents.agent_config import Gains
 from agents.laws.law import Law, Neighbour, Own, SetPoints
 from wire.parameters import Range, Unit
 

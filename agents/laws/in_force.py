@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from agents.config import Control
-from agents.handling import gains_in_force
+from agents.agent_config import Control
+from agents.degraded_communication import gains_in_force
 from agents.laws.consensus import Consensus
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
 from agents.neighbour_states import NeighbourStates
 from wire.bounds import MOST_COUNT
 from wire.messages import AgentStatus

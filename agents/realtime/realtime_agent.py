@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from agents.agent_config import AgentConfig
 from agents.agent_node import REPORT_TICKS, AgentNode
-from agents.config import AgentConfig
 from agents.laws.law import Law
 from agents.realtime.agent_statistics import AgentStatistics, Phase
 from agents.realtime.link_command_receiver import LinkCommandReceiver

@@ -20,16 +20,16 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from agents.config import AgentConfig
-from plant.config import GflParameters, PlantConfig, SwitchEvent
+from agents.agent_config import AgentConfig
 from plant.feeder import Plant
-from plant.interface import PlantLike
 from plant.network import Network
+from plant.plant_config import GflParameters, PlantConfig, SwitchEvent
+from plant.plant_interface import PlantLike
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 
-from .compare import QUANTITIES, Largest, differences
+from .compare_gridlabd import QUANTITIES, Largest, differences
 from .impedance import with_impedances
 from .twin import GridlabdError, Twin
 

@@ -1,7 +1,7 @@
 """Write a feeder of `plant/data` as a GridLAB-D model (GLM).
 
 This file reads the tables by itself and shares no code with `plant.tables` and `plant.network`, so that a mistake
-there shows as a difference. Only the inverters' parameters come as `plant.config` has them.
+there shows as a difference. Only the inverters' parameters come as `plant.plant_config` has them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Mapping
 from math import pi, sqrt
 from pathlib import Path
 
-from plant.config import GflParameters, GfmParameters
+from plant.plant_config import GflParameters, GfmParameters
 
 F_NOM = 60.0
 """Nominal frequency (Hz)."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from plant.config import PlantSettings
 from plant.feeder import Plant
 from plant.feeder.plant import Reading
+from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 
 from .glm import write_glm
@@ -34,7 +34,7 @@ class GridlabdError(RuntimeError):
 
 
 class Twin:
-    """A plant whose numbers are GridLAB-D's, to be controlled by the same agents (`plant.interface.PlantLike`).
+    """A plant whose numbers are GridLAB-D's, to be controlled by the same agents (`plant.plant_interface.PlantLike`).
 
     Parameters
     ----------

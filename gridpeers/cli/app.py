@@ -11,15 +11,15 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.compare import compare
+from gridpeers.cli.commands.compare_command import compare
 from gridpeers.cli.commands.init import init
-from gridpeers.cli.commands.live import register
+from gridpeers.cli.commands.live_commands import register
 from gridpeers.cli.commands.predict import predict
-from gridpeers.cli.commands.run import run
+from gridpeers.cli.commands.run_command import run
 from gridpeers.cli.commands.show import check, doc, list_
-from gridpeers.cli.commands.sweep import sweep
+from gridpeers.cli.commands.sweep_command import sweep
 from gridpeers.cli.contributed import contributed
-from gridpeers.cli.mistyped import Commands
+from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
 from wire.driver.leftover import leave
 from wire.driver.output import speaking

@@ -22,8 +22,8 @@ COMMANDS: Registry[Command] = Registry(
     "commands",
     _objection,
     own={
-        "reproduce": "papers.singhal2022.reproduce.command:reproduce",
-        "experiment": "papers.singhal2022.experiments.command:experiment",
+        "reproduce": "papers.singhal2022.reproduce.reproduce_command:reproduce",
+        "experiment": "papers.singhal2022.experiments.experiment_command:experiment",
     },
 )
 """Commands by name; those that come with gridpeers are references."""

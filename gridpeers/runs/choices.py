@@ -7,11 +7,12 @@ from typing import TypedDict, get_args
 
 import msgspec
 
-from scenarios.live.setup import SPEEDS
-from scenarios.results.numbers import Clock
+from scenarios.live.live_options import SPEEDS
+from scenarios.results.metrics_file import Clock
 from scenarios.run import Driver
-from scenarios.spec import ScenarioError, model
-from wire.nearest import suggestion
+from scenarios.spec import ScenarioError
+from scenarios.spec import scenario_model as model
+from wire.suggestion import suggestion
 
 
 def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:

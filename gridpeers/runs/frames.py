@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from scenarios.results.history import History
-from scenarios.results.links import COLUMNS
-from scenarios.sweep.words import unit_of
+from scenarios.results.link_records import COLUMNS
+from scenarios.sweep.column_labels import unit_of
 
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's index and quantities."""

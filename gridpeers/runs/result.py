@@ -19,23 +19,23 @@ from gridpeers.runs.run_folder import RunFolder, empty_folder
 from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
-from scenarios.live.numbers.drawing import drawing_by_hand
-from scenarios.results.benchmarks import benchmark_of
+from scenarios.live.numbers.live_figures import drawing_by_hand
+from scenarios.results.benchmark_registry import benchmark_of
 from scenarios.results.claims import Verdict, judge
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import Findings, find
-from scenarios.results.folder import FolderError, refusal, shown, write_whole
 from scenarios.results.history import History, Plates, read_history
+from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import windows
-from scenarios.results.moves import as_they_came
-from scenarios.results.own.claim import judged
 from scenarios.results.own.measuring import own_measures
-from scenarios.spec import model
-from scenarios.spec.moves import inverters_of
-from scenarios.spec.own import claims_of
+from scenarios.results.own.own_claim import judged
+from scenarios.results.run_files import FolderError, refusal, shown, write_whole
+from scenarios.spec import scenario_model as model
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.own_modules import claims_of
 from wire.messages import PlantEvent
-from wire.nearest import suggestion
 from wire.printable import printable
+from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

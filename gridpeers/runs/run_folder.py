@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scenarios.results.folder import FolderError, refusal
+from scenarios.results.run_files import FolderError, refusal
 from wire.path_text import is_no_path
 
 

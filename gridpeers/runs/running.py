@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Unpack
 from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Results
 from gridpeers.runs.run_folder import RunFolder, empty_folder
-from scenarios.results.folder import FolderError
+from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError
 from scenarios.spec.portability import check_portable
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario

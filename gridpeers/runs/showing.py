@@ -7,7 +7,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from scenarios.results.drawing import Drawing
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from gridpeers.runs.reading import read
 from gridpeers.runs.result import Result, Results
+from gridpeers.runs.run_reading import read
 from gridpeers.runs.showing import shown_in_notebooks
-from scenarios.spec.mistakes import ScenarioError
-from scenarios.spec.writing import to_toml
+from scenarios.spec.scenario_errors import ScenarioError
+from scenarios.spec.scenario_writing import to_toml
 from scenarios.sweep.file.paths import flatten
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Comparison:
 
     def plot(self) -> Figure:
         """Draw f, MPSI, V and MQSI of both, case by case."""
-        from scenarios.results.plots.comparison import comparison
+        from scenarios.results.plots.comparison_plot import comparison
 
         shown_in_notebooks()
         return comparison(

@@ -12,16 +12,17 @@ from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
 from scenarios.predict.closed_form import Kind, delay_limit_closed, modes
-from scenarios.predict.fleet import Fleet, fleet_of
-from scenarios.predict.limits import delay_limit
-from scenarios.predict.loads import IslandStep, LoadError, load_steps
+from scenarios.predict.delay_limits import delay_limit
+from scenarios.predict.inverter_group import Fleet, fleet_of
+from scenarios.predict.load_steps import IslandStep, LoadError, load_steps
+from scenarios.predict.prediction_table import case_text
 from scenarios.predict.sensitivity import Sensitivity, sensitivity
-from scenarios.predict.table import case_text
 from scenarios.predict.times import predicted_times
 from scenarios.run import BrokenRunError
-from scenarios.spec import ScenarioError, model
-from scenarios.spec.law import PAPER, law_of
-from scenarios.spec.netem import is_calm, netem_of
+from scenarios.spec import ScenarioError
+from scenarios.spec import scenario_model as model
+from scenarios.spec.law_choice import PAPER, law_of
+from scenarios.spec.netem_tables import is_calm, netem_of
 
 _LIMITS: dict[str, Kind] = {
     "agent to agent": "neighbours",

@@ -17,16 +17,16 @@ from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.results.own.metric import METRICS
 from scenarios.spec import Scenario as Spec
-from scenarios.spec.mistakes import Mistakes, ScenarioError
-from scenarios.spec.own import metrics_of
+from scenarios.spec.own_modules import metrics_of
 from scenarios.spec.portability import check_portable
-from scenarios.sweep.columns import FATE, columns_of
-from scenarios.sweep.file.model import Sweep
+from scenarios.spec.scenario_errors import Mistakes, ScenarioError
+from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file.plan import Plan, Run
-from scenarios.sweep.file.reading import Base, plan_of
-from scenarios.sweep.one import Done, run_one, run_with_history
-from scenarios.sweep.words import unit_of
-from wire.nearest import suggestion
+from scenarios.sweep.file.sweep_model import Sweep
+from scenarios.sweep.file.sweep_reading import Base, plan_of
+from scenarios.sweep.sweep_case import SweepRow, run_one, run_with_history
+from scenarios.sweep.sweep_columns import FATE, columns_of
+from wire.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
 """Values by the dotted path of a key."""
@@ -88,7 +88,7 @@ def sweep(
     checked, chosen = _with_metrics(known, metrics)
     plan = _plan(checked, grid or {}, zip or {}, _names(cases or ()), seeds)
     runs = list(enumerate(plan.runs))
-    done: dict[int, Done] = {}
+    done: dict[int, SweepRow] = {}
     kept: dict[int, pd.DataFrame] = {}
     for end, history in _results(runs, _jobs(plan, jobs), histories=histories):
         done[end.number] = end
@@ -181,9 +181,13 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
     return min(jobs, len(plan.runs))
 
 
-def _results(runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool) -> Iterator[tuple[Done, History | None]]:
+def _results(
+    runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool
+) -> Iterator[tuple[SweepRow, History | None]]:
     """Do all runs; each comes as soon as it is done, with its history if that is asked for."""
-    task: Callable[[int, Spec, str], tuple[Done, History | None]] = run_with_history if histories else _without_history
+    task: Callable[[int, Spec, str], tuple[SweepRow, History | None]] = (
+        run_with_history if histories else _without_history
+    )
     if jobs == 1:
         yield from (task(number, run.scenario, run.case) for number, run in runs)
         return
@@ -195,7 +199,7 @@ def _results(runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool) -> 
         yield from results
 
 
-def _without_history(number: int, scenario: Spec, case: str) -> tuple[Done, None]:
+def _without_history(number: int, scenario: Spec, case: str) -> tuple[SweepRow, None]:
     """Do one run whose history nobody wants, which spares its way between two processes."""
     return run_one(number, scenario, case), None
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace, Outcome
 from netem.models.instant import INSTANT
-from netem.schedule import GATES
 from netem.spec.fault import Span
 
 Array = npt.NDArray[np.float64]

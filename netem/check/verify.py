@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from netem.check.delay import check_delay
-from netem.check.loss import FEWEST, Finding, check_loss
-from netem.check.own import AS_IT_SAYS, added_by, check_own
+from netem.check.delay_check import check_delay
+from netem.check.loss_check import FEWEST, Finding, check_loss
+from netem.check.own_check import AS_IT_SAYS, added_by, check_own
 from netem.check.rows import Messages, Row, messages
 from netem.draws import Stream
+from netem.fault_schedule import GATES
 from netem.ledger import LinkCounts, LinkTrace
-from netem.schedule import GATES
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
 from wire.plugin import Plugin

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from netem.draws import Stream
-from netem.mistakes import Mistake, probability
+from netem.netem_errors import Mistake, probability
 
 _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 """Indices of the draws of the first copy; those of the next follow."""

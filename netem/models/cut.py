@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from netem.mistakes import Mistake
+from netem.netem_errors import Mistake
 
 
 class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

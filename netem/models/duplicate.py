@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from netem.draws import Stream
-from netem.mistakes import Mistake, probability, seconds
+from netem.netem_errors import Mistake, probability, seconds
 
 
 class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -6,7 +6,7 @@ import math
 
 import msgspec
 
-from netem.mistakes import Mistake, seconds
+from netem.netem_errors import Mistake, seconds
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""

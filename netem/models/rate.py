@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from netem.mistakes import Mistake, amount
-from netem.plausible import Range
+from netem.netem_errors import Mistake, amount
+from netem.plausible_links import Range
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

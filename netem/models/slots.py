@@ -6,8 +6,8 @@ import math
 
 import msgspec
 
-from netem.mistakes import Mistake, seconds
 from netem.models.instant import INSTANT
+from netem.netem_errors import Mistake, seconds
 
 
 class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

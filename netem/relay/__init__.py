@@ -7,6 +7,6 @@ comes of that is up to the transport. `docs/netem.md` says which layer to use fo
 from netem.relay.endpoint import Endpoint, EndpointError
 from netem.relay.faults import Faults, FaultsError
 from netem.relay.relay import Relay, RelayError
-from netem.relay.words import WordError
+from netem.relay.relay_commands import WordError
 
 __all__ = ["Endpoint", "EndpointError", "Faults", "FaultsError", "Relay", "RelayError", "WordError"]

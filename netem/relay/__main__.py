@@ -8,7 +8,7 @@ import sys
 
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
 from netem.relay.faults import UNITS
-from netem.relay.words import HELP
+from netem.relay.relay_commands import HELP
 from wire.driver.output import speaking
 
 OK, USAGE = 0, 2

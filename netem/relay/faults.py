@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from netem.mistakes import probability, seconds
+from netem.netem_errors import probability, seconds
 
 
 class FaultsError(ValueError):

@@ -8,7 +8,7 @@ import threading
 from types import TracebackType
 from typing import Any
 
-from netem.relay import words
+from netem.relay import relay_commands as words
 from netem.relay.bottleneck import NEVER
 from netem.relay.datagrams import UdpRelay
 from netem.relay.direction import Counts, Direction, Road
@@ -84,7 +84,7 @@ class Relay:
         self._loop.close()
 
     def do(self, line: str) -> str:
-        """Do what a line says; see `netem.relay.words.HELP`.
+        """Do what a line says; see `netem.relay.relay_commands.HELP`.
 
         Returns
         -------

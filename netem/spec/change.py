@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
+from netem.fault_schedule import Schedule
 from netem.models.cut import Cut
-from netem.schedule import Schedule
 from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link, links_among, parse

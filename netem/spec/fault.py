@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from netem.mistakes import Mistake, below, seconds
 from netem.models.corrupt import Corrupt
 from netem.models.cut import Cut
 from netem.models.delay import AnyDelay, Constant
 from netem.models.duplicate import Duplicate
 from netem.models.flap import Flap
 from netem.models.loss import AnyLoss, Bernoulli
-from netem.models.own import FAULTS
+from netem.models.own_fault import FAULTS
 from netem.models.rate import Rate
 from netem.models.slots import Slots
+from netem.netem_errors import Mistake, below, seconds
 from netem.spec.pattern import parse
 from netem.spec.profiles import PROFILES
-from wire.nearest import suggestion
 from wire.plugin import Plugin, problems
+from wire.suggestion import suggestion
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""

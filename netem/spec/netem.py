@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from netem.mistakes import Mistake, below
+from netem.netem_errors import Mistake, below
 from netem.spec.fault import Fault, Span
-from netem.spec.node import NodeFault
+from netem.spec.node_fault import NodeFault
 from netem.spec.partition import Partition
 from netem.spec.pattern import Link, links_among, objections
 

@@ -9,11 +9,11 @@ from typing import Literal
 
 import msgspec
 
-from netem.mistakes import Mistake
 from netem.models.cut import Cut
+from netem.netem_errors import Mistake
 from netem.spec.fault import Span, wrong_times
 from wire.messages import PLANT
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 _REST = "the rest"
 

@@ -9,10 +9,10 @@ from typing import TextIO
 
 import msgspec
 
-from netem.mistakes import LONGEST_DELAY, Mistake, seconds
 from netem.models.delay import Trace
+from netem.netem_errors import LONGEST_DELAY, Mistake, seconds
 from netem.spec.netem import Netem
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.config import GflParameters, GfmParameters
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.reduction import Real
 from plant.equipment import F_NOM
+from plant.plant_config import GflParameters, GfmParameters
 
 
 @dataclass(frozen=True, kw_only=True)

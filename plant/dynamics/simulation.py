@@ -12,7 +12,7 @@ from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
 from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
-from plant.dynamics.live import TOLERANCE, LiveNetwork
+from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduction import Complex, Real
 

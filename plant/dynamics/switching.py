@@ -10,7 +10,7 @@ import numpy as np
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
-from plant.dynamics.live import LiveNetwork
+from plant.dynamics.live_network import LiveNetwork
 from plant.dynamics.phasors import PHASES, aligned_sum
 
 

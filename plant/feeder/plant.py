@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from plant.config import PlantSettings, PowerLimit
 from plant.dynamics import Dynamics, Inverter, PlantError
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
@@ -18,6 +17,7 @@ from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Synchronism
 from plant.feeder.trips import trip_event
 from plant.network import Network
+from plant.plant_config import PlantSettings, PowerLimit
 from wire.clock import time_of
 from wire.messages import OFF, PlantEvent
 

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.config import Protection
+from plant.plant_config import Protection
 from plant.trip_settings import F_BASE, defaults
 
 Floats = NDArray[np.float64]

@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from plant.config import SwitchEvent
 from plant.network import Network
+from plant.plant_config import SwitchEvent
 from wire.clock import time_of
 from wire.messages import PlantEvent
 

@@ -13,9 +13,9 @@ from math import degrees
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.config import SyncCheck
 from plant.dynamics import Dynamics
 from plant.network import Network
+from plant.plant_config import SyncCheck
 from plant.trip_settings import F_BASE
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))

@@ -18,15 +18,15 @@ from __future__ import annotations
 
 from typing import Literal
 
-from plant.config import PlantConfig
-from plant.interface import LivePlant
+from plant.plant_config import PlantConfig
+from plant.plant_interface import LivePlant
 from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
 from plant.realtime.kept_telemetry import KeptTelemetry
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.pacer import RealTimePacer
 from plant.realtime.run_commands import RunCommands
 from plant.realtime.silence_detector import SilenceDetector
-from plant.reporting import measurement_of
+from plant.telemetry_reporter import measurement_of
 from wire.admission import FASTER
 from wire.clock import time_of
 from wire.codec import encode

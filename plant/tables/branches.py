@@ -8,7 +8,8 @@ from typing import Literal, cast
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
 from plant.tables.buses import BusTable
-from plant.tables.plausible import (
+from plant.tables.csv_table import Row, Table
+from plant.tables.plausible_feeder import (
     LENGTH,
     MUTUAL,
     R_PERCENT,
@@ -21,8 +22,7 @@ from plant.tables.plausible import (
     positive_definite,
     power_of,
 )
-from plant.tables.table import Row, Table
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 
 def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig] | None:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from plant.connectivity import Connectivity, Node
 from plant.equipment import PHASES, Bus, Feeder
-from plant.tables.plausible import BUS_VOLTAGE
-from plant.tables.table import Row, Table
-from wire.nearest import suggestion
+from plant.tables.csv_table import Row, Table
+from plant.tables.plausible_feeder import BUS_VOLTAGE
+from wire.suggestion import suggestion
 
 _SHOWN = 24
 """So many buses that are cut off are named."""

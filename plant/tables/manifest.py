@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from plant.equipment import F_NOM
-from plant.tables.plausible import NOMINAL_FREQUENCY, objection
-from wire.nearest import suggestion
+from plant.tables.plausible_feeder import NOMINAL_FREQUENCY, objection
+from wire.suggestion import suggestion
 
 MANIFEST = "feeder.toml"
 """Name of the file."""

@@ -9,7 +9,7 @@ from plant.tables.branches import read_line_configs, read_lines, read_regulators
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.manifest import read_f_nom
 from plant.tables.shunts import LOAD_COLUMNS, read_capacitors, read_inverters, read_loads, read_source
-from wire.nearest import suggestion
+from wire.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""

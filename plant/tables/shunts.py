@@ -10,7 +10,8 @@ from typing import Literal, cast
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
 from plant.tables.buses import BusTable
-from plant.tables.plausible import (
+from plant.tables.csv_table import Row, Table
+from plant.tables.plausible_feeder import (
     BRANCH_CURRENT,
     P_F_DROOP,
     Q_V_DROOP,
@@ -21,7 +22,6 @@ from plant.tables.plausible import (
     Plausible,
     power_of,
 )
-from plant.tables.table import Row, Table
 from wire.keys import check_name
 from wire.messages import OFF, PLANT
 

@@ -14,16 +14,16 @@ from typing import NamedTuple
 
 import msgspec
 
+from agents.agent_config import AgentConfig
 from agents.carriers.make import close_laws, make_law
-from agents.config import AgentConfig
 from agents.laws.law import Law
 from agents.lockstep_agent import LockstepAgent
-from plant.config import PlantConfig
-from plant.interface import PlantLike
 from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
+from plant.plant_interface import PlantLike
 from scenarios.drivers.outcome import Outcome
-from scenarios.emulation.links import links_of
-from wire.actions import Action, Fetch, Listen, Publish, Say
+from scenarios.emulation.emulated_links import links_of
+from wire.actions import Action, Fetch, Listen, Log, Publish
 from wire.codec import decode
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 
@@ -118,7 +118,7 @@ class Bus:
             self._do(other, other.take_actions())
         self._do(agent, agent.take_actions())
 
-    def _do(self, side: LockstepPlant | LockstepAgent, actions: Sequence[Action | Say]) -> None:
+    def _do(self, side: LockstepPlant | LockstepAgent, actions: Sequence[Action | Log]) -> None:
         for action in actions:
             if isinstance(action, Publish):
                 key, payload = action

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from agents.config import AgentConfig
-from scenarios.emulation.setup import Setup
+from agents.agent_config import AgentConfig
+from scenarios.emulation.emulation_config import Setup
 
 
 def own_code(config: AgentConfig) -> tuple[str, ...]:
@@ -13,7 +13,7 @@ def own_code(config: AgentConfig) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from agents.config import Control, LawChoice
+    >>> from agents.agent_config import Control, LawChoice
     >>> control = Control(secondary="all", graph="full", law=LawChoice(command=("./mylaw",)))
     >>> own_code(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0, f_nom=60.0,
     ...     m_p=0.01, m_q=0.05, T_c=0.02, control=control, deadline=10.0, connect=()))

@@ -2,9 +2,9 @@
 
 For experiments that draw predictions beside measurements:
 
-    from scenarios.predict.fleet import fleet_of
+    from scenarios.predict.inverter_group import fleet_of
     from scenarios.predict.times import LoadStep, predicted_times
-    from scenarios.predict.limits import delay_limit
+    from scenarios.predict.delay_limits import delay_limit
     from scenarios.predict.closed_form import delay_limit_closed, modes
 
     fleet = fleet_of(scenario, feeder, "IV")

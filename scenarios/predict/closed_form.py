@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from scenarios.predict.fleet import Fleet
+from scenarios.predict.inverter_group import Fleet
 from scenarios.results.history import Floats
 
 SETTLING = 4.0
@@ -121,7 +121,7 @@ def modes(fleet: Fleet) -> Modes:
     --------
     Nine alike, three leaders, everybody hears everybody:
 
-    >>> from agents.config import Gains
+    >>> from agents.agent_config import Gains
     >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
     >>> found = modes(nine)
     >>> round(found.lambda_2, 6), round(found.frequency_rate, 6), round(found.slowest_rate, 6)
@@ -163,7 +163,7 @@ def delay_limit_closed(fleet: Fleet, kind: Kind) -> float:
 
     Examples
     --------
-    >>> from agents.config import Gains
+    >>> from agents.agent_config import Gains
     >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
     >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)
     (0.0145, 0.3927)

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
-from scenarios.predict.fleet import Fleet
+from scenarios.predict.inverter_group import Fleet
 from scenarios.results.history import Floats
 
 PlantModel = Literal["lagged", "quasi-steady"]

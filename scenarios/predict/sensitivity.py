@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant.build import build_plant
-from plant.config import PlantConfig
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from plant.feeder import Plant, raise_for_trip
-from scenarios.predict.loads import LoadError
+from plant.plant_config import PlantConfig
+from scenarios.predict.load_steps import LoadError
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs

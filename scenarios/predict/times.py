@@ -1,8 +1,9 @@
 """What experiments draw beside their measurements: times to restore and to share.
 
-All of it comes from `scenarios.predict.model`, law and plant in discrete time, and is exact for that model. Delays are
-in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used from the first
-tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or after t_k + d.
+All of it comes from `scenarios.predict.linear_model`, law and plant in discrete time, and is exact for that model.
+Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used from
+the first tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or after
+t_k + d.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from typing import TypeVar
 import numpy as np
 
 from scenarios.predict.closed_form import groups
-from scenarios.predict.fleet import Fleet
-from scenarios.predict.model import Link, Loop, Path, Ticks
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.linear_model import Link, Loop, Path, Ticks
 from scenarios.predict.response import PlantModel
 from scenarios.results.history import Flags, Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND
@@ -120,7 +121,7 @@ def predicted_times(
     loss : float or Mapping[(src, dst), float], optional
         Probability that a state is lost; the last one is held.
     load : LoadStep, optional
-        The event; the paper's event 1 if left out. `scenarios.predict.loads.load_steps` has those of a scenario.
+        The event; the paper's event 1 if left out. `scenarios.predict.load_steps.load_steps` has those of a scenario.
     plant : {"lagged", "quasi-steady"}, optional
         With the inverters' filters, or as docs/theory.md has it.
 

@@ -20,8 +20,8 @@ import numpy as np
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from plant.feeder import raise_for_trip
-from scenarios.predict.fleet import Fleet
-from scenarios.predict.loads import LoadError
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.load_steps import LoadError
 from scenarios.predict.sensitivity import STEP, plant_in_first_window
 from scenarios.predict.vars import factors
 from scenarios.results.history import Floats

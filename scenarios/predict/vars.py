@@ -20,8 +20,8 @@ import numpy as np
 
 from agents.laws.consensus import V_factors
 from scenarios.predict.closed_form import settling
-from scenarios.predict.fleet import Fleet
-from scenarios.predict.model import AT_REST
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.linear_model import AT_REST
 from scenarios.predict.sensitivity import Sensitivity
 from scenarios.results.history import Floats
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 from plant.equipment import Feeder
 from scenarios.results.history import History, Plates
-from scenarios.results.islands import Spell, islands_of, spells_of
+from scenarios.results.island_membership import Spell, islands_of, spells_of
 from scenarios.short_names import in_order, short
 from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.agentless import without_agent
-from scenarios.spec.limits import limits_of
-from scenarios.spec.model import Event
-from scenarios.spec.moves import inverters_of
+from scenarios.spec.power_limits import limits_of
+from scenarios.spec.scenario_model import Event
 
 
 class Mark(NamedTuple):

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from plant.equipment import F_NOM, Feeder
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
-from scenarios.results.islands import islands_of, part_of
+from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own.metric import Measured
 from scenarios.results.published import Published
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
-from scenarios.spec.limits import limits_of
+from scenarios.spec.power_limits import limits_of
 
 Results = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""

@@ -13,8 +13,8 @@ from netem.spec.change import Change, schedule_of
 from netem.spec.fault import Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
-from scenarios.results.folder import write_whole
-from scenarios.results.links import LinkRecord
+from scenarios.results.link_records import LinkRecord
+from scenarios.results.run_files import write_whole
 from wire.messages import PLANT
 
 

@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from agents.config import Gains, Handling
+from agents.agent_config import Gains, Handling
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.node import NodeFault
+from netem.spec.node_fault import NodeFault
 from netem.spec.partition import Partition
-from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
+from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.results.own import pages as own_pages
-from scenarios.spec.model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time, key_of
+from scenarios.spec.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time, key_of
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.results.benchmarks import NO_BENCHMARK, Benchmark
+from scenarios.results.benchmark_registry import NO_BENCHMARK, Benchmark
 from scenarios.results.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.metrics import Steady

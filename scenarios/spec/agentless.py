@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from plant.equipment import Feeder, InverterRow
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import Scenario
-from scenarios.spec.moves import inverters_of
-from wire.nearest import suggestion
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Scenario
+from wire.suggestion import suggestion
 
 
 def without_agent(scenario: Scenario, case: str) -> frozenset[str]:

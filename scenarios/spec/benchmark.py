@@ -6,10 +6,10 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from scenarios.results.benchmarks import BENCHMARKS
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import Scenario
+from scenarios.results.benchmark_registry import BENCHMARKS
 from scenarios.spec.plugins import check_plugin, placed
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Scenario
 
 
 def with_benchmark_folder(scenario: Scenario, folder: Path) -> Scenario:

@@ -6,11 +6,11 @@ import re
 from itertools import pairwise
 
 from plant.equipment import Feeder
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import Scenario
 from scenarios.spec.multiples import divides, multiple
-from wire.nearest import suggestion
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Scenario
 from wire.plugin import plugin_of
+from wire.suggestion import suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""

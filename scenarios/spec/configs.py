@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from agents.config import MAX_AGE, AgentConfig, Control
-from plant.config import PlantConfig, PlantSettings, SwitchEvent
+from agents.agent_config import MAX_AGE, AgentConfig, Control
 from plant.equipment import Feeder
+from plant.plant_config import PlantConfig, PlantSettings, SwitchEvent
+from scenarios.spec.agent_schedule import inverters_of, moves_of
 from scenarios.spec.agentless import with_agent
-from scenarios.spec.changes import changes_of
 from scenarios.spec.graph import graph_of
-from scenarios.spec.law import law_of
-from scenarios.spec.limits import limits_of
-from scenarios.spec.model import Event, Scenario
-from scenarios.spec.moves import inverters_of, moves_of
-from scenarios.spec.netem import deaths_of, is_calm, netem_of, setup_of
+from scenarios.spec.law_choice import law_of
+from scenarios.spec.netem_tables import deaths_of, is_calm, netem_of, setup_of
+from scenarios.spec.power_limits import limits_of
+from scenarios.spec.scenario_changes import changes_of
+from scenarios.spec.scenario_model import Event, Scenario
 
 
 def configs(

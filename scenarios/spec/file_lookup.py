@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from scenarios.catalogue_files import names_in
-from scenarios.spec.mistakes import ScenarioError
-from wire.nearest import suggestion
+from scenarios.spec.scenario_errors import ScenarioError
+from wire.suggestion import suggestion
 
 
 def find_file(name: str, folder: Path, what: str) -> Path:
@@ -34,7 +34,8 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    scenarios.spec.mistakes.ScenarioError: no sweep "gain"; did you mean "gains"? The sweeps of the catalogue are ...
+    scenarios.spec.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? The sweeps of the catalogue are
+    ...
     """
     names = names_in(folder)
     if name in names:

@@ -8,13 +8,13 @@ from typing import get_args
 
 from msgspec.structs import replace
 
-from agents.config import GraphRule
+from agents.agent_config import GraphRule
 from agents.graphs import GRAPHS, make_graph, neighbours_by
 from plant.equipment import Feeder, InverterRow
 from scenarios.spec.agentless import with_agent
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import Case, Scenario
 from scenarios.spec.plugins import check_plugin, placed
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Case, Scenario
 from wire.plugin import Plugin, plugin_of
 
 OURS = get_args(GraphRule)

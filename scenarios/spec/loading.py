@@ -13,9 +13,9 @@ import msgspec
 from plant.equipment import F_NOM, Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.catalogue_files import CATALOGUE, names_in
+from scenarios.spec.agent_schedule import check_moves, inverters_of
 from scenarios.spec.agentless import check_agentless
 from scenarios.spec.benchmark import check_benchmark, with_benchmark_folder
-from scenarios.spec.changes import as_in, check_changes
 from scenarios.spec.checks import (
     check_cases,
     check_events,
@@ -27,15 +27,15 @@ from scenarios.spec.checks import (
 )
 from scenarios.spec.file_lookup import find_file
 from scenarios.spec.graph import check_graphs, with_graph_folders
-from scenarios.spec.law import check_laws, with_law_folders
-from scenarios.spec.limits import check_limits
-from scenarios.spec.mistakes import Mistakes, ScenarioError
-from scenarios.spec.model import Scenario
-from scenarios.spec.moves import check_moves, inverters_of
-from scenarios.spec.netem import check_netem, with_delays
-from scenarios.spec.own import check_own, with_own_folders
-from scenarios.spec.protection import check_protection
-from scenarios.spec.reading import read_tables
+from scenarios.spec.law_choice import check_laws, with_law_folders
+from scenarios.spec.netem_tables import check_netem, with_delays
+from scenarios.spec.own_modules import check_own, with_own_folders
+from scenarios.spec.power_limits import check_limits
+from scenarios.spec.protection_table import check_protection
+from scenarios.spec.scenario_changes import as_in, check_changes
+from scenarios.spec.scenario_errors import Mistakes, ScenarioError
+from scenarios.spec.scenario_model import Scenario
+from scenarios.spec.scenario_reading import read_tables
 from scenarios.spec.supply import check_supply
 
 ReadFeeder = Callable[[str, str], Feeder]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.scenario_errors import Mistakes
 
 
 def multiple(path: str, value: float, of: str, step: float, rule: str, mistakes: Mistakes) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import PluginKey
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import PluginKey
 from wire.module_folder import folder_of
 from wire.path_text import is_no_path
 from wire.plugin import Plugin, plugin_of, problems, scalar_objection, table_of

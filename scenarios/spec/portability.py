@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from agents.carriers.registry import LAWS
+from agents.carriers.law_registry import LAWS
 from agents.graphs import GRAPHS
-from netem.models.own import FAULTS
+from netem.models.own_fault import FAULTS
 from scenarios.results.own.metric import METRICS
 from scenarios.spec.graph import graph_of
-from scenarios.spec.law import law_of
-from scenarios.spec.model import Scenario
-from scenarios.spec.netem import netem_of
-from scenarios.spec.own import metrics_of
+from scenarios.spec.law_choice import law_of
+from scenarios.spec.netem_tables import netem_of
+from scenarios.spec.own_modules import metrics_of
+from scenarios.spec.scenario_model import Scenario
 from wire.registry import PluginError, Registry
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from agents.config import Gains, Handling
-from netem.plausible import Range
-from plant.config import GflParameters, GfmParameters, Protection, SyncCheck
-from scenarios.spec.model import UNIT_OF_KEY, Event, InverterTable, PlantTable, Processes, Scenario, Time
+from agents.agent_config import Gains, Handling
+from netem.plausible_links import Range
+from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from scenarios.spec.scenario_model import UNIT_OF_KEY, Event, InverterTable, PlantTable, Processes, Scenario, Time
 
 RANGES: dict[tuple[type, str], Range] = {
     (Scenario, "seed"): Range("a seed", "", 0, 2**63 - 1),

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from plant.connectivity import Connectivity, Node
 from plant.equipment import Feeder
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.model import Event, Scenario
-from scenarios.spec.moves import inverters_of
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Event, Scenario
 
 _SHOWN = 6
 """So many buses of a dead part are named."""

@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 
 from scenarios.results.history import Floats
-from scenarios.sweep.columns import FATE
 from scenarios.sweep.statistics import MOST_VALUES, is_number
+from scenarios.sweep.sweep_columns import FATE
 
 REPEATS = ("sample", "case", "seed", "graph.number", "graph.lambda_2", "graph.edges")
 """Columns that repeat a point of the sweep instead of being an axis of it; medians are taken over them."""

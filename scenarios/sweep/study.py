@@ -8,10 +8,10 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.results.folder import refusal, set_broken, set_status
+from scenarios.results.run_files import refusal, set_broken, set_status
 from scenarios.sweep.file import Plan
-from scenarios.sweep.folder import SweepFolder
-from scenarios.sweep.table import table_of, write_table
+from scenarios.sweep.sweep_folder import SweepFolder
+from scenarios.sweep.sweep_table import table_of, write_table
 from scenarios.sweep.workers import on_dask, on_this_machine
 
 Tell = Callable[[int], None]
@@ -73,7 +73,9 @@ def _study(plan: Plan, folder: SweepFolder, tell: Tell, jobs: int, dask: str) ->
     table = table_of(plan, folder.done)
     path = write_table(table, folder.path)
 
-    from scenarios.sweep import plots  # matplotlib takes longer to import than a run; nothing else waits for it
+    from scenarios.sweep import (
+        sweep_plots as plots,  # matplotlib takes longer to import than a run; nothing else waits for it
+    )
 
     figures = plots.draw_all(table, folder.path / "plots")
     set_status(folder.path, "complete")

@@ -19,7 +19,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from scenarios.spec import Scenario
 from scenarios.sweep.file import Run
-from scenarios.sweep.one import Done, run_one
+from scenarios.sweep.sweep_case import SweepRow, run_one
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ def cores() -> int:
 
 
 @overload
-def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[Done, None, None]: ...
+def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[SweepRow, None, None]: ...
 @overload
 def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int, task: Task[T]) -> Generator[T, None, None]: ...
 def on_this_machine(
@@ -63,7 +63,7 @@ def on_this_machine(
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
-def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[Done, None, None]:
+def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[SweepRow, None, None]:
     """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders.
 
     Raises

@@ -7,11 +7,11 @@ from msgspec.structs import replace
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.results.history import History, Plates
+from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import measure, windows
-from scenarios.results.moves import as_they_came
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.writing import to_toml
+from scenarios.spec.scenario_writing import to_toml
 from wire.messages import Telemetry
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.fleet import run_processes
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.ports import endpoint
+from scenarios.drivers.process_driver import run_processes
 from scenarios.spec import Event, load_scenario
 from scenarios.spec.configs import configs
 from tests.toy.runs import Rows, first_difference

@@ -5,13 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.config import Control
+from agents.agent_config import Control
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
-from scenarios.results.numbers import Ran as RanScenario
-from scenarios.results.numbers import metrics_json
+from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 from tests.conformance.test_drivers import in_one_process
@@ -77,7 +76,7 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     history, plates = history_of(path, "IV"), Plates.of(feeder.inverters)
     found = find(scenario, feeder, plates, {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]})
     steady = found.results["IV"]["event1"]
-    ran = RanScenario(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 
     assert np.ptp(history.P_set[:, 1]) == 0.0
     assert steady.p["inv2"] == pytest.approx(0.647, abs=2e-3)

@@ -10,8 +10,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.config import AgentConfig, Control, GraphRule
-from plant.config import PlantConfig, SwitchEvent
+from agents.agent_config import AgentConfig, Control, GraphRule
+from plant.plant_config import PlantConfig, SwitchEvent
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.spec import load_scenario

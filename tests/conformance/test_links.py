@@ -8,10 +8,10 @@ from typing import NamedTuple
 import pytest
 
 from netem.ledger import LinkCounts
-from scenarios.drivers.fleet import run_processes
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
-from scenarios.results.links import LinkRecord
+from scenarios.drivers.process_driver import run_processes
+from scenarios.results.link_records import LinkRecord
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 

@@ -7,9 +7,9 @@ import hashlib
 import pytest
 from threadpoolctl import threadpool_limits
 
-from plant.config import PlantSettings, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings, SwitchEvent
 from plant.tables import read_feeder
 
 

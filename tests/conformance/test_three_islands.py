@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import pytest
 
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs

@@ -12,9 +12,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from agents.agent_config import LawChoice
 from agents.carriers.fmu import FmuLaw, load_problem
 from agents.carriers.fmu_interface import fmu_problems
-from agents.config import LawChoice
 from agents.laws.call import LawError, begun, decided
 from tests.laws.test_programs_end import OWN
 
@@ -65,7 +65,7 @@ def test_an_fmu_that_fails_in_a_step_is_told(how: float, said: str, folder: Path
 AGENT = """
 import os, signal
 from agents.carriers.fmu import FmuLaw
-from agents.config import LawChoice
+from agents.agent_config import LawChoice
 from agents.laws.law import Own
 law = FmuLaw(LawChoice(fmu={name!r}, folder={folder!r}, parameters={{"how": 1}}))
 law.start(Own(*{own!r}))

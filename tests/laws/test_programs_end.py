@@ -9,9 +9,9 @@ from time import monotonic
 
 import pytest
 
+from agents.agent_config import LawChoice
 from agents.carriers.make import close_laws
 from agents.carriers.program import ProgramLaw
-from agents.config import LawChoice
 from agents.laws.call import LawError
 from agents.laws.law import Own
 
@@ -23,7 +23,7 @@ STAYS = "sleep 600 & sleep 600"
 AGENT = f"""
 import os, signal
 from agents.carriers.program import ProgramLaw
-from agents.config import LawChoice
+from agents.agent_config import LawChoice
 law = ProgramLaw(LawChoice(command=("sh", "-c", {STAYS!r})))
 """
 

@@ -16,7 +16,7 @@ from time import monotonic
 import msgspec
 import pytest
 
-from scenarios.drivers.fleet import run_processes
+from scenarios.drivers.process_driver import run_processes
 from scenarios.drivers.rendezvous import rendezvous
 from tests.toy import toy_plant
 from tests.toy.runs import FleetRun
@@ -152,7 +152,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
 PARENT = """
 import json, sys
 from pathlib import Path
-from scenarios.drivers.fleet import run_processes
+from scenarios.drivers.process_driver import run_processes
 from tests.toy.toy_configs import toy_configs
 plant, agents = toy_configs(3, end=2000.0)
 def told(children):
@@ -221,7 +221,7 @@ def test_an_agent_alone_gives_up() -> None:
 def test_an_agent_imports_nothing_heavy() -> None:
     """Nine agents start in the time of one: neither numpy nor numba are in them."""
     heavy = ("numpy", "scipy", "numba", "matplotlib", "asyncio")
-    code = f"import sys, agents.runtime, wire.driver.process; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, agents.agent_process, wire.driver.process; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
 
     assert done.stdout == "[]\n"

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from agents.config import Control
-from plant.config import SwitchEvent
+from agents.agent_config import Control
+from plant.plant_config import SwitchEvent
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs

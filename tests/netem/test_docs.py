@@ -12,8 +12,8 @@ import msgspec
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
 from netem.spec.fault import KINDS
+from netem.spec.netem_reading import read_netem
 from netem.spec.profiles import PROFILES
-from netem.spec.reading import read_netem
 from tests.netem.links import MICROGRIDS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "netem.md").read_text(encoding="utf-8")

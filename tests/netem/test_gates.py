@@ -10,13 +10,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from netem.channel import Channel
+from netem.fault_schedule import Schedule
 from netem.models.cut import Cut
 from netem.models.delay import Constant
 from netem.models.duplicate import Duplicate
 from netem.models.flap import Flap
 from netem.models.rate import Rate
 from netem.models.slots import Slots
-from netem.schedule import Schedule
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
 from tests.netem.links import T_C, channel, fates, steady

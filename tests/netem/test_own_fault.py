@@ -13,15 +13,15 @@ from netem.channel import Channel
 from netem.check.rows import Row
 from netem.check.verify import verify
 from netem.ledger import LinkTrace
-from netem.models.own import FAULTS, LinkFault
+from netem.models.own_fault import FAULTS, LinkFault
 from netem.receiver import Receiver
 from netem.spec.change import replayed
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
+from netem.spec.netem_reading import read_netem
 from netem.spec.pattern import Link
-from netem.spec.reading import read_netem
-from scenarios.emulation.orders import Order
-from scenarios.emulation.setup import Setup
+from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.link_command import LinkCommand
 from wire.plugin import Plugin, problems
 from wire.registry import PluginError
 
@@ -219,7 +219,7 @@ def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
 
     assert Setup.of_text(setup.to_text()) == setup
     with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
-        Order.of_text(Order(fault=entry).to_text())
+        LinkCommand.of_text(LinkCommand(fault=entry).to_text())
 
 
 def test_a_decorator_adds_a_fault_and_takes_over_none_of_ours() -> None:

@@ -16,10 +16,10 @@ from netem.models.loss import Bernoulli, GilbertElliott
 from netem.spec.change import Change, Heal, replayed, schedule_of
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
+from netem.spec.netem_reading import read_netem
 from netem.spec.partition import Partition
 from netem.spec.pattern import Link, links_among
 from netem.spec.profiles import PROFILES
-from netem.spec.reading import read_netem
 from tests.netem.links import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)

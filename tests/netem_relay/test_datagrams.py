@@ -10,7 +10,7 @@ from netem.relay.bottleneck import NEVER
 from netem.relay.datagrams import Datagrams
 from netem.relay.direction import Direction
 from netem.relay.faults import Faults, FaultsError
-from netem.relay.words import WordError, read
+from netem.relay.relay_commands import WordError, read
 
 N = 4000
 SURE = 1e-4

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from plant.config import GflParameters, GfmParameters
 from plant.dynamics import Circuit, Dynamics, Inverter
+from plant.plant_config import GflParameters, GfmParameters
 
 S_B = 200e3
 V_B = 277.1363

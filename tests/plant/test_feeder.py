@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
 from plant.tables import read_feeder
 
 T_C = 0.02

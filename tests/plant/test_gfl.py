@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.config import GflParameters
 from plant.dynamics import Dynamics
 from plant.dynamics.kernel import gfl
+from plant.plant_config import GflParameters
 from tests.plant.circuits import BALANCED, GFL_D, S_B, V_B, on_stiff_bus
 from tests.plant.test_gfm import crossing
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.config import PlantSettings, Protection, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings, Protection, SwitchEvent
 from plant.tables import read_feeder
 
 T_C, H, END = 0.02, 0.002, 5.0

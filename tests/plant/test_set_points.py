@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.config import GflParameters, GfmParameters, PlantSettings
 from plant.dynamics import Dynamics, PlantError
 from plant.dynamics.kernel import gfl
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import GflParameters, GfmParameters, PlantSettings
 from plant.tables import read_feeder
 from tests.plant.circuits import BALANCED, GFL_D, V_B, on_stiff_bus
 from tests.plant.test_feeder import opened, plant, run

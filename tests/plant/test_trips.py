@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from plant.tables import read_feeder
 from tests.plant.test_feeder import T_C, opened, run
 from wire.messages import OFF, PlantEvent

@@ -10,8 +10,8 @@ import numpy as np
 from agents.agent import Agent
 from plant.build import build_plant
 from plant.equipment import F_NOM, Feeder
-from plant.reporting import measurement_of
-from scenarios.predict.fleet import Fleet, fleet_of
+from plant.telemetry_reporter import measurement_of
+from scenarios.predict.inverter_group import Fleet, fleet_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import Scenario, load_scenario
@@ -83,7 +83,7 @@ def on_the_plant(
     still_voltage: bool = False,
     end_s: float = 7.0,
 ) -> Run:
-    """The real agents on the real plant, with delays in ticks as `scenarios.predict.model.Ticks` means them.
+    """The real agents on the real plant, with delays in ticks as `scenarios.predict.linear_model.Ticks` means them.
 
     With `frequency_only` V and Q are measured at once, and V_set is held at once.
     """

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from agents.config import Gains
+from agents.agent_config import Gains
 from agents.laws.consensus import P_set_step
-from scenarios.predict.fleet import Fleet
-from scenarios.predict.limits import delay_limit, first_crossing
-from scenarios.predict.model import Loop, Ticks
+from scenarios.predict.delay_limits import delay_limit, first_crossing
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.results.history import Floats
 from tests.predict.graphs import GRAPHS, fleet
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from scenarios.predict.limits import delay_limit
-from scenarios.predict.loads import load_steps
+from scenarios.predict.delay_limits import delay_limit
+from scenarios.predict.load_steps import load_steps
 from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.times import LoadStep, predicted_times
 from scenarios.predict.vars import var_delay_limit

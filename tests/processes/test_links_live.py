@@ -16,12 +16,12 @@ from netem.models.delay import Normal
 from netem.spec.change import Heal, replayed
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.node import NodeFault
+from netem.spec.node_fault import NodeFault
 from netem.spec.partition import Partition
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.orders import Order
-from scenarios.emulation.setup import Setup
-from scenarios.results.links import LinkRecord
+from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.link_command import LinkCommand
+from scenarios.results.link_records import LinkRecord
 from scenarios.spec import load_scenario
 from tests.processes.terminals import Desk
 from tests.toy.runs import FleetRun
@@ -62,7 +62,7 @@ def simulated(told: Setup, end: float) -> dict[tuple[str, str], LinkTrace]:
     return links.by_link()
 
 
-def give(town: Town, order: Order, *receivers: str) -> float:
+def give(town: Town, order: LinkCommand, *receivers: str) -> float:
     """Give an order and wait until the receivers have taken it; from when on (s) it holds."""
     before = len(town.obeyed)
     answer = town.command("link", order.to_text())
@@ -90,9 +90,9 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
     told = setup()
     with Town(4, tmp_path, links=told.to_text()).all() as town:
         orders = [
-            Order(fault=Fault(on="inv1 -> inv2", loss=0.3, delay=Normal(mean_s=0.03, std_s=0.01))),
-            Order(fault=Fault(on="inv3 <-> inv4", cut=True)),
-            Order(fault=Fault(on="inv2 -> inv4", delay=0.05)),
+            LinkCommand(fault=Fault(on="inv1 -> inv2", loss=0.3, delay=Normal(mean_s=0.03, std_s=0.01))),
+            LinkCommand(fault=Fault(on="inv3 <-> inv4", cut=True)),
+            LinkCommand(fault=Fault(on="inv2 -> inv4", delay=0.05)),
         ]
         set_at = give(town, orders[0], "inv2")
         cut_at = give(town, orders[1], "inv3", "inv4")
@@ -105,13 +105,13 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
         town.until(lambda: town.status["inv4"].impaired == ("inv2", "inv3"), "the new inv4 is behind the same links")
         wait(town, 0.6)
         joined_at = next(event.t for event in town.events[count:] if "inv4 joined" in event.text)
-        healed_at = give(town, Order(heal=Heal(on="inv3 <-> inv4", from_s=0.0)), "inv3", "inv4")
+        healed_at = give(town, LinkCommand(heal=Heal(on="inv3 <-> inv4", from_s=0.0)), "inv3", "inv4")
         town.until(lambda: town.status["inv4"].impaired == ("inv2",), "inv4 tells that it is healed")
         wait(town, 2.5)  # a report comes every 2 s
         assert town.command("down").ok
         assert [town.until_ended(name) for name in (*FOUR, "plant")] == [0] * 5
         traces = town.link_record.by_link()
-        changes = [Order.of_text(order.text).at(order.t) for order in town.orders]
+        changes = [LinkCommand.of_text(order.text).at(order.t) for order in town.orders]
 
     heard_at = [event.t for event in town.events if event.kind == "link"]
     cut = [*verdicts(traces["inv3", "inv4"]), *verdicts(traces["inv4", "inv3"])]

@@ -9,8 +9,8 @@ from typing import Literal
 import pytest
 from msgspec.structs import replace
 
-from plant.config import PlantConfig
-from plant.runtime import run_plant
+from plant.plant_config import PlantConfig
+from plant.plant_process import run_plant
 from scenarios.drivers.rendezvous import rendezvous
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant

@@ -16,11 +16,11 @@ from plant.realtime.pacer import TOLERATED
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
-from scenarios.live.setup import Wishes, set_up
+from scenarios.live.live_options import LiveOptions, set_up
 from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
 
-REAL = ("-m", "scenarios.emulation.plant")
+REAL = ("-m", "scenarios.emulation.emulated_plant")
 
 
 class Feeder:
@@ -30,7 +30,7 @@ class Feeder:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
         self.endpoint = rendezvous()
-        plant, agents = set_up(scenario, feeder, Wishes(run="feeder", case="IV", duration=end), self.endpoint)
+        plant, agents = set_up(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end), self.endpoint)
         self.agents = {agent.name: replace(agent, connect=(self.endpoint,)) for agent in agents}
         self.rated = [agent.P_rated for agent in agents]
         standing = [self.agents[name] for name in plant.agents]
@@ -41,7 +41,7 @@ class Feeder:
         """Start an agent of a name while the run goes on."""
         assert self.run.children is not None
         log = self.folder / f"{name}-again.log"
-        child = Child(name, ["-m", "scenarios.emulation.agent"], self.agents[name], log, lambda child: None)
+        child = Child(name, ["-m", "scenarios.emulation.emulated_agent"], self.agents[name], log, lambda child: None)
         before = [child for child in self.run.children if child.name == name]
         for former in before:
             former.release()

@@ -12,14 +12,14 @@ import numpy as np
 from msgspec.structs import replace
 
 from plant.build import build_plant
-from scenarios.live.setup import Wishes, set_up
+from scenarios.live.live_options import LiveOptions, set_up
 from scenarios.results.record import QUANTITIES
 from scenarios.spec import load_scenario
 from tests.schedules.schedule import HEAL, Action, draw
 from tests.toy.town import Town
 from wire.messages import PLANT
 
-PLANT_COMMAND = ("-m", "scenarios.emulation.plant")
+PLANT_COMMAND = ("-m", "scenarios.emulation.emulated_plant")
 
 LONGEST = 20.0
 """Run time (s) after the heal for which the run goes on, if an island does not come back into its band."""
@@ -83,7 +83,7 @@ def carry_out(seed: int, folder: Path, *, switchings: bool = True) -> Verdict:
     """
     scenario, feeder = load_scenario("microgrid-switching")
     scenario = replace(scenario, events=scenario.events[:1])
-    configs = set_up(scenario, feeder, Wishes(run=f"schedule{seed}", case="IV"), "tcp/127.0.0.1:0")
+    configs = set_up(scenario, feeder, LiveOptions(run=f"schedule{seed}", case="IV"), "tcp/127.0.0.1:0")
     actions = draw(seed, {row.name: row.microgrid for row in feeder.inverters}, switchings=switchings)
     rated = {agent.name: agent.P_rated for agent in configs[1]}
     leaders = {agent.name for agent in configs[1] if agent.kind == "GFM"}

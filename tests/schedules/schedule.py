@@ -9,7 +9,7 @@ from typing import NamedTuple
 from netem.models.delay import Uniform
 from netem.spec.change import Heal
 from netem.spec.fault import Fault
-from scenarios.emulation.orders import EVERYTHING, Order
+from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 
 BEGIN = 2.0
 """Run time (s) of the earliest fault: the feeder has islanded at 1 s."""
@@ -32,7 +32,7 @@ class Action(NamedTuple):
     """The inverter, the switch, or the order as text."""
 
     def __str__(self) -> str:
-        shown = str(Order.of_text(self.subject)) if self.kind == "link" else self.subject
+        shown = str(LinkCommand.of_text(self.subject)) if self.kind == "link" else self.subject
         return f"{self.t:.2f} s {self.kind} {shown}"
 
 
@@ -62,7 +62,7 @@ def draw(seed: int, microgrids: Mapping[str, str], *, switchings: bool = True) -
         draws.append(lambda t: _switch(random, t))
     for t in sorted(round(random.uniform(BEGIN, HEAL - 0.2), 2) for _ in range(random.randint(10, 20))):
         actions += random.choice(draws)(t)
-    actions.append(Action(HEAL, "link", Order(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()))
+    actions.append(Action(HEAL, "link", LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()))
     return tuple(sorted(actions, key=lambda action: action.t))
 
 
@@ -108,7 +108,7 @@ def _link(random: Random, t: float, names: Sequence[str], microgrids: Sequence[s
             Fault(on=on, duplicate=0.3, corrupt=0.1),
         ]
     )
-    return Action(t, "link", Order(fault=fault).to_text())
+    return Action(t, "link", LinkCommand(fault=fault).to_text())
 
 
 def _switch(random: Random, t: float) -> list[Action]:

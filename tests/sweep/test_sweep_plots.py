@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.sweep.choice import choose, values
-from scenarios.sweep.columns import FATE
-from scenarios.sweep.plots import _curves, _heat_maps, draw_all
+from scenarios.sweep.column_labels import label_of
 from scenarios.sweep.statistics import spread_of
-from scenarios.sweep.words import label_of
+from scenarios.sweep.sweep_columns import FATE
+from scenarios.sweep.sweep_plots import _curves, _heat_maps, draw_all
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:

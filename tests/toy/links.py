@@ -12,10 +12,10 @@ from functools import partial
 
 import msgspec
 
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
 from agents.lockstep_agent import LockstepAgent
-from plant.config import PlantConfig
 from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode

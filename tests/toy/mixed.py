@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from agents.config import AgentConfig
-from plant.config import PlantConfig
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Children
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.config import AgentConfig
-from plant.config import PlantConfig
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child, Children
-from scenarios.drivers.fleet import run_processes
 from scenarios.drivers.outcome import Outcome
+from scenarios.drivers.process_driver import run_processes
 from tests.toy import toy_plant
 from wire.messages import Telemetry
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.config import AgentConfig
-from plant.config import PlantConfig
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.rendezvous import rendezvous
-from scenarios.results.links import LinkRecord
+from scenarios.results.link_records import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
 from wire.codec import RejectedError, decode, encode
@@ -131,7 +131,9 @@ class Town:
             is_plant = name == "plant"
             config = self.plant_config if is_plant else self.agent_configs[name]
             command = (
-                self._plant_command if is_plant else ["-m", "scenarios.emulation.agent" if config.links else "agents"]
+                self._plant_command
+                if is_plant
+                else ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
             )
             self.add(name, command, config)
         return self

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from agents.config import AgentConfig, Control
-from plant.config import Move, PlantConfig, PlantSettings
+from agents.agent_config import AgentConfig, Control
+from plant.plant_config import Move, PlantConfig, PlantSettings
 from tests.toy.toy_plant import F_NOM, M_P, P_RATED, V_NOM
 
 Moves = tuple[tuple[float, str, Literal["leave", "join"]], ...]

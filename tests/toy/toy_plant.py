@@ -9,9 +9,9 @@ from __future__ import annotations
 import sys
 from typing import NamedTuple
 
-from plant.config import PlantConfig
-from plant.runtime import run_plant
-from scenarios.emulation.links import links_of
+from plant.plant_config import PlantConfig
+from plant.plant_process import run_plant
+from scenarios.emulation.emulated_links import links_of
 from wire.driver.process import main
 from wire.messages import PlantEvent
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from time import monotonic
 from typing import Protocol
 
-from wire.actions import Action, Fetch, Listen, Publish, Say
-from wire.codec import Rejects
+from wire.actions import Action, Fetch, Listen, Log, Publish
+from wire.codec import RejectedMessages
 from wire.driver.log_limit import limit_log
 from wire.driver.session import Session
 
@@ -16,7 +16,7 @@ from wire.driver.session import Session
 class Core(Protocol):
     """What the driver needs of a node (`wire.node`)."""
 
-    rejects: Rejects
+    rejects: RejectedMessages
 
     @property
     def token(self) -> str:
@@ -52,7 +52,7 @@ class Core(Protocol):
         """Begin."""
         ...
 
-    def take_actions(self) -> Sequence[Action | Say]:
+    def take_actions(self) -> Sequence[Action | Log]:
         """What is to be done."""
         ...
 
@@ -88,7 +88,7 @@ EVERYTHING = 1 << 30
 """More messages than can be `wanted`: who wants so many is woken by its clock, by tokens and by words only."""
 
 
-def perform(actions: Sequence[Action | Say], session: Session, log: logging.Logger) -> None:
+def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
     """Do what a core asks for, in its order."""
     for action in actions:
         if isinstance(action, Publish):

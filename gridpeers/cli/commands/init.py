@@ -25,7 +25,7 @@ def init(
     """
     import shlex
 
-    from scenarios.results.folder import refusal, shown
+    from scenarios.results.run_files import refusal, shown
 
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

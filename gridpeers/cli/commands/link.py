@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, told, visit_to
-from gridpeers.cli.mistyped import Commands
+from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
 
 if TYPE_CHECKING:
-    from agents.config import AgentConfig
-    from scenarios.emulation.orders import Order
+    from agents.agent_config import AgentConfig
+    from scenarios.emulation.link_command import LinkCommand
 
 link = typer.Typer(
     cls=Commands,
@@ -60,7 +60,7 @@ def set_(
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
         fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
         if not fault and not profile:
-            from scenarios.live.place import UsageError
+            from scenarios.live.run_address import UsageError
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
@@ -121,20 +121,20 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
     Example:  gridpeers link show
     """
-    with visit_to(run, connect, wait) as visit:
-        from scenarios.live.ordering import stands
-        from scenarios.live.show.links import links_text
+    with visit_to(run, connect, wait) as client:
+        from scenarios.live.command_links import stands
+        from scenarios.live.show.link_table import links_text
 
-        t, found, silent = stands(visit)
+        t, found, silent = stands(client)
         typer.echo(links_text(run, t, found), nl=False)
         if silent:
             fail([f"has not answered: {', '.join(silent)}; what its links do is not shown"], BROKEN)
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
-    from netem.mistakes import seconds
     from netem.models.delay import Uniform
-    from scenarios.live.place import UsageError
+    from netem.netem_errors import seconds
+    from scenarios.live.run_address import UsageError
 
     if jitter is None:
         return {} if delay is None else {"delay": delay}
@@ -149,8 +149,8 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 
 def _pattern(links: list[str], arrow: str) -> str:
-    from scenarios.emulation.orders import EVERYTHING
-    from scenarios.live.place import UsageError
+    from scenarios.emulation.link_command import EVERYTHING
+    from scenarios.live.run_address import UsageError
 
     if not links:
         return EVERYTHING
@@ -179,25 +179,25 @@ def _give(
     from netem.spec.change import Heal
     from netem.spec.fault import Fault
     from netem.spec.pattern import parse
-    from scenarios.emulation.orders import Order
-    from scenarios.live.ordering import check, give, links_of_run
-    from scenarios.live.place import UsageError
+    from scenarios.emulation.link_command import LinkCommand
+    from scenarios.live.command_links import check, give, links_of_run
+    from scenarios.live.run_address import UsageError
 
     on = _pattern(links, arrow)
     try:
         parse(on)
     except ValueError as error:
         raise UsageError(f"LINKS: {error}") from None
-    order = Order(
+    order = LinkCommand(
         fault=None if fault is None else Fault(on=on, **fault),
         heal=Heal(on=on, from_s=0.0) if fault is None else None,
         for_s=duration,
     )
     check(order, None)
-    with visit_to(run, connect, wait) as visit:
-        setup, agent = links_of_run(visit)
+    with visit_to(run, connect, wait) as client:
+        setup, agent = links_of_run(client)
         check(order, setup)
-        outcome = give(visit, order)
+        outcome = give(client, order)
     typer.echo(f"{outcome.said}; from t = {outcome.t:.2f} s on" if outcome.changes_links else outcome.said)
     if outcome.acknowledged:
         typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
@@ -212,7 +212,7 @@ def _give(
         fail(wrong, BROKEN)
 
 
-def _too_old(order: Order, agent: AgentConfig) -> str:
+def _too_old(order: LinkCommand, agent: AgentConfig) -> str:
     """What a person should know if states will be ignored for their age."""
     from netem.models.delay import Constant, RandomDelay
 

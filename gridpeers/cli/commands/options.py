@@ -1,4 +1,4 @@
-"""What the commands for runs by hand have in common: options, the visit to a run, and what went wrong in one line."""
+"""What the commands for runs by hand have in common: options, the client to a run, and what went wrong in one line."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, fail, require
 
 if TYPE_CHECKING:
-    from scenarios.live.visit import Visit
+    from scenarios.live.run_client import RunClient
 
 RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
-"""As in `scenarios.live.place`, which a test holds them against."""
+"""As in `scenarios.live.run_address`, which a test holds them against."""
 
 Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
@@ -25,26 +25,26 @@ Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest 
 
 
 @contextmanager
-def visit_to(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[Visit]:
+def visit_to(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[RunClient]:
     """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
     require({"zenoh": "the connection to a run"})
     with told():
-        from scenarios.live.place import check_wait, place
-        from scenarios.live.visit import Visit
+        from scenarios.live.run_address import check_wait, place
+        from scenarios.live.run_client import RunClient
 
         check_wait(wait)
-        with Visit(place(run, connect), meet_agents=meet_agents) as visit:
-            visit.find_plant(wait)
-            yield visit
+        with RunClient(place(run, connect), meet_agents=meet_agents) as client:
+            client.find_plant(wait)
+            yield client
 
 
 @contextmanager
 def told() -> Iterator[None]:
     """What a person did wrong, or what is not there, in one line and exit code 2."""
-    from scenarios.live.asking import RefusedError
-    from scenarios.live.place import UsageError
-    from scenarios.live.visit import NobodyError
-    from scenarios.results.folder import FolderError
+    from scenarios.live.run_address import UsageError
+    from scenarios.live.run_client import NobodyError
+    from scenarios.live.run_requests import RefusedError
+    from scenarios.results.run_files import FolderError
     from wire.driver.process import ConfigurationError
     from wire.driver.session import SessionError
 

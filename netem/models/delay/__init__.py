@@ -1,7 +1,7 @@
 """Delays of single messages."""
 
-from netem.models.delay.base import DelayModel, RandomDelay
 from netem.models.delay.constant import Constant
+from netem.models.delay.delay_model import DelayModel, RandomDelay
 from netem.models.delay.lognormal import Lognormal
 from netem.models.delay.normal import Normal
 from netem.models.delay.pareto import Pareto

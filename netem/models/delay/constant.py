@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from netem.draws import Stream
-from netem.mistakes import Mistake, seconds
-from netem.models.delay.base import DelayModel, Sampler
+from netem.models.delay.delay_model import DelayModel, Sampler
+from netem.netem_errors import Mistake, seconds
 
 
 class Constant(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="constant"):

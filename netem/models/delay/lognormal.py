@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from netem.mistakes import Mistake, amount, seconds
-from netem.models.delay.base import STANDARD, RandomDelay
-from netem.plausible import Range
+from netem.models.delay.delay_model import STANDARD, RandomDelay
+from netem.netem_errors import Mistake, amount, seconds
+from netem.plausible_links import Range
 
 
 class Lognormal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="lognormal"):

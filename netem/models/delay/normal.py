@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from netem.mistakes import Mistake, seconds
-from netem.models.delay.base import STANDARD, RandomDelay
+from netem.models.delay.delay_model import STANDARD, RandomDelay
+from netem.netem_errors import Mistake, seconds
 
 
 class Normal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="normal"):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from netem.mistakes import Mistake, amount, seconds
-from netem.models.delay.base import RandomDelay
-from netem.plausible import Range
+from netem.models.delay.delay_model import RandomDelay
+from netem.netem_errors import Mistake, amount, seconds
+from netem.plausible_links import Range
 
 
 class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="pareto"):

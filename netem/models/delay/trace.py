@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from netem.draws import Stream
-from netem.mistakes import Mistake, below, seconds
-from netem.models.delay.base import DelayModel, Sampler
+from netem.models.delay.delay_model import DelayModel, Sampler
+from netem.netem_errors import Mistake, below, seconds
 
 MOST_SHOWN = 5
 """So many wrong delays of a trace are named; a file in milliseconds has thousands."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from netem.draws import Stream
-from netem.mistakes import Mistake, probability
-from netem.models.loss.base import LossModel, Lost
+from netem.models.loss.loss_model import LossModel, Lost
+from netem.netem_errors import Mistake, probability
 
 
 class Bernoulli(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="bernoulli"):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from netem.mistakes import Mistake, probability
-from netem.models.loss.base import LossModel
+from netem.models.loss.loss_model import LossModel
+from netem.netem_errors import Mistake, probability
 
 
 class Markov(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="markov"):

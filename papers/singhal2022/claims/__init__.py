@@ -1,13 +1,13 @@
 """What the paper claims of its experiments, one file per experiment."""
 
 from gridpeers.benchmarks import Claim
-from papers.singhal2022.claims.communication import COMMUNICATION
-from papers.singhal2022.claims.intermittency import INTERMITTENCY
-from papers.singhal2022.claims.islanding import ISLANDING
-from papers.singhal2022.claims.plug_n_play import PLUG_N_PLAY
-from papers.singhal2022.claims.switching import SWITCHING
-from papers.singhal2022.claims.topology import TOPOLOGY
-from papers.singhal2022.claims.wind_up import WIND_UP
+from papers.singhal2022.claims.communication_claims import COMMUNICATION
+from papers.singhal2022.claims.intermittency_claims import INTERMITTENCY
+from papers.singhal2022.claims.islanding_claims import ISLANDING
+from papers.singhal2022.claims.plug_n_play_claims import PLUG_N_PLAY
+from papers.singhal2022.claims.switching_claims import SWITCHING
+from papers.singhal2022.claims.topology_claims import TOPOLOGY
+from papers.singhal2022.claims.wind_up_claims import WIND_UP
 
 CLAIMS: dict[str, tuple[Claim, ...]] = {
     "islanding": ISLANDING,

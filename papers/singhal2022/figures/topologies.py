@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.figures import PAGE
-from papers.singhal2022.claims.topology import TREE, medians
+from papers.singhal2022.claims.topology_claims import TREE, medians
 from papers.singhal2022.graph_runs import GraphRun
 
 LEAST = 1e-6

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gridpeers.benchmarks import Findings, Verdict
-from gridpeers.folders import versions
+from gridpeers.output_folders import versions
 from papers.singhal2022.graph_runs import graph_runs
 from papers.singhal2022.headline import Number, numbers
 from papers.singhal2022.reproduce.parts import Part, Picture

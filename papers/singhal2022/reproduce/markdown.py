@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gridpeers.benchmarks import HEADINGS, Verdict
-from gridpeers.folders import versions
+from gridpeers.output_folders import versions
 from papers.singhal2022.headline import headline
 from papers.singhal2022.reproduce.found import Reproduction, Result, machine
 from papers.singhal2022.reproduce.grid import Entry, lines, tolerances
-from papers.singhal2022.reproduce.page import PAPER
+from papers.singhal2022.reproduce.report_page import PAPER
 
 _MARKS = {True: "yes", False: "**NO**"}
 

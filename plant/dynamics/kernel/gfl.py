@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.config import GflParameters
 from plant.dynamics.kernel.arithmetic import A120, heun, sat
 from plant.dynamics.kernel.compiled import compiled
+from plant.plant_config import GflParameters
 
 PARAMETERS = np.dtype(
     [

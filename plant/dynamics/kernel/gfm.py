@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.config import GfmParameters
 from plant.dynamics.kernel.arithmetic import heun, sat
 from plant.dynamics.kernel.compiled import compiled
+from plant.plant_config import GfmParameters
 
 PARAMETERS = np.dtype(
     [

@@ -13,13 +13,13 @@ import msgspec
 from plant.equipment import Feeder
 from plant.network import Network
 from scenarios.live.numbers.expected_silence import ExpectedSilence
-from scenarios.live.numbers.opened import NEAR, Opened, events_by_hand, opened
+from scenarios.live.numbers.windows import NEAR, LiveWindows, events_by_hand, opened
 from scenarios.live.show.events import line_of
+from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import Window, windows
-from scenarios.results.moves import as_they_came
 from scenarios.results.steadiness import STEADY
 from scenarios.spec import Scenario
-from scenarios.spec.netem import netem_of
+from scenarios.spec.netem_tables import netem_of
 from wire.messages import PlantEvent
 
 
@@ -33,7 +33,7 @@ class Compared:
     """The scenario as far as the last of its windows that is measured; its end is that one's, as it is meant."""
     happened: Scenario
     """The scenario with the events that came, those among them that people made by operating switches."""
-    opened: Opened
+    opened: LiveWindows
     """The windows of measurement of these events."""
     by_hand: Mapping[str, str]
     """What people did at each event of theirs, by its label."""

@@ -6,23 +6,23 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from scenarios.live.folders import Folders
-from scenarios.live.hand import Ended
-from scenarios.live.numbers.account import Account
+from scenarios.live.live_folders import Folders
+from scenarios.live.live_processes import ProcessOutcome
+from scenarios.live.numbers.live_report import LiveReport
 from scenarios.results.report import show
 from wire.driver.drive import StoppedError
 
 
-def conclude(ended: Ended, account: Account, kept: Folders) -> Ended:
+def conclude(ended: ProcessOutcome, account: LiveReport, kept: Folders) -> ProcessOutcome:
     """Give account of a run that has ended, show it, and note how it ended.
 
     Ctrl-C and SIGTERM are as good an end as any: the run has no other. Only a second one leaves it without numbers.
 
     Parameters
     ----------
-    ended : Ended
+    ended : ProcessOutcome
         How the run ended.
-    account : Account
+    account : LiveReport
         With the record, if that is whole.
     kept : Folders
         With the run folder.

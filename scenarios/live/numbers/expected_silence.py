@@ -10,7 +10,7 @@ from netem.spec.fault import Span
 from netem.spec.pattern import Link
 from plant.equipment import Feeder
 from scenarios.spec import Scenario
-from scenarios.spec.netem import netem_of, setup_of
+from scenarios.spec.netem_tables import netem_of, setup_of
 from wire.messages import PLANT, PlantEvent
 
 _NOTICED = 1.0

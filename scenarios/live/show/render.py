@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.live.show.look import Line, Look
+from scenarios.live.show.snapshot import Line, Snapshot
 from scenarios.short_names import short
 
 EVENTS = 6
@@ -61,13 +61,13 @@ _COLUMNS = (
 are those between whom and it an emulated fault holds."""
 
 
-def _columns(look: Look) -> tuple[_Column, ...]:
+def _columns(look: Snapshot) -> tuple[_Column, ...]:
     """The columns that there is something to show in."""
     calm = not any(line.impaired for line in look.lines)
     return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
-def head(look: Look) -> str:
+def head(look: Snapshot) -> str:
     """One line on the whole run."""
     t = "has not begun" if look.t is None else f"t = {look.t:.2f} s"
     islands = list(dict.fromkeys(line.island for line in look.lines if line.island))
@@ -76,12 +76,12 @@ def head(look: Look) -> str:
     return "   ".join(part for part in parts if part)
 
 
-def plain(look: Look) -> str:
+def plain(look: Snapshot) -> str:
     """Text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut.
 
     Parameters
     ----------
-    look : Look
+    look : Snapshot
         What to show.
     """
     columns = _columns(look)
@@ -99,12 +99,12 @@ def plain(look: Look) -> str:
     return "\n".join(text) + "\n"
 
 
-def table(look: Look, keys: str = "q: quit") -> Group:
+def table(look: Snapshot, keys: str = "q: quit") -> Group:
     """Table for `gridpeers watch`.
 
     Parameters
     ----------
-    look : Look
+    look : Snapshot
         What to show.
     keys : str, optional
         What can be typed.

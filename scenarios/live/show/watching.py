@@ -7,11 +7,11 @@ from time import monotonic
 from rich.console import Console
 from rich.live import Live
 
-from scenarios.live.asking import Watching, present, standing
+from scenarios.live.run_client import RunClient
+from scenarios.live.run_requests import Watching, present, standing
 from scenarios.live.show.keyboard import keyboard
-from scenarios.live.show.picture import Picture
 from scenarios.live.show.render import plain, table
-from scenarios.live.visit import Visit
+from scenarios.live.show.run_monitor import RunMonitor
 
 REFRESH = 0.25
 """Time (s) between two pictures on a terminal: the plant tells five times a second."""
@@ -23,41 +23,43 @@ QUIT = ("q", "Q", "\x1b")
 """Keys that end it."""
 
 
-def watch(visit: Visit, console: Console, seconds: float | None) -> None:
+def watch(client: RunClient, console: Console, seconds: float | None) -> None:
     """Show a run until somebody quits, or for a time.
 
     Parameters
     ----------
-    visit : Visit
+    client : RunClient
         At the run, with its agents met.
     console : Console
         Where to.
     seconds : float or None
         For how long (s); None until q or Ctrl-C.
     """
-    picture = Picture(visit.where.run)
-    picture.standing(standing(visit))
-    watching = Watching(visit, picture)
+    monitor = RunMonitor(client.where.run)
+    monitor.standing(standing(client))
+    watching = Watching(client, monitor)
     end = None if seconds is None else monotonic() + seconds
     if console.is_terminal:
-        _on_terminal(visit, picture, watching, console, end)
+        _on_terminal(client, monitor, watching, console, end)
     else:
-        _as_lines(visit, picture, watching, console, end)
+        _as_lines(client, monitor, watching, console, end)
 
 
-def _on_terminal(visit: Visit, picture: Picture, watching: Watching, console: Console, end: float | None) -> None:
+def _on_terminal(
+    client: RunClient, monitor: RunMonitor, watching: Watching, console: Console, end: float | None
+) -> None:
     with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
         while end is None or monotonic() < end:
             _gather(watching, monotonic() + REFRESH)
-            live.update(table(picture.look(present(visit), monotonic())), refresh=True)
+            live.update(table(monitor.look(present(client), monotonic())), refresh=True)
             if key(0.0) in QUIT:
                 return
 
 
-def _as_lines(visit: Visit, picture: Picture, watching: Watching, console: Console, end: float | None) -> None:
+def _as_lines(client: RunClient, monitor: RunMonitor, watching: Watching, console: Console, end: float | None) -> None:
     while end is None or monotonic() < end:
         _gather(watching, monotonic() + PERIOD if end is None else min(end, monotonic() + PERIOD))
-        text = plain(picture.look(present(visit), monotonic()))
+        text = plain(monitor.look(present(client), monotonic()))
         console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 

@@ -15,4 +15,4 @@ def _objection(it: Any) -> str:
 
 
 CLAIMS: Registry[Any] = Registry("claim", "claims", _objection)
-"""Claims by name. Those of a publication come with its benchmark (`scenarios.results.benchmarks`)."""
+"""Claims by name. Those of a publication come with its benchmark (`scenarios.results.benchmark_registry`)."""

@@ -14,7 +14,7 @@ from scenarios.results.own.metric import Measured, make_metrics, measured
 from scenarios.results.own.window_data import WindowData
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
-from scenarios.spec.own import metrics_of
+from scenarios.spec.own_modules import metrics_of
 
 
 def own_measures(

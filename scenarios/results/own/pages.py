@@ -9,12 +9,13 @@ from typing import Any
 import msgspec
 
 from agents import graphs
-from agents.carriers.registry import LAWS
+from agents.carriers.law_registry import LAWS
 from agents.graphs import GRAPHS
-from netem.models import own as faults
-from netem.models.own import FAULTS
+from netem.models import own_fault as faults
+from netem.models.own_fault import FAULTS
 from scenarios.field_docs import field_docs
-from scenarios.results.own import claim, metric
+from scenarios.results.own import metric
+from scenarios.results.own import own_claim as claim
 from scenarios.results.own.claim_registry import CLAIMS
 from scenarios.results.own.metric import METRICS
 from wire.parameters import parameters_of

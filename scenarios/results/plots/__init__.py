@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from scenarios.results.drawing import Drawing
 from scenarios.results.plots.available import available_power
 from scenarios.results.plots.cases import MPSI, MQSI, V_error, frequency, overview, single, voltage
-from scenarios.results.plots.inverters import plug_and_play, powers
-from scenarios.results.plots.islands import microgrids
+from scenarios.results.plots.inverters_plot import plug_and_play, powers
+from scenarios.results.plots.islands_plot import microgrids
 from scenarios.results.plots.saving import save
 from scenarios.results.plots.style import CASE_STYLES, OTHER_STYLES, PAGE, case_style
 

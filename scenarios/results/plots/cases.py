@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats
-from scenarios.results.islands import Quantity, worst
+from scenarios.results.island_membership import Quantity, worst
 from scenarios.results.plots import sharing
 from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, case_styles, columns, from_zero, time_axis, words

@@ -17,13 +17,13 @@ from matplotlib.axes import Axes
 from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats
 
-Look = tuple[str, Any]
+Snapshot = tuple[str, Any]
 """Colour and dash pattern."""
 
 Style = tuple[str, Any, float]
 """Colour, dash pattern and line width (pt)."""
 
-CASE_STYLES: dict[str, Look] = {
+CASE_STYLES: dict[str, Snapshot] = {
     "I": ("#7a7a7a", "-"),
     "II": ("#d55e00", "-"),
     "III": ("#009e73", "--"),
@@ -49,7 +49,7 @@ goes from dark to light, after the palette viridis."""
 TITLE_LENGTH = 48
 """Characters of a panel's title that fit above half a page."""
 
-OTHER_STYLES: tuple[Look, ...] = (
+OTHER_STYLES: tuple[Snapshot, ...] = (
     ("#0072b2", "-"),
     ("#d55e00", "-"),
     ("#009e73", "--"),
@@ -84,7 +84,7 @@ PAGE: Any = {
 """Layout of every figure."""
 
 
-def case_style(case: str, number: int) -> Look:
+def case_style(case: str, number: int) -> Snapshot:
     """Style of a case: fixed for the paper's four, else in turn.
 
     Examples

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeGuard
 
-from scenarios.spec.mistakes import Mistakes
-from scenarios.sweep.file.graphs import algebraic_connectivity, connected_graphs
-from scenarios.sweep.file.model import GraphAxis
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
 from scenarios.sweep.file.paths import flatten
-from wire.nearest import suggestion
+from scenarios.sweep.file.sweep_model import GraphAxis
+from wire.suggestion import suggestion
 
 MOST_POINTS = 1_000_000
 """Most values of one range: more are a slip, and would fill the memory before anybody could be told."""

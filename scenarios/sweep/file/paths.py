@@ -10,8 +10,8 @@ from typing import Any
 
 import msgspec
 
-from scenarios.spec.model import Scenario
-from wire.nearest import suggestion
+from scenarios.spec.scenario_model import Scenario
+from wire.suggestion import suggestion
 
 _STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"
 _PATH = re.compile(rf"{_STEP}(?:\.{_STEP})*")

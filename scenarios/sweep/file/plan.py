@@ -13,7 +13,8 @@ from plant.equipment import Feeder
 from scenarios.spec import Scenario
 
 SECONDS_PER_SECOND = 0.05
-"""Roughly what a second of the nine-inverter feeder costs (s on one core, bench/sweep.py); only for saying "2 h"."""
+"""Roughly what a second of the nine-inverter feeder costs (s on one core, bench/sweep_speed.py); only for saying "2
+h"."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from plant.equipment import Feeder
 from plant.tables import read_feeder
 from scenarios.spec import Scenario
 from scenarios.spec.loading import check_tables
-from scenarios.spec.mistakes import Mistakes
+from scenarios.spec.scenario_errors import Mistakes
 from scenarios.sweep.file.axes import Setting
 from scenarios.sweep.file.paths import PathError, Tree, put, steps
 from scenarios.sweep.file.plan import Run

@@ -9,15 +9,15 @@ import msgspec
 
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from papers.singhal2022.experiments.data.swept import Swept
-from papers.singhal2022.experiments.data.told import Told
+from papers.singhal2022.experiments.data.case_data import CaseData
+from papers.singhal2022.experiments.data.sweep_data import SweepData
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History
 from scenarios.results.record import Tape
 from scenarios.spec import Scenario, load_scenario
 from scenarios.spec.configs import configs
-from scenarios.sweep.one import plant_at_start, run_one
+from scenarios.sweep.sweep_case import plant_at_start, run_one
 
 ALL = "* <-> *"
 
@@ -39,17 +39,17 @@ def measured(scenario: str, case: str, end_s: float, *links: Fault, **of: Any) -
     return {name.removeprefix("event1."): value for name, value in done.measures.items()}
 
 
-def told(scenario: str, end_s: float, *cases: str) -> Told:
+def told(scenario: str, end_s: float, *cases: str) -> CaseData:
     """Some cases of a scenario with their histories."""
     spec, feeder = load_scenario(scenario)
     spec = msgspec.structs.replace(spec, time=msgspec.structs.replace(spec.time, end_s=end_s))
-    return Told(scenario=spec, feeder=feeder, histories={case: _history(spec, feeder, case) for case in cases})
+    return CaseData(scenario=spec, feeder=feeder, histories={case: _history(spec, feeder, case) for case in cases})
 
 
 @cache
-def theory(scenario: str) -> Swept:
+def theory(scenario: str) -> SweepData:
     """What theory needs to know of a scenario, without any runs."""
-    return Swept(rows=(), base=load_scenario(scenario)[0], window="event1")
+    return SweepData(rows=(), base=load_scenario(scenario)[0], window="event1")
 
 
 def _history(spec: Scenario, feeder: Feeder, case: str) -> History:

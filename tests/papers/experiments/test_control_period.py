@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from scenarios.spec import load_scenario
-from scenarios.sweep.one import run_one
+from scenarios.sweep.sweep_case import run_one
 
 
 def steady(T_c: float, end_s: float) -> tuple[float, float]:

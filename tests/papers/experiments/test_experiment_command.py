@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from papers.singhal2022.experiments.output.page import Curve, Line, Page, Panel
-from papers.singhal2022.experiments.output.result import Result
-from papers.singhal2022.experiments.output.table import Table
-from papers.singhal2022.experiments.registry import EXPERIMENTS
+from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS
+from papers.singhal2022.experiments.output.experiment_page import Curve, Line, Page, Panel
+from papers.singhal2022.experiments.output.experiment_result import Result
+from papers.singhal2022.experiments.output.experiment_table import Table
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -12,16 +12,16 @@ from papers.singhal2022.headline import within
 from papers.singhal2022.reproduce.found import Reproduction, Result, metrics_json
 from papers.singhal2022.reproduce.grid import lines
 from papers.singhal2022.reproduce.markdown import markdown
-from papers.singhal2022.reproduce.page import html
 from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
+from papers.singhal2022.reproduce.report_page import html
 from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.studies.topology import graphs
+from papers.singhal2022.reproduce.studies.topology_study import graphs
 from papers.singhal2022.tables import TABLES, Cell, tables_of
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.spec import load_scenario
-from scenarios.sweep.file.graphs import algebraic_connectivity
+from scenarios.sweep.file.graph_axis import algebraic_connectivity
 
 ISLANDING: Part = PARTS[0]
 PIXEL = bytes.fromhex(

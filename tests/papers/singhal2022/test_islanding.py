@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from papers.singhal2022.claims.islanding import EVENTS
+from papers.singhal2022.claims.islanding_claims import EVENTS
 from scenarios.results import metrics
 
 from .conftest import Experiment, expected

@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.config import Control, GraphRule
+from agents.agent_config import Control, GraphRule
 from agents.lockstep_agent import LockstepAgent
 from tests.toy.toy_configs import agent_config
 from wire.actions import Fetch, Listen, Publish

@@ -10,7 +10,7 @@ from agents.agent import Agent
 from agents.laws.law import Law
 from agents.realtime.realtime_agent import RealtimeAgent
 from tests.toy.toy_configs import agent_config
-from wire.actions import Fetch, Listen, Publish, Say
+from wire.actions import Fetch, Listen, Log, Publish
 from wire.codec import decode, encode
 from wire.keys import Keys
 from wire.messages import AgentStatus, Measurement, Message, State
@@ -46,7 +46,7 @@ class Lab:
             elif isinstance(action, Listen):
                 self.listened.append(action.key)
             else:
-                assert isinstance(action, Say)
+                assert isinstance(action, Log)
                 self.said.append(action.text)
 
     def token(self, name: str, instance: str = "a", *, gone: bool = False, epoch: int = 1) -> None:

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.config import Control, Handling
+from agents.agent_config import Control, Handling
 from agents.laws.consensus import P_set_step, V_set_step
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from wire.messages import OFF, Measurement, Nameplate, State

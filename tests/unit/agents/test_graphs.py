@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.config import Control
+from agents.agent_config import Control
 from agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
 from agents.topology import adjacency, in_neighbours, is_pairwise
 from tests.toy.toy_configs import agent_config

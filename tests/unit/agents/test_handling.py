@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.config import Control, Gains, Handling
-from agents.handling import Follows, Worth, gains_in_force
+from agents.agent_config import Control, Gains, Handling
+from agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
+from agents.island_detector import IslandDetector
 from agents.realtime.realtime_agent import RealtimeAgent
-from agents.slip import Slips
 from scenarios.spec import load_scenario
-from scenarios.sweep.one import run_one
+from scenarios.sweep.sweep_case import run_one
 from tests.toy.toy_configs import agent_config
 from wire.actions import Publish
 from wire.codec import decode, encode
@@ -98,7 +98,7 @@ def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
 @given(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.01, 10.0))
 def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float) -> None:
     """From 1 for what is new down to 0, whatever the ages."""
-    worth = Worth(Handling(stale="age-weighted", T_age=T_age))
+    worth = StalenessWeights(Handling(stale="age-weighted", T_age=T_age))
     worth.arrived("inv2")
     new, later = worth.at_tick({"inv2": age})["inv2"], worth.at_tick({"inv2": age + longer})["inv2"]
 
@@ -193,7 +193,7 @@ def test_vars_that_do_not_follow_stop_v_set_on_that_side_only() -> None:
 @given(st.floats(0.01, 0.4), st.booleans())
 def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
     """A first-order lag below T_sat is off its characteristic for seconds, but on the way to it."""
-    follows, sign = Follows(T_sat=0.5), 1 if up else -1
+    follows, sign = SaturationDetector(T_sat=0.5), 1 if up else -1
     does = [sign * (1.0 - exp(-k * T / lag)) for k in range(300)]
 
     assert {follows.short_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
@@ -202,7 +202,7 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
 
 def test_the_default_is_the_papers() -> None:
     """Without a word all gains and limits are as given, and every state heard counts in full."""
-    worth = Worth(Handling())
+    worth = StalenessWeights(Handling())
 
     assert gains_in_force(Gains(P_set_max=0.7), Handling()) == Gains(P_set_max=0.7)
     assert [worth.at_tick({"inv2": age}) for age in (0.02, 1e6)] == [{"inv2": 1.0}] * 2
@@ -246,7 +246,7 @@ def test_what_is_told_of_the_own_island_and_made_of_anothers(islands: Any, told:
 
 def test_a_neighbour_out_of_step_is_left_out_until_the_grid_is_back() -> None:
     """At 59 Hz it slips by 0.02 cycles in a period; on the grid all are in step, and nothing of it is kept."""
-    it, angles = agent(islands="frequency"), Slips(60.0, 0.01)
+    it, angles = agent(islands="frequency"), IslandDetector(60.0, 0.01)
     shared = []
     for k in range(6):
         grid = k == 5

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from agents.config import Gains, Handling
-from agents.handling import gains_in_force
+from agents.agent_config import Gains, Handling
+from agents.degraded_communication import gains_in_force
 from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
 from wire.parameters import parameters_of
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.agent import Agent
-from agents.config import Control, GraphRule
+from agents.agent_config import Control, GraphRule
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.lockstep_lab import Lab, nameplate, ticking
 

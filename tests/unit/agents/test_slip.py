@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.slip import LONGEST, RETRY, T_GAP, T_LEAK, TRUSTED, Slips
+from agents.island_detector import LONGEST, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
 
 T, F_NOM, SLIP_MAX = 0.02, 60.0, 0.01
 
 
-def pair(slip_max: float = SLIP_MAX) -> tuple[Slips, Slips]:
+def pair(slip_max: float = SLIP_MAX) -> tuple[IslandDetector, IslandDetector]:
     """One inverter and its neighbour."""
-    return Slips(F_NOM, slip_max), Slips(F_NOM, slip_max)
+    return IslandDetector(F_NOM, slip_max), IslandDetector(F_NOM, slip_max)
 
 
 @given(st.integers(0, 10_000))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.config import Control, GraphRule
+from agents.agent_config import Control, GraphRule
 from agents.topology import adjacency, in_neighbours, is_pairwise, laplacian, link_mistakes, natural_order
 
 PAPER = {

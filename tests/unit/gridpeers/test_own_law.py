@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from agents.carriers.registry import LAWS
-from scenarios.spec.law import law_of
+from agents.carriers.law_registry import LAWS
+from scenarios.spec.law_choice import law_of
 
 MINE = '''
 from typing import Annotated

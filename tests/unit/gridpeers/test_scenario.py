@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from gridpeers.cli.commands.run import run as command
+from gridpeers.cli.commands.run_command import run as command
 from gridpeers.runs.choices import Pace
 from gridpeers.runs.running import How
 from scenarios.run import Request

@@ -9,7 +9,7 @@ import pytest
 
 import gridpeers as gp
 from scenarios.sweep.file import read_sweep
-from scenarios.sweep.one import run_one
+from scenarios.sweep.sweep_case import run_one
 from tests.command_line import invoke
 
 

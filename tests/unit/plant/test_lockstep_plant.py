@@ -8,8 +8,8 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from plant.config import Move
 from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import Move
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish

@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.config import Protection
 from plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
+from plant.plant_config import Protection
 from plant.trip_settings import DEFAULTS
 
 H = 0.002

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from plant.config import Move
+from plant.plant_config import Move
 from plant.realtime.realtime_plant import LEAD, RealtimePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant

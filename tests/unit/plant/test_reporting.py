@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from plant.reporting import Reporter, measurement_of
+from plant.telemetry_reporter import Reporter, measurement_of
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import Reading, ToyPlant
 from wire.codec import RejectedError, decode, encode

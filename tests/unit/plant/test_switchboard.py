@@ -1,8 +1,8 @@
 import pytest
 
-from plant.config import SwitchEvent
 from plant.feeder.switchboard import Switchboard
 from plant.network import Network
+from plant.plant_config import SwitchEvent
 
 H = 0.002
 

@@ -7,9 +7,9 @@ from math import degrees, pi
 import pytest
 from msgspec.structs import replace
 
-from plant.config import PlantSettings, SwitchEvent, SyncCheck
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
 from plant.realtime.realtime_plant import RealtimePlant
 from tests.toy.toy_configs import toy_configs
 from wire.actions import Publish

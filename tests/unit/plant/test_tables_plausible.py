@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from plant.config import PlantSettings
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings
 from plant.tables import FeederError, feeders, read_feeder
 from plant.tables.read import DATA
 

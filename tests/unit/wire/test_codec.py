@@ -13,7 +13,7 @@ from msgspec import inspect
 
 from tests.hostile.cases import cases, packed, plain, sealed, sound
 from wire.bounds import LIMIT
-from wire.codec import KINDS, RejectedError, Rejects, decode, encode
+from wire.codec import KINDS, RejectedError, RejectedMessages, decode, encode
 from wire.messages import (
     MESSAGES,
     AgentStatus,
@@ -182,7 +182,7 @@ def test_every_flipped_bit_is_caught() -> None:
 
 def test_one_line_is_kept_for_each_kind() -> None:
     """A flood of garbage fills counters, not logs."""
-    rejects = Rejects("inv1")
+    rejects = RejectedMessages("inv1")
     for _ in range(1000):
         rejects.add("garbled", "some/key", "y" * 10_000)
     rejects.add("ghost", "some/key", "old")
@@ -197,7 +197,7 @@ def test_one_line_is_kept_for_each_kind() -> None:
 
 def test_lines_are_printable_whatever_was_sent() -> None:
     """A log is read on terminals: nobody's bytes clear the screen there, or forge a line."""
-    rejects = Rejects("inv1")
+    rejects = RejectedMessages("inv1")
     rejects.add("unknown", "some/key", "type \x1b[2J\n2026-01-01 ERROR \u202egnorw si lla")
     rejects.add("failed", "some/key", "KeyError: '\x1b'", "Traceback\n" + "  at \x1b[31m\n" * 1000)
 
@@ -223,6 +223,6 @@ def test_telemetry_may_carry_what_is_not_finite() -> None:
 
 def test_a_process_that_decodes_ends_well() -> None:
     """Msgspec 0.22 corrupts memory over some unions of bounded types, which shows at the end of the process only."""
-    done = subprocess.run([sys.executable, "-c", "import wire.codec, scenarios.emulation.report"], check=False)
+    done = subprocess.run([sys.executable, "-c", "import wire.codec, scenarios.emulation.link_reports"], check=False)
 
     assert done.returncode == 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.config import AgentConfig, Control
+from agents.agent_config import AgentConfig, Control
 from wire.codec import decode, encode
 from wire.keys import describe
 from wire.messages import (

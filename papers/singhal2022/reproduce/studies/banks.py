@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import gridpeers as gp
-from gridpeers.folders import feeder_folder
+from gridpeers.output_folders import feeder_folder
 
 CASES = ("I", "II", "III", "IV")
 EVENTS = ("event1", "event2")

@@ -10,8 +10,8 @@ from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.links import links_of
-from scenarios.emulation.setup import Setup
+from scenarios.emulation.emulated_links import links_of
+from scenarios.emulation.emulation_config import Setup
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.codec import encode

@@ -20,7 +20,7 @@ from plant.realtime.realtime_plant import RealtimePlant
 from tests.hostile.cases import hostile
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Listen, Publish, Say
+from wire.actions import Fetch, Listen, Log, Publish
 from wire.codec import KINDS, decode, encode
 from wire.keys import Keys
 from wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
@@ -88,7 +88,7 @@ class _Played:
                 return
 
 
-def _comparable(action: Publish | Fetch | Listen | Say) -> object:
+def _comparable(action: Publish | Fetch | Listen | Log) -> object:
     """An action, but for what a core counts of messages that it did not use."""
     if isinstance(action, Publish):
         message = decode(action.payload)
@@ -225,7 +225,7 @@ def test_tokens_of_anybody_change_nothing(make: Callable[[], _Played]) -> None:
             scene.honest(k)
         for token in TOKENS if k % 3 else ():
             flooded.side.vanished(token, flooded.now)
-    said = [action.text for action in flooded.done if isinstance(action, Say)]
+    said = [action.text for action in flooded.done if isinstance(action, Log)]
 
     assert not flooded.side.finished
     assert _decided(flooded) == _decided(calm)
@@ -242,13 +242,13 @@ def test_a_flood_of_tokens_does_not_flood_the_log(make: Callable[[], _Played]) -
         scene.side.appeared(KEYS.alive_agent(f"who{i}", "x"), scene.now)
     scene.honest(1)
 
-    assert len([action for action in scene.done if isinstance(action, Say)]) < 50
+    assert len([action for action in scene.done if isinstance(action, Log)]) < 50
 
 
 def _decided(scene: _Played) -> list[object]:
     """The states, measurements and rows that a core has published."""
     kinds = ("state", "measurement", "telemetry")
-    done = [entry for entry in scene.done if isinstance(entry, tuple) and not isinstance(entry, Fetch | Listen | Say)]
+    done = [entry for entry in scene.done if isinstance(entry, tuple) and not isinstance(entry, Fetch | Listen | Log)]
     return [entry for entry in done if entry[0].split("/")[2] in kinds]
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.config import Control, GraphRule
+from agents.agent_config import Control, GraphRule
 from plant.lockstep_plant import LockstepPlant
 from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.links import Links

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.config import AgentConfig, Control, GraphRule
-from plant.config import PlantConfig
+from agents.agent_config import AgentConfig, Control, GraphRule
 from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from tests.toy.links import Links

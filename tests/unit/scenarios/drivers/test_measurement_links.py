@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.setup import Setup
+from scenarios.emulation.emulation_config import Setup
 from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

@@ -17,20 +17,20 @@ from agents.realtime.realtime_agent import RealtimeAgent
 from netem.spec.change import Heal, schedule_of
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.node import NodeFault
+from netem.spec.node_fault import NodeFault
 from netem.spec.pattern import Link, links_among
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers import misfortunes
-from scenarios.drivers.misfortunes import Misfortunes
-from scenarios.emulation.links import EmulatedLinks
-from scenarios.emulation.orders import EVERYTHING, Order
-from scenarios.emulation.report import decode_stands
-from scenarios.emulation.setup import Setup
-from scenarios.live.book import replay_of
+from scenarios.drivers import fault_injector as misfortunes
+from scenarios.drivers.fault_injector import FaultInjector
+from scenarios.emulation.emulated_links import EmulatedLinks
+from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from scenarios.emulation.link_reports import decode_stands
+from scenarios.live.link_log import replay_of
 from scenarios.spec import load_scenario
-from scenarios.spec.netem import netem_of, setup_of
-from scenarios.spec.writing import to_toml
+from scenarios.spec.netem_tables import netem_of, setup_of
+from scenarios.spec.scenario_writing import to_toml
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -40,7 +40,7 @@ from wire.codec import decode
 from wire.messages import LinkAnswer, LinkOrder, Measurement
 
 SETUP = Setup(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
-CUT = Order(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
+CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
 
 
 def agent_lab() -> agent_side.Lab:
@@ -122,7 +122,7 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
     lab.join("inv2")
     lab.step(3)
     lab.sent.clear()
-    lab.now = lab.side.until
+    lab.now = lab.side.deadline
     answer = lab.ask("link", CUT)
     lab.step()
     kinds = [type(message) for key, message in lab.sent if key.endswith("/inv1")]
@@ -139,7 +139,7 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
     assert kinds == [LinkOrder, Measurement]
     assert {(m.seq, m.t, m.text) for m in orders} == {(1, 0.08, CUT)}
     assert again == [(plant_side.KEYS.order("inv2"), 1)]
-    assert not lab.ask("link", Order(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_text()).ok
+    assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_text()).ok
     assert [event.text for event in lab.events("link")] == ["order 1 to links: inv2 -> inv1: cut, from t = 0.08 s on"]
 
 
@@ -155,7 +155,7 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     lab.join("inv1", "inv2")
     lab.ask("link", CUT)
     lab.step()
-    heal = Order(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()
+    heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()
     first = json.loads(lab.ask("link", heal).text)
     lab.step()
     again = json.loads(lab.ask("link", heal).text)
@@ -209,7 +209,7 @@ def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
     lab.state("inv2", 1, 0.02, P_set=90e3)
     lab.go(0.0)
     before = lab.age("inv2")
-    order(lab, 2, 0.04, Order(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
+    order(lab, 2, 0.04, LinkCommand(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
     lab.measure(2)
     lab.state("inv2", 2, 0.04, P_set=70e3)
     lab.go(0.02)
@@ -243,7 +243,7 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
     lab.measure(0, incarnation=2)
     order(lab, 2, 0.0, life=1)
     lab.go(0.5)
-    order(lab, 1, 0.0, Order(fault=Fault(on="inv3 -> inv1", cut=True)).to_text(), life=2)
+    order(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_text(), life=2)
     lab.measure(1, incarnation=2)
     lab.go(0.5)
 
@@ -284,10 +284,10 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path
     scenario, feeder = load_scenario(tmp_path / "mine.toml")
     setup = setup_of(netem_of(scenario, "IV"), scenario, feeder, real_nodes=True)
     changes = [
-        Order(fault=Fault(on="* -> inv4", profile="lte", delay=0.3), for_s=1.0).at(0.62),
-        Order(fault=Fault(on="inv4 <-> plant", cut=True)).at(1.2),
-        Order(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
-        Order(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
+        LinkCommand(fault=Fault(on="* -> inv4", profile="lte", delay=0.3), for_s=1.0).at(0.62),
+        LinkCommand(fault=Fault(on="inv4 <-> plant", cut=True)).at(1.2),
+        LinkCommand(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
+        LinkCommand(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
     ]
     (tmp_path / "again.toml").write_text(to_toml(replay_of(scenario, feeder, changes, 7.33), {}))
     again, _ = load_scenario(tmp_path / "again.toml")
@@ -326,7 +326,7 @@ def test_misfortunes_strike_in_turn_and_nobody_stays_paused(monkeypatch: pytest.
             sent.append((clock[0] - 100.0, self.name, number.name))
 
     children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
-    struck = Misfortunes(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
+    struck = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
     struck.strike(children)
     struck.heard(0.0, 100.0)
     for _ in range(5):

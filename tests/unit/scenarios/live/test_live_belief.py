@@ -10,14 +10,14 @@ import pytest
 from msgspec.structs import replace
 
 from netem.ledger import LinkCounts, LinkTrace
-from scenarios.emulation.report import LinkBook, encode_book
-from scenarios.live import visit
-from scenarios.live.asking import Watching, _plate
-from scenarios.live.place import place
-from scenarios.live.show.picture import Picture
+from scenarios.emulation.link_reports import LinkBook, encode_book
+from scenarios.live import run_client as client
+from scenarios.live.run_address import place
+from scenarios.live.run_client import RunClient
+from scenarios.live.run_requests import Watching, _plate
 from scenarios.live.show.render import plain
-from scenarios.live.visit import Visit
-from scenarios.results.links import LinkRecord
+from scenarios.live.show.run_monitor import RunMonitor
+from scenarios.results.link_records import LinkRecord
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
 from wire.codec import RejectedError, decode, encode
@@ -49,9 +49,9 @@ class Line:
 
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> Line:
-    """The line of every visit from now on."""
+    """The line of every client from now on."""
     made = Line()
-    monkeypatch.setattr(visit, "Session", lambda *_, **__: made)
+    monkeypatch.setattr(client, "Session", lambda *_, **__: made)
     return made
 
 
@@ -75,9 +75,9 @@ def is_status(message: bytes, key: str) -> bool:
 
 def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None:
     """Telemetry of a plant that is not there, statuses under others' keys, nonsense: no line of the table changes."""
-    at = Visit(place("lab", None))
-    picture = Picture("lab")
-    watching = Watching(at, picture)
+    at = RunClient(place("lab", None))
+    monitor = RunMonitor("lab")
+    watching = Watching(at, monitor)
     keys: Truth = {
         KEYS.telemetry: ("plant", (Telemetry, LinkReport, LinkOrder)),
         **{KEYS.status(name): (name, (AgentStatus,)) for name in NAMES},
@@ -87,24 +87,24 @@ def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None
         ("message", KEYS.telemetry, encode(telemetry(1.0)), 0.0),
     ]
     watching.take(0.1)
-    before = plain(picture.look((), 0.0))
+    before = plain(monitor.look((), 0.0))
     flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))
     line.events = [("message", key, payload, 0.0) for key, payload in flood if not is_status(payload, key)]
     sent = len(line.events)
     watching.take(0.1)
 
     assert sent > 30_000
-    assert plain(picture.look((), 0.0)) == before
+    assert plain(monitor.look((), 0.0)) == before
     assert before.replace("\n", "").isprintable()
 
 
 def test_a_picture_of_other_inverters_waits_for_their_values() -> None:
     """A plant with other inverters, that has no row yet, does not lend them the former's."""
-    picture = Picture("lab")
-    picture.telemetry(telemetry(1.0), 0.0)
-    picture.telemetry(replace(telemetry(0.0, 8, ("inv1", "inv2", "inv3")), rows=()), 0.1)
+    monitor = RunMonitor("lab")
+    monitor.telemetry(telemetry(1.0), 0.0)
+    monitor.telemetry(replace(telemetry(0.0, 8, ("inv1", "inv2", "inv3")), rows=()), 0.1)
 
-    assert [entry.P for entry in picture.look((), 0.2).lines] == [None, None, None]
+    assert [entry.P for entry in monitor.look((), 0.2).lines] == [None, None, None]
 
 
 @pytest.mark.parametrize("change", [{"P_rated": 0.0}, {"V_nom": -1.0}, {"name": "\x1b[2J"}, {"m_p": 1e300}])
@@ -162,7 +162,7 @@ def test_a_sound_book_is_recorded() -> None:
 
 def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line: Line) -> None:
     """And by nobody who sees another plant's token."""
-    at = Visit(place("lab", None))
+    at = RunClient(place("lab", None))
     line.events = [("appeared", KEYS.alive_plant(7), b"", 0.0)]
     list(at.take(0.0))
     said: Message = telemetry(1.0)

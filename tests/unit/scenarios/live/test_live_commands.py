@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.config import AgentConfig
+from agents.agent_config import AgentConfig
 from gridpeers.cli.commands import options
-from plant.config import PlantConfig
-from scenarios.live import place
-from scenarios.live.setup import Wishes, set_up
+from plant.plant_config import PlantConfig
+from scenarios.live import run_address as place
+from scenarios.live.live_options import LiveOptions, set_up
 from scenarios.spec import load_scenario
 from tests.command_line import invoke
 
@@ -133,7 +133,7 @@ def test_a_port_in_use_is_told(elsewhere: Path) -> None:
 
 def test_the_plant_hands_every_agent_what_it_needs() -> None:
     """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
-    wishes = Wishes(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
+    wishes = LiveOptions(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
     plant, agents = set_up(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
     handed = {name: msgspec.json.decode(text, type=AgentConfig) for name, text in plant.handout.items()}
 
@@ -149,6 +149,6 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
 
 def test_a_plant_can_wait_for_its_agents_for_ever() -> None:
     """An infinite --wait reaches the plant as a time that JSON can say."""
-    plant, _ = set_up(*load_scenario("islanding"), Wishes(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
+    plant, _ = set_up(*load_scenario("islanding"), LiveOptions(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
 
     assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == place.LONGEST

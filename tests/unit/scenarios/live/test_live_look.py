@@ -6,10 +6,10 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from agents.config import AgentConfig, Control
-from scenarios.live.show.look import Line, Look
-from scenarios.live.show.picture import Picture
+from agents.agent_config import AgentConfig, Control
 from scenarios.live.show.render import plain, table
+from scenarios.live.show.run_monitor import RunMonitor
+from scenarios.live.show.snapshot import Line, Snapshot
 from scenarios.short_names import short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -41,9 +41,9 @@ def status(sender: str, neighbours: dict[str, float], used: tuple[str, ...], wai
     )  # fmt: skip
 
 
-def picture() -> Picture:
+def monitor() -> RunMonitor:
     """Two inverters, of which the first has an agent that hears nobody."""
-    seen = Picture("lab")
+    seen = RunMonitor("lab")
     for name in ("inv1", "inv2"):
         seen.plate(plate(name))
     seen.telemetry(told(2.0, PlantEvent(t=1.0, kind="switch", subject="13-152", text="13-152 opened")), now=10.0)
@@ -53,7 +53,7 @@ def picture() -> Picture:
 
 def test_status_is_a_line_per_agent_with_units() -> None:
     """Run, time, pacing; per agent its numbers, whom it hears, its messages; what happened."""
-    text = plain(picture().look({"inv1"}, now=10.1))
+    text = plain(monitor().look({"inv1"}, now=10.1))
 
     assert text.splitlines() == [
         "run lab   t = 2.00 s   pace: 100.00 % of steps in time (p50 0.1 ms, p99 1.0 ms)   islands: grid",
@@ -68,7 +68,7 @@ def test_status_is_a_line_per_agent_with_units() -> None:
 
 def test_a_run_that_has_not_begun_shows_who_waits() -> None:
     """Agents are listed by their tokens though the plant has told nothing."""
-    seen = Picture("lab")
+    seen = RunMonitor("lab")
     seen.status(status("inv3", {}, (), waits_for="the plant"), now=1.0)
 
     text = plain(seen.look({"inv3", "inv4"}, now=1.0))
@@ -80,7 +80,7 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
 
 def test_a_frozen_agent_is_silent() -> None:
     """A token without a status is told with the time since the last one."""
-    (line, _) = picture().look({"inv1"}, now=14.0).lines
+    (line, _) = monitor().look({"inv1"}, now=14.0).lines
 
     assert line.note == "silent for 4 s"
     assert line.received is None
@@ -88,7 +88,7 @@ def test_a_frozen_agent_is_silent() -> None:
 
 def test_a_silent_plant_is_told() -> None:
     """Old numbers are not shown as if they were new."""
-    assert picture().look({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
+    assert monitor().look({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
 
 
 def numbers(line: Line) -> set[float | None]:
@@ -98,7 +98,7 @@ def numbers(line: Line) -> set[float | None]:
 
 def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> None:
     """With the last telemetry powers, pace and impaired links are gone; when it ended, and why it broke, is there."""
-    ended, broke = picture(), picture()
+    ended, broke = monitor(), monitor()
     ended.telemetry(replace(told(2.2), final=True, impaired=("inv1",)), now=10.2)
     broke.telemetry(replace(told(2.2), final=True, outcome="the deadline of inv1 passed"), now=10.2)
     look = ended.look((), now=10.3)
@@ -111,7 +111,7 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
 
 def test_numbers_of_a_silent_plant_are_not_shown() -> None:
     """A plant that was killed has told no end: its numbers go when it has been silent, and come back with the next."""
-    seen = picture()
+    seen = monitor()
     before, silent = seen.look({"inv1"}, now=11.4).lines[0], seen.look({"inv1"}, now=11.6).lines[0]
     seen.telemetry(told(0.2, life=2), now=20.0)
 
@@ -122,7 +122,7 @@ def test_numbers_of_a_silent_plant_are_not_shown() -> None:
 
 def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
     """The end belongs to the former plant's life."""
-    seen = picture()
+    seen = monitor()
     seen.telemetry(replace(told(2.2), final=True), now=10.2)
     seen.telemetry(told(0.2, life=2), now=20.0)
 
@@ -132,7 +132,7 @@ def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
     """What happened before its new life belongs to another run."""
-    seen = picture()
+    seen = monitor()
     seen.telemetry(told(0.2, life=2), now=20.0)
 
     assert seen.look((), now=20.0).events == ()
@@ -140,7 +140,7 @@ def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
 
 def test_only_neighbours_in_use_count_as_heard() -> None:
     """Who is too old, or in another island, is named in the note."""
-    seen = picture()
+    seen = monitor()
     seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
     line = seen.look({"inv1"}, now=10.0).lines[0]
 
@@ -166,7 +166,7 @@ def test_names_take_little_room(names: list[str], text: str) -> None:
 def test_watch_shows_the_same_as_a_table() -> None:
     """Every number of the text is in the table, with the keys below."""
     console = Console(width=160, record=True, file=io.StringIO())
-    console.print(table(picture().look({"inv1"}, now=10.0)))
+    console.print(table(monitor().look({"inv1"}, now=10.0)))
     text = console.export_text()
 
     for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "q: quit"):
@@ -175,15 +175,15 @@ def test_watch_shows_the_same_as_a_table() -> None:
 
 def test_a_look_at_nothing_is_one_line() -> None:
     """No agent, no plant: only the run's name."""
-    assert plain(Look(run="lab")) == "run lab   has not begun\n"
+    assert plain(Snapshot(run="lab")) == "run lab   has not begun\n"
     assert Line(name="inv1").note == ""
 
 
 def test_impaired_links_are_shown_only_while_there_are_any() -> None:
     """A column of few characters, and a word in the first line of whom the plant hears badly; else nothing of it."""
     hurt = Line(name="inv4", impaired=("inv1", "inv7", "plant"))
-    calm = Look(run="lab", t=1.0, lines=(Line(name="inv4"), Line(name="inv5")))
-    bad = Look(run="lab", t=1.0, lines=(hurt, Line(name="inv5")), impaired=("inv2", "inv3", "inv4"))
+    calm = Snapshot(run="lab", t=1.0, lines=(Line(name="inv4"), Line(name="inv5")))
+    bad = Snapshot(run="lab", t=1.0, lines=(hurt, Line(name="inv5")), impaired=("inv2", "inv3", "inv4"))
 
     assert "impaired" not in plain(calm)
     assert plain(bad).splitlines()[0].endswith("impaired to the plant: inv2-4")
@@ -192,7 +192,7 @@ def test_impaired_links_are_shown_only_while_there_are_any() -> None:
 
 def test_telemetry_that_is_published_again_for_a_recorder_does_not_turn_the_clock_back() -> None:
     """Who watches has seen it; a new life of the plant begins at 0 again."""
-    seen = picture()
+    seen = monitor()
     seen.telemetry(told(2.2), now=10.2)
     seen.telemetry(told(1.4), now=10.3)
     assert seen.look((), now=10.3).t == 2.2

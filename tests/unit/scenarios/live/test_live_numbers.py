@@ -11,21 +11,21 @@ import pytest
 
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.node import NodeFault, Skew
+from netem.spec.node_fault import NodeFault, Skew
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.live.book import Book
-from scenarios.live.numbers.account import Account
+from scenarios.live.link_log import LinkLog
 from scenarios.live.numbers.departures import compare
+from scenarios.live.numbers.live_report import LiveReport
 from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
-from scenarios.results.numbers import Ran, metrics_json
+from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Tape
 from scenarios.results.report import plain
 from scenarios.spec import Scenario, load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.model import Event
-from scenarios.spec.netem import netem_of, setup_of
+from scenarios.spec.netem_tables import netem_of, setup_of
+from scenarios.spec.scenario_model import Event
 from wire.messages import PlantEvent
 
 
@@ -228,9 +228,9 @@ def recorded() -> Recorded:
 def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
     """What metrics.json and the report say of a run by hand that ended then (s)."""
     scenario, feeder = one_case("islanding")
-    ran = Ran(scenario=scenario, feeder=feeder, driver="by hand", folder=folder, clock="wall")
+    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="by hand", folder=folder, clock="wall")
     links = setup_of(netem_of(scenario, "IV"), scenario, feeder, real_nodes=True).to_text()
-    given = Account(ran, Book(scenario, feeder, links, None, None, None))
+    given = LiveReport(ran, LinkLog(scenario, feeder, links, None, None, None))
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
     given(msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events), None)
@@ -248,7 +248,7 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     found = find(
         scenario, feeder, Plates.of(feeder.inverters), {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]}
     )
-    ran = Ran(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)
 
@@ -331,7 +331,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     history = History.of(switched.inverters, switched.rows)
     came = {"IV": [(event.label, event.t_s) for event in events]}
     found = find(whole, feeder, Plates.of(feeder.inverters), {"IV": history}, came)
-    ran = Ran(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = RunMetrics(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)
     case = metrics["cases"]["IV"]

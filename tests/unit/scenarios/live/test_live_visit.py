@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from scenarios.live import visit
-from scenarios.live.place import place
-from scenarios.live.visit import NobodyError, Visit
+from scenarios.live import run_client as client
+from scenarios.live.run_address import place
+from scenarios.live.run_client import NobodyError, RunClient
 from wire.keys import Keys
 
 
@@ -41,10 +41,10 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
             peers = staticmethod(lambda: ["a plant"])
             take = staticmethod(clock.take)
 
-        monkeypatch.setattr(visit, "Session", lambda *_, **__: Session())
-        monkeypatch.setattr(visit, "monotonic", lambda: clock.now)
+        monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
+        monkeypatch.setattr(client, "monotonic", lambda: clock.now)
         try:
-            Visit(place("lab", None)).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
+            RunClient(place("lab", None)).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
         except NobodyError as error:
             told.append(str(error))
         return told

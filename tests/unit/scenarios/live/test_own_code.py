@@ -7,13 +7,13 @@ from contextlib import nullcontext
 import pytest
 from msgspec.structs import replace
 
-from agents.config import Control, LawChoice
+from agents.agent_config import Control, LawChoice
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from scenarios.emulation.setup import Setup
-from scenarios.live import hand
+from scenarios.emulation.emulation_config import Setup
+from scenarios.live import live_processes as hand
 from scenarios.live.own_code import own_code
-from scenarios.live.place import Place, UsageError
+from scenarios.live.run_address import RunAddress, UsageError
 from tests.toy.toy_configs import agent_config
 from wire.plugin import Plugin
 
@@ -40,10 +40,10 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
 ) -> None:
     """Whoever can pose as a plant would else have any program run on every host that joins."""
     ran: list[str] = []
-    where = Place(run="demo", connect=(endpoint,))
-    monkeypatch.setattr(hand, "Visit", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})()))
-    monkeypatch.setattr(hand, "configuration", lambda visit, name: CONFIG)
-    monkeypatch.setattr(hand, "check_free", lambda visit, name: None)
+    where = RunAddress(run="demo", connect=(endpoint,))
+    monkeypatch.setattr(hand, "RunClient", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})()))
+    monkeypatch.setattr(hand, "configuration", lambda client, name: CONFIG)
+    monkeypatch.setattr(hand, "check_free", lambda client, name: None)
     monkeypatch.setattr(hand, "run_agent", lambda config, links: ran.append(config.name) or "")
     monkeypatch.setattr(hand.signal, "signal", lambda *_: None)
 

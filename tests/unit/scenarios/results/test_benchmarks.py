@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.results.benchmarks import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
+from scenarios.results.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
 from scenarios.results.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import Report, plain
 from scenarios.spec import ScenarioError, load_scenario
 from scenarios.spec.loading import check_tables
-from scenarios.spec.mistakes import Mistakes
-from scenarios.spec.writing import to_toml
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_writing import to_toml
 
 MODULE = """
-from scenarios.results.benchmarks import Benchmark
+from scenarios.results.benchmark_registry import Benchmark
 from scenarios.results.claims import Claim
 from scenarios.results.published import Published
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.results.folder import FolderError, new_folder, set_broken, set_status, write_whole
+from scenarios.results.run_files import FolderError, new_folder, set_broken, set_status, write_whole
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 

@@ -9,8 +9,8 @@ from netem.models.duplicate import Duplicate
 from netem.receiver import Receiver
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from scenarios.emulation.report import parts
-from scenarios.results.links import COLUMNS, LinkRecord
+from scenarios.emulation.link_reports import parts
+from scenarios.results.link_records import COLUMNS, LinkRecord
 from wire.messages import LinkReport
 
 

@@ -15,11 +15,11 @@ from scenarios.results.findings import Findings
 from scenarios.results.history import History, Plates, read_only
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own import builtin
-from scenarios.results.own.claim import judged
 from scenarios.results.own.claim_registry import CLAIMS
 from scenarios.results.own.metric import ALWAYS, METRICS, make_metrics, measured, name_of
+from scenarios.results.own.own_claim import judged
 from scenarios.results.own.window_data import WindowData
-from scenarios.sweep.words import unit_of
+from scenarios.sweep.column_labels import unit_of
 from wire.plugin import Plugin, problems
 from wire.registry import PluginError
 

@@ -11,9 +11,9 @@ from matplotlib.image import imread
 from plant.tables import read_feeder
 from scenarios.results.drawing import Mark
 from scenarios.results.history import History, Plates
-from scenarios.results.islands import Spell
+from scenarios.results.island_membership import Spell
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
-from scenarios.results.plots.inverters import powers
+from scenarios.results.plots.inverters_plot import powers
 from scenarios.results.plots.marks import GAP, LETTER, placed
 from scenarios.results.plots.saving import Format, save
 from scenarios.spec import catalogue, load_scenario

@@ -7,14 +7,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.config import Gains
+from agents.agent_config import Gains
 from gridpeers.cli.commands.show import Topic
 from netem.spec.netem import Netem
-from netem.spec.reading import ENTRIES
-from plant.config import GflParameters, GfmParameters
+from netem.spec.netem_reading import ENTRIES
+from plant.plant_config import GflParameters, GfmParameters
 from scenarios.field_docs import field_docs
 from scenarios.results.reference import TOPICS, page
-from scenarios.spec.model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
+from scenarios.spec.scenario_model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
 from wire import keys, messages
 
 DOCS = Path(__file__).parents[4] / "docs"

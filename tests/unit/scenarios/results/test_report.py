@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from papers.singhal2022.benchmarks import ISLANDING
 from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.paper_benchmarks import ISLANDING
 from papers.singhal2022.tables import tables_of
-from scenarios.results.benchmarks import NO_BENCHMARK
+from scenarios.results.benchmark_registry import NO_BENCHMARK
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
-from scenarios.results.numbers import Ran, metrics_json
+from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.report import Report, plain, show
 from scenarios.spec import load_scenario
 
@@ -119,7 +119,7 @@ def test_metrics_of_several_islands_together_are_null() -> None:
     """metrics.json has no number either that means nothing; what the islands share is beside it."""
     whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=2.0, p={})
     scenario, feeder = load_scenario("microgrid-switching")
-    ran = Ran(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
+    ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=Path("here"))
     found = Findings(
         results={"IV": {"event1": whole, "event2": whole}}, islands={"IV": {"event2": {"inv1": whole, "inv4": whole}}}
     )

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from papers.singhal2022.benchmarks import ISLANDING
 from papers.singhal2022.claims import CLAIMS
+from papers.singhal2022.paper_benchmarks import ISLANDING
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Plates
 from scenarios.results.metrics import Steady, Window, measure
-from scenarios.results.numbers import Ran, metrics_json
+from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.report import Report, plain
 from scenarios.spec import load_scenario
 
@@ -188,7 +188,7 @@ def test_metrics_json_has_null_and_the_reason(tmp_path: Path) -> None:
     """A program that reads the file meets no number that is not one."""
     found, _ = ramping()
     spec, feeder = load_scenario("islanding")
-    ran = Ran(scenario=spec, feeder=feeder, driver="inprocess", folder=tmp_path)
+    ran = RunMetrics(scenario=spec, feeder=feeder, driver="inprocess", folder=tmp_path)
 
     cases = json.loads(metrics_json(ran, found, dict.fromkeys(spec.cases, "x"), {}))["cases"]
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from agents.config import Gains, Handling
-from plant.config import GfmParameters, SwitchEvent, SyncCheck
+from agents.agent_config import Gains, Handling
+from plant.plant_config import GfmParameters, SwitchEvent, SyncCheck
 from plant.tables.read import DATA
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import catalogue, load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.writing import to_toml
+from scenarios.spec.scenario_writing import to_toml
 from tests.scenario_files import written
 
 SHORT = """

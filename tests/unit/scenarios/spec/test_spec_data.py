@@ -7,7 +7,7 @@ import pytest
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.writing import to_toml
+from scenarios.spec.scenario_writing import to_toml
 from tests.scenario_files import mistakes, written
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.config import PlantSettings, PowerLimit, SwitchEvent
 from plant.feeder import Plant
 from plant.network import Network
+from plant.plant_config import PlantSettings, PowerLimit, SwitchEvent
 from plant.tables import read_feeder
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.spec import load_scenario
-from scenarios.spec.limits import limits_of
-from scenarios.spec.writing import to_toml
+from scenarios.spec.power_limits import limits_of
+from scenarios.spec.scenario_writing import to_toml
 from tests.scenario_files import mistakes, written
 
 CLOUDS = (CATALOGUE / "intermittency.toml").read_text(encoding="utf-8")

@@ -1,0 +1,164 @@
+"""The tables of docs/theory.md: what is predicted beside what the agents do on the plant, on eight graphs.
+
+.venv/bin/python bench/theory_tables.py            # all, some 4 minutes on two cores
+.venv/bin/python bench/theory_tables.py limits     # or one part: times, late, limits, vars
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import gridpeers as gp
+from gridpeers.theory import (
+    LoadStep,
+    Spec,
+    delay_limit,
+    feeder_of,
+    first_window,
+    fleet_of,
+    load_steps,
+    predicted_times,
+    sensitivity,
+    var_delay_limit,
+    var_growth,
+    var_response,
+)
+from scenarios.predict.closed_form import delay_limit_closed
+
+ALONE = 1e5
+"""k_q that leaves V_set alone."""
+
+CUT = {"without": [["inv4", "inv7"]]}
+
+
+def star(hub: int) -> dict[str, Any]:
+    """Links of one inverter with each of the others."""
+    return {"graph": "links", "links": [[f"inv{hub}", f"inv{i}"] for i in range(1, 10) if i != hub]}
+
+
+GRAPHS: dict[str, dict[str, Any]] = {
+    "full": {"graph": "full"},
+    "full less 4-7": {"graph": "full", **CUT},
+    "reduced": {"graph": "clustered"},
+    "reduced less 4-7": {"graph": "clustered", **CUT},
+    "ring": {"graph": "ring"},
+    "star, hub inv1": star(1),
+    "star, hub inv2": star(2),
+    "path": {"graph": "links", "links": [[f"inv{i}", f"inv{i + 1}"] for i in range(1, 9)]},
+}
+TUNED = "reduced, alpha 1, beta 4"
+LATE = ("full", "reduced", "ring", "path")
+LIMITS = ("full", "reduced", "ring", "star, hub inv1", "star, hub inv2", "path")
+GROWTH = ("full", "reduced", TUNED, "ring", "path", "star, hub inv1")
+DELAYS = (0.02, 0.1, 0.16, 0.26, 0.34, 0.42, 0.5, 0.6, 1.0)
+
+
+@cache
+def scenario() -> gp.Scenario:
+    """Islanding under every graph, with good links."""
+    old = gp.load("graphs")
+    gains = {"k_p": 0.0007, "k_q": 0.25, "alpha": 1.0, "beta_GFM": 4.0, "beta_GFL": 4.0}
+    cases = {f"case.{name(title)}": {"secondary": "all", "title": title, **graph} for title, graph in GRAPHS.items()}
+    tuned = {"secondary": "all", "title": TUNED, **GRAPHS["reduced"], "gains": gains}
+    gone = {f"case.{case}": None for case in old.cases}
+    return old.replace({**gone, **cases, f"case.{name(TUNED)}": tuned})
+
+
+def name(title: str) -> str:
+    """Name of the case of a graph."""
+    return "".join(c for c in title if c.isalnum())
+
+
+@cache
+def calm() -> Spec:
+    """The scenario with its first event alone."""
+    return first_window(scenario().spec, 3.0)
+
+
+@cache
+def load() -> LoadStep:
+    """The step of load of islanding."""
+    (step,) = load_steps(calm(), feeder_of(scenario().spec))
+    assert step.load is not None
+    return step.load
+
+
+def fleet(title: str) -> Any:
+    """The inverters on a graph."""
+    return fleet_of(scenario().spec, feeder_of(scenario().spec), name(title))
+
+
+def measured(titles: tuple[str, ...], end_s: float, d: float) -> dict[tuple[str, float], str]:
+    """Times to restore and to share on the plant, by graph and k_q."""
+    link = [{"on": "* <-> *", "delay": d}] if d else None
+    rows = gp.sweep(
+        scenario().replace({"time.end_s": end_s, "link": link}),
+        {"gains.k_q": [0.25, ALONE]},
+        cases=[name(title) for title in titles],
+        metrics=["t_f_s", "t_share_s"],
+    )
+    by_case = {name(title): title for title in titles}
+    return {
+        (by_case[row["case"]], row["gains.k_q"]): both(row["event1.t_f_s"], row["event1.t_share_s"])
+        for row in rows.to_dict("records")
+    }
+
+
+def both(restore_s: float | None, share_s: float | None) -> str:
+    """Two times in words; never as None or not a number."""
+    return " | ".join("never" if t is None or np.isnan(t) else f"{t:.3g}" for t in (restore_s, share_s))
+
+
+def compare(titles: tuple[str, ...], end_s: float, d: float) -> None:
+    """Predicted, V_set left alone, whole law."""
+    print(f"links late by {d:g} s: predicted, V_set left alone, whole law: f | sharing (s)")
+    found = measured(titles, end_s, d)
+    for title in titles:
+        said = predicted_times(fleet(title), link_delay_s=d, load=load())
+        cells = both(said.restore_s, said.share_s), found[title, ALONE], found[title, 0.25]
+        print(f"{title:20}", "   ".join(f"{cell:14}" for cell in cells))
+
+
+def times() -> None:
+    """How near theory comes with good links."""
+    compare(tuple(GRAPHS), 7.0, 0.0)
+
+
+def late() -> None:
+    """The same with late links."""
+    for d in (0.12, 0.52):
+        compare(LATE, 31.0, d)
+
+
+def limits() -> None:
+    """Longest delays (s), in discrete time (by the continuous law)."""
+    answers = sensitivity(calm(), feeder_of(scenario().spec))
+    print("links | both alike (continuous) | f or P_set late (continuous) | V, Q or V_set late")
+    for title in LIMITS:
+        one = fleet(title)
+        cells = [f"{delay_limit(one, 'neighbours'):.2f}"]
+        cells += [
+            f"{delay_limit(one, kind):.2f} ({delay_limit_closed(one, kind):.3f})"
+            for kind in ("disagreement", "local loop")
+        ]
+        print(f"{title:20}", " | ".join([*cells, f"{var_delay_limit(one, answers):.2f}"]))
+
+
+def vars_() -> None:
+    """Growth (1/s) of vars over late links."""
+    response = var_response(calm(), feeder_of(scenario().spec))
+    print("delay (s)  " + "  ".join(GROWTH))
+    for d in DELAYS:
+        print(f"{d:<10}", "  ".join(f"{var_growth(fleet(title), response, link_delay_s=d):.2f}" for title in GROWTH))
+
+
+PARTS: dict[str, Callable[[], None]] = {"times": times, "late": late, "limits": limits, "vars": vars_}
+
+if __name__ == "__main__":
+    for part in sys.argv[1:] or PARTS:
+        PARTS[part]()

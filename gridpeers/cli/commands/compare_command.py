@@ -1,0 +1,67 @@
+"""The command `gridpeers compare`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require
+
+_Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
+
+
+def compare(
+    first: _Run,
+    second: _Run,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
+    ] = Path("runs/comparison.png"),
+) -> None:
+    """Compare two runs: scenarios, metrics, and one figure of both.
+
+    Exit code: 0 they were compared, 2 bad usage, or no folder of a run.
+
+    Example:  gridpeers compare runs/islanding/latest runs/mine/latest
+    """
+    require({"matplotlib": "the figure", "pandas": "the tables"})
+    kinds = (".png", ".pdf", ".svg")
+    if out.suffix not in kinds:
+        fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
+
+    from gridpeers.studies.comparison import compare as compare_runs
+    from scenarios.results.run_files import FolderError, refusal, shown
+    from scenarios.spec import ScenarioError
+
+    try:
+        found = compare_runs(first, second, names=_names(first, second))
+        typer.echo(str(found))
+        figure = found.plot()
+        out.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(out)
+    except ScenarioError as error:
+        refuse(error)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(out, error)], BAD_INPUT)
+    typer.echo(f"\nFigure: {shown(out)}")
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
+    parts, others = first.resolve().parts, second.resolve().parts
+    if _is_time(parts[-1]) and _is_time(others[-1]) and parts[-2] != others[-2]:
+        return parts[-2], others[-2]
+    for count in range(1, max(len(parts), len(others)) + 1):
+        names = "/".join(parts[-count:]), "/".join(others[-count:])
+        if names[0] != names[1]:
+            return names
+    return "first", "second"
+
+
+def _is_time(name: str) -> bool:
+    """Whether a folder is called as `gridpeers run` calls those of a scenario."""
+    return re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", name) is not None

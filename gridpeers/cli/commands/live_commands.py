@@ -1,0 +1,288 @@
+"""The commands for runs by hand. What they need is imported when one is used, so that help comes at once."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from gridpeers.cli.commands.link import link
+from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
+from wire.driver.output import watch_readers
+
+if TYPE_CHECKING:
+    from scenarios.live.live_processes import ProcessOutcome
+
+_Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
+_Listen = Annotated[
+    str,
+    typer.Option("--listen", metavar="ENDPOINT", help="Where the others connect; tcp/0.0.0.0:7447 for other hosts."),
+]
+_Beyond = Annotated[
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help="What the plant connects to itself, e.g. a Zenoh router."),
+]
+_Speed = Annotated[float, typer.Option("--speed", metavar="X", help="Run time per wall time, 0.1 to 50; 1 is real.")]
+_WaitForAgents = Annotated[
+    float, typer.Option("--wait", metavar="SECONDS", help="How long the plant waits for its agents before it starts.")
+]
+_For = Annotated[float | None, typer.Option("--for", metavar="SECONDS", help="Run time to end at; no end if left out.")]
+_Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 3 when pace cannot be kept.")]
+_Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Record the run in a new folder, and measure it at its end.")
+]
+_Record = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Write a scenario that replays what gridpeers link did, for run."),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (plant, agent, up, down, status, watch, stop, event):
+        app.command()(command)
+    app.add_typer(link, name="link")
+
+
+def _start(
+    scenario: ScenarioName,
+    case: _Case = "",
+    run: Run = RUN,
+    listen: _Listen = ENDPOINT,
+    connect: _Beyond = None,
+    speed: _Speed = 1.0,
+    wait: _WaitForAgents = 30.0,
+    duration: _For = None,
+    strict: _Strict = False,
+    out: _Out = None,
+    record: _Record = None,
+    *,
+    agents: bool,
+) -> None:
+    """Run the plant, with its agents or without; its arguments are the options of both commands."""
+    require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
+    with told():
+        from scenarios.live.run_address import check_endpoint, check_run
+        from scenarios.live.run_client import check_alone, claim_for_run
+
+        # first of all: to read a scenario takes seconds, and who has forgotten a run hears of it at once
+        check_run(run)
+        beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
+        endpoint = claim_for_run(listen)
+        check_alone(run, beyond)
+    spec, feeder = load(scenario)
+    with told():
+        from scenarios.live.link_log import LinkLog, check_new
+        from scenarios.live.live_folders import BY_HAND, folders
+        from scenarios.live.live_options import LiveOptions, chosen_case, real_nodes, set_up
+        from scenarios.live.live_processes import all_here, plant_here, say
+        from scenarios.live.numbers.ending import conclude
+        from scenarios.live.numbers.live_report import LiveReport
+        from scenarios.results.metrics_file import RunMetrics
+
+        check_new("--record", record)
+        spec = chosen(spec, chosen_case(spec, case), None)
+        wishes = LiveOptions(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
+        config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
+        watch_readers(quits=False)
+        with folders(out, spec) as kept:
+            say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
+            book = LinkLog(
+                spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml"
+            )
+            account = None
+            if kept.whole is not None:
+                ran = RunMetrics(
+                    scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed
+                )
+                account = LiveReport(ran, book)
+            if left := real_nodes(spec) if not agents else "":
+                say(left)
+            if agents:
+                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
+                ended = all_here(config, everyone, kept.logs, kept.record, book, account)
+            else:
+                ended = plant_here(config, kept.record, book, account)
+            if account is not None:
+                ended = conclude(ended, account, kept)
+        _finish(ended)
+
+
+def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `_start` that a person chooses, as typer reads them."""
+    signature = inspect.signature(_start, eval_str=True)
+    chosen_by_people = [one for one in signature.parameters.values() if one.name != "agents"]
+    command.__signature__ = signature.replace(parameters=chosen_by_people)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in chosen_by_people}
+    return command
+
+
+@_takes_options_of_start
+def plant(**options: Any) -> None:
+    """Run the plant of a scenario in this terminal, in real time. Agents come from others.
+
+    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+
+    Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
+    """
+    _start(**options, agents=False)
+
+
+@_takes_options_of_start
+def up(**options: Any) -> None:
+    """Run the plant and all its agents at once, in real time.
+
+    It runs until `gridpeers down` or Ctrl-C.
+
+    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+
+    Example:  gridpeers up islanding --speed 0.5
+    """
+    _start(**options, agents=True)
+
+
+def agent(
+    inverter: Annotated[
+        str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2; spare ones too.")
+    ],
+    run: Run = RUN,
+    connect: Connect = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option("--listen", metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
+    ] = None,
+    wait: Wait = 60.0,
+    own_code: Annotated[
+        bool,
+        typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
+    ] = False,
+) -> None:
+    """Run the agent of one inverter in this terminal. Ctrl-C leaves properly: the inverter is switched off.
+
+    Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
+
+    Example:  gridpeers agent inv2 --connect tcp/192.168.1.10:7447
+    """
+    require({"zenoh": "an agent"})
+    with told():
+        from scenarios.live.live_processes import agent_here
+        from scenarios.live.run_address import check_inverter, check_wait, claim, place
+
+        where = place(run, connect)
+        check_inverter(inverter)
+        check_wait(wait)
+        watch_readers(quits=False)
+        listening = tuple(claim("--listen", text) for text in listen) if listen else None
+        _finish(agent_here(where, inverter, listening, wait, trusts=own_code))
+
+
+def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+    """Look once at a run: time, pacing, agents, latest events.
+
+    Example:  gridpeers status
+    """
+    with visit_to(run, connect, wait, meet_agents=True) as client:
+        from scenarios.live.run_requests import look
+        from scenarios.live.show.render import plain
+
+        typer.echo(plain(look(client)), nl=False)
+
+
+def watch(
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+    duration: Annotated[
+        float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
+    ] = None,
+) -> None:
+    """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
+
+    Example:  gridpeers watch --connect tcp/192.168.1.10:7447
+    """
+    with told():
+        from scenarios.live.run_address import check_duration
+
+        check_duration(duration)
+    with visit_to(run, connect, wait, meet_agents=True) as client:
+        from rich.console import Console
+
+        from scenarios.live.show.watching import watch as watch_run
+
+        watch_run(client, Console(), duration)
+
+
+def stop(
+    inverter: Annotated[str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2.")],
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+) -> None:
+    """Have an agent leave properly: its inverter is switched off.
+
+    The others take over.
+
+    Exit code: 0 it has left, 2 there is no such agent, 3 it has not left.
+
+    Example:  gridpeers stop inv2
+    """
+    with visit_to(run, connect, wait) as client:
+        from scenarios.live.run_requests import LEAVING, ask, has_left
+
+        typer.echo(ask(client, "stop", inverter))
+        if not has_left(client, inverter):
+            fail([f"{inverter} has not left within {LEAVING:g} s; is its process frozen?"], BROKEN)
+
+
+def event(
+    action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
+    switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
+    synchronised: Annotated[
+        bool, typer.Option("--synchronised", help="Close only if both sides are in step (IEEE 1547, Table 5).")
+    ] = False,
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+) -> None:
+    """Open or close a switch of a running plant.
+
+    Exit code: 0 it was done, 2 there is no such switch, or its sides are not in step.
+
+    Example:  gridpeers event close 13-152 --synchronised
+    """
+    if action not in ("open", "close"):
+        fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
+    if synchronised and action == "open":
+        fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
+    with visit_to(run, connect, wait) as client:
+        from scenarios.live.run_requests import ask
+
+        closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
+        typer.echo(ask(client, "open" if action == "open" else closing, switch))
+
+
+def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+    """End a run: its agents leave, its plant ends.
+
+    Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
+
+    Example:  gridpeers down --run lab
+    """
+    with visit_to(run, connect, wait) as client:
+        from scenarios.live.run_requests import LEAVING, ask, has_ended
+
+        typer.echo(ask(client, "down"))
+        if not has_ended(client):
+            fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)
+
+
+def _finish(ended: ProcessOutcome) -> None:
+    if ended.interrupted:
+        code = TERMINATED if ended.interrupted == "SIGTERM" else INTERRUPTED
+        fail([f"{ended.interrupted}: everything that was started here has ended"], code)
+    if ended.broke:
+        fail([ended.broke], BROKEN)

@@ -1,0 +1,116 @@
+"""The command `gridpeers run`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    PASSED,
+    ScenarioName,
+    chosen,
+    fail,
+    load,
+    refuse,
+    require,
+)
+
+
+class DriverName(StrEnum):
+    """Values of `--driver`."""
+
+    processes = "processes"
+    inprocess = "inprocess"
+
+
+class ClockName(StrEnum):
+    """Values of `--clock`."""
+
+    simulated = "simulated"
+    wall = "wall"
+
+
+def run(
+    scenario: ScenarioName,
+    driver: Annotated[
+        DriverName,
+        typer.Option(help="processes: a plant process and one process per agent, over Zenoh; inprocess: all in one."),
+    ] = DriverName.processes,
+    clock: Annotated[
+        ClockName,
+        typer.Option(help="simulated: in lock-step, the same result every time; wall: real time, agents run freely."),
+    ] = ClockName.simulated,
+    speed: Annotated[
+        float, typer.Option(metavar="X", help="With --clock wall: seconds of the run per second of real time.")
+    ] = 1.0,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
+    ] = False,
+    case: Annotated[
+        str | None, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="Seed instead of the one in the scenario.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
+    ] = None,
+) -> None:
+    """Run a scenario and show its results, beside published ones.
+
+    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
+    2 bad usage or a bad file, 3 the run broke.
+
+    Example:  gridpeers run islanding --case IV --driver inprocess
+    """
+    from datetime import datetime
+
+    from gridpeers.runs.choices import Pace, check_how
+    from scenarios.spec import ScenarioError
+
+    spec, feeder = load(scenario)
+    spec = chosen(spec, case, seed)
+    pace = Pace(clock=clock.value, speed=speed, strict=strict)
+    try:
+        check_how(driver.value, pace, dash="--")
+    except ScenarioError as error:
+        refuse(error)
+    needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
+    require(needed | ({"zenoh": "the driver with processes"} if driver is DriverName.processes else {}))
+
+    from rich.console import Console
+
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.progress import progress
+    from scenarios.drivers.ports import PortError, check_port
+    from scenarios.results.report import show
+    from scenarios.results.run_files import FolderError, new_folder, shown
+    from scenarios.run import BrokenRunError, Request
+    from scenarios.run import run as run_scenario
+
+    try:
+        if driver is DriverName.processes:
+            check_port(spec.processes.port)
+        folder = new_folder(out, spec.name, datetime.now().astimezone())
+    except (FolderError, PortError) as error:
+        fail([str(error)], BAD_INPUT)
+
+    console = Console()
+    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder, **pace)
+    try:
+        with interruptible(), progress(console, tuple(spec.cases)) as tell:
+            report = run_scenario(request, tell)
+    except BrokenRunError as error:
+        kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []
+        fail([f"the run broke: {error}", *kept], BROKEN)
+    except KeyboardInterrupt as error:
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+    show(report, console)
+    raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)

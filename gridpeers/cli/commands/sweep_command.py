@@ -1,0 +1,136 @@
+"""The command `gridpeers sweep`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, refuse, require
+
+if TYPE_CHECKING:
+    from scenarios.sweep.file import Plan
+    from scenarios.sweep.study import Summary
+
+_PACKAGES = {"joblib": "the runs over all cores", "pyarrow": "the table", "matplotlib": "the plots"}
+
+
+def sweep(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a sweep file, or a name, e.g. gains, topology.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, e.g. tcp://10.0.0.1:8786.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
+    ] = False,
+) -> None:
+    """Run a scenario many times over values of its keys.
+
+    What comes of it is one table with plots. The same command resumes it.
+
+    Exit code: 0 done (runs that broke are rows of the table), 2 bad usage or a bad file, 3 every run broke or the
+    workers went, 130 interrupted by Ctrl-C: what is done is kept.
+
+    Example:  gridpeers sweep topology --jobs 2
+    """
+    from scenarios.spec import ScenarioError
+    from scenarios.sweep.file import read_sweep
+
+    try:
+        plan = read_sweep(file)
+    except ScenarioError as error:
+        refuse(error)
+    check_packages(dask=bool(dask))
+    if dry_run:
+        typer.echo(_size(file, plan))
+        return
+    import shlex
+
+    from scenarios.sweep.sweep_folder import folder_of
+
+    again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
+    for line in _told(summary):
+        typer.echo(line)
+    raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
+
+
+def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: str) -> Summary:
+    """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
+
+    Parameters
+    ----------
+    file : str
+        What the user calls it.
+    plan : Plan
+        The sweep.
+    path : Path
+        Its folder.
+    jobs : int or None
+        Processes; None is one per core.
+    dask : str
+        Address of a scheduler to use instead, or nothing.
+    again : str
+        The command that goes on with what was interrupted.
+    """
+    from rich.console import Console
+
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.remaining import remaining
+    from scenarios.results.run_files import FolderError, refusal, shown
+    from scenarios.sweep.study import study
+    from scenarios.sweep.sweep_folder import SweepFolder
+    from scenarios.sweep.workers import WorkersError, cores
+
+    console = Console()
+    try:
+        with interruptible(), SweepFolder(path, plan) as folder:
+            console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
+            try:
+                with remaining(console, size := len(plan.runs)) as tell:
+
+                    def note(done: int) -> None:
+                        tell(f"{plan.name}, {done} of {size} runs", done)
+
+                    return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
+            except (KeyboardInterrupt, OSError, WorkersError) as error:
+                kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
+                if isinstance(error, KeyboardInterrupt):
+                    fail([f"interrupted; {kept}"], exit_code(error))
+                fail([refusal(path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+
+
+def _told(summary: Summary) -> list[str]:
+    """What a sweep came to, in lines."""
+    from scenarios.results.run_files import shown
+
+    broke = sum(summary.broke.values())
+    lines = [f"{summary.runs - broke} runs reached their end" + (f", {broke} broke:" if broke else "")]
+    lines += [f"  {count} x {why}" for why, count in summary.broke.most_common(3)]
+    if len(summary.broke) > 3:
+        lines.append(f"  and for {len(summary.broke) - 3} more reasons: see the column why")
+    lines.append(f"table: {shown(summary.table)}")
+    if summary.plots:
+        lines.append(f"plots: {shown(summary.plots[0].parent)}/ ({len(summary.plots)})")
+    return lines
+
+
+def _size(file: str, plan: Plan, done: int = 0) -> str:
+    samples = plan.runs[-1].sample + 1
+    left = f"; {done} are done already" if done else ""
+    varied = ", ".join(plan.parameters)
+    return f"{file}: {len(plan.runs)} runs ({samples} samples of {plan.base.name}) over {varied}{left}"
+
+
+def check_packages(*, dask: bool = False) -> None:
+    """End with what to install when a package of the extra `sweep` is missing."""
+    modules = _PACKAGES | ({"distributed": "--dask"} if dask else {})
+    require(modules, "install what sweeps need: pip install 'gridpeers[sweep]'")

@@ -1,0 +1,93 @@
+"""What was typed wrong, in one line as all other mistakes, with the nearest word; typer has three lines for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from typer import BadParameter
+from typer.core import TyperGroup
+
+from gridpeers.cli.usage import BAD_INPUT, fail
+from wire.suggestion import suggestion
+
+_UsageError: type[BaseException] = BadParameter.__mro__[1]
+"""Base of all mistakes on a command line; releases of typer keep it in different modules."""
+
+
+class Commands(TyperGroup):
+    """Commands whose mistyped words are told in one line."""
+
+    def make_context(self, *words: Any, **extra: Any) -> Any:
+        """Read the options before the command."""
+        with _told():
+            return super().make_context(*words, **extra)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Read what follows the command, and run it."""
+        with _told():
+            return super().invoke(ctx)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command."""
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            fail([f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}'], BAD_INPUT)
+        return super().resolve_command(ctx, args)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    try:
+        yield
+    except _UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # the help is all that it says
+            raise
+        fail([_line(error)], BAD_INPUT)
+
+
+def _line(error: Any) -> str:
+    """A mistake in one line: where, what, and what would be right."""
+    message = error.format_message().rstrip(".")
+    path = error.ctx.command_path if error.ctx is not None else "gridpeers"
+    param, kind = getattr(error, "param", None), type(error).__name__
+    if kind == "NoSuchOption":
+        known = [name for each in error.ctx.command.get_params(error.ctx) for name in each.opts if name[:2] == "--"]
+        return f'no option "{error.option_name}"; {suggestion(error.option_name, known, "options")}'
+    if kind == "MissingParameter" and param is not None:
+        return f"{_name(param)} is missing; {path} -h shows what it is"
+    if kind == "BadOptionUsage":
+        needs = "needs a value" if "requires" in message else "takes no value"
+        return f"{error.option_name}: {needs}"
+    if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", message):
+        return f'too much was typed: "{extra[1]}"; {path} -h shows what is expected'
+    if param is not None:
+        return f"{_name(param)}: {_wrong_value(error, message)}"
+    return f"{message[:1].lower()}{message[1:]}; {path} -h shows what can be given"
+
+
+def _name(param: Any) -> str:
+    """What the help calls an option or an argument."""
+    if param.param_type_name == "option":
+        return str(max(param.opts, key=len))
+    return param.metavar if param.metavar and param.metavar.isupper() else str(param.name).upper()
+
+
+def _wrong_value(error: Any, message: str) -> str:
+    """What is wrong with a value that was typed."""
+    value, *choices = re.findall(r"'([^']*)'", message.partition(": ")[2]) or [""]
+    ctx: dict[str, Any] = {}
+    if details := getattr(error.__cause__, "errors", None):  # typer has values checked by pydantic since 0.29
+        first = details()[0]
+        value, ctx = first["input"], first.get("ctx", {})
+    if choices:
+        return f'there is no "{value}"; {suggestion(value, choices, "choices")}'
+    if "ge" in ctx:
+        return f"must be at least {ctx['ge']}, got {value}"
+    if "integer" in message:
+        return f'must be a whole number, got "{value}"'
+    if "number" in message or "float" in message:
+        return f'must be a number, got "{value}"'
+    text = message.partition(": ")[2] or message
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,16 @@
+"""Communication graphs: random connected ones, and what a rule of the scenario makes of nameplates."""
+
+from __future__ import annotations
+
+from agents.agent_config import Control
+from agents.topology import adjacency
+from scenarios.sweep.file.graph_axis import Edges, algebraic_connectivity, connected_graph, connected_graphs
+
+__all__ = [
+    "Control",
+    "Edges",
+    "adjacency",
+    "algebraic_connectivity",
+    "connected_graph",
+    "connected_graphs",
+]

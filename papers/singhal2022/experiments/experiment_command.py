@@ -1,0 +1,111 @@
+"""`gridpeers experiment`: from a name to a figure and a table. What it needs is imported when it is used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import gridpeers as gp
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
+
+if TYPE_CHECKING:
+    from papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
+    from papers.singhal2022.experiments.output.experiment_result import Result
+
+
+def experiment(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="An experiment; `list`, or nothing, shows all of them.")
+    ] = "list",
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder, new or this experiment's; runs/experiments/NAME when left out."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes of a sweep; one per core when left out.")
+    ] = None,
+) -> None:
+    """Run an experiment on late, lossy or broken links.
+
+    It writes its figure and table, with theory beside.
+    A sweep that was interrupted goes on by the same command. docs/experiments.md tells what was found.
+
+    Exit code: 0 done, 2 bad usage or a bad file, 3 a run broke, 130 interrupted by Ctrl-C.
+
+    Example:  gridpeers experiment delay
+    """
+    needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
+    require(needed)
+    import shlex
+
+    from gridpeers.output_folders import RUNS, refusal, shown
+    from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS, FromSweep
+
+    if name == "list":
+        for known, source in EXPERIMENTS.items():
+            typer.echo(f"{known:14} {_title(source)}")
+        return
+    check_choice("", "experiment", name, tuple(EXPERIMENTS))
+    source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
+    again = f"gridpeers experiment {name}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    result = _swept(source, folder, jobs, again) if isinstance(source, FromSweep) else _told(source, folder)
+    try:
+        files = result.write(folder)
+    except OSError as error:
+        fail([refusal(folder, error)], BROKEN)
+    for path in files:
+        typer.echo(shown(path))
+
+
+def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Result:
+    """Do what is left of the sweep, and draw."""
+    from gridpeers.cli.commands.sweep_command import check_packages, finish
+
+    check_packages()
+    import pyarrow.parquet as pq
+
+    from gridpeers.sweep_files import read_sweep
+    from papers.singhal2022.experiments.data.sweep_data import SweepData
+
+    try:
+        plan = read_sweep(source.sweep)
+    except gp.ScenarioError as error:
+        refuse(error)
+    summary = finish(source.sweep, plan, folder, jobs, "", again)
+    if sum(summary.broke.values()):
+        fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
+    rows = pq.read_table(summary.table).to_pylist()
+    return source.make(SweepData(rows=rows, base=plan.base, window=plan.base.events[0].label))
+
+
+def _told(source: FromScenario, folder: Path) -> Result:
+    """Run every case of the scenario in this process, and draw."""
+    from rich.console import Console
+
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.progress import progress
+    from gridpeers.output_folders import shown
+    from papers.singhal2022.experiments.data.case_data import CaseData
+
+    scenario = gp.load(source.scenario)
+    try:
+        with interruptible(), progress(Console(), tuple(scenario.cases)) as tell:
+            run = scenario.run(progress=tell, folder=folder)
+    except gp.FolderError as error:
+        fail([str(error)], BAD_INPUT)
+    except gp.BrokenRunError as error:
+        fail([f"the run broke: {error}"], BROKEN)
+    except KeyboardInterrupt as error:
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+    histories = {case: result.record for case, result in run.items()}
+    return source.make(CaseData(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))
+
+
+def _title(source: FromSweep | FromScenario) -> str:
+    """The title of the file that is run."""
+    from gridpeers.sweep_files import sweep_title
+    from papers.singhal2022.experiments.experiment_registry import FromScenario
+
+    return gp.load(source.scenario).title if isinstance(source, FromScenario) else sweep_title(source.sweep)

@@ -1,0 +1,49 @@
+"""The experiments by name: what is run, and what makes a figure and a table of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from papers.singhal2022.experiments.communication_experiment import communication
+from papers.singhal2022.experiments.data.case_data import CaseData
+from papers.singhal2022.experiments.data.sweep_data import SweepData
+from papers.singhal2022.experiments.delay_experiment import delay
+from papers.singhal2022.experiments.flapping_experiment import flapping
+from papers.singhal2022.experiments.handling_experiment import handling
+from papers.singhal2022.experiments.loss_experiment import loss
+from papers.singhal2022.experiments.output.experiment_result import Result
+from papers.singhal2022.experiments.partition_experiment import partition
+from papers.singhal2022.experiments.places_experiment import places
+from papers.singhal2022.experiments.topology_experiment import topology
+
+
+@dataclass(frozen=True)
+class FromSweep:
+    """An experiment on the rows of a sweep."""
+
+    sweep: str
+    """Name in `scenarios/catalogue/sweeps/`."""
+    make: Callable[[SweepData], Result]
+
+
+@dataclass(frozen=True)
+class FromScenario:
+    """An experiment on the histories of a scenario's cases."""
+
+    scenario: str
+    """Name in `scenarios/catalogue/`."""
+    make: Callable[[CaseData], Result]
+
+
+EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {
+    "delay": FromSweep("delay", delay),
+    "loss": FromSweep("loss", loss),
+    "places": FromSweep("places", places),
+    "topology": FromSweep("topology-delay", topology),
+    "flapping": FromScenario("flapping", flapping),
+    "partition": FromScenario("partition", partition),
+    "handling": FromSweep("handling", handling),
+    "communication": FromSweep("communication-delay", communication),
+}
+"""In the order of docs/experiments.md."""

@@ -1,0 +1,105 @@
+"""The same delay between agents, on the way of measurements, and on the way of set-points: what swings, from where on.
+
+The links carry frequency and voltage together. What swings first is mostly the voltage; to see the frequency by itself,
+the sweep has runs that leave V_set alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gridpeers.measures import Flags, Floats
+from gridpeers.theory import delay_limit, var_delay_limit, var_growth
+from papers.singhal2022.experiments.data.sweep_data import SweepData
+from papers.singhal2022.experiments.delay_experiment import ALONE, DELAY, K_Q, WHOLE
+from papers.singhal2022.experiments.output.experiment_page import Curve, Line, Page, Panel
+from papers.singhal2022.experiments.output.experiment_result import Result
+from papers.singhal2022.experiments.output.experiment_table import Table
+
+ON = "link[0].on"
+
+LINKS, MEASUREMENTS, SET_POINTS = "* <-> *", "plant -> *", "* -> plant"
+
+CASES = ("full", "reduced", "path", "star")
+
+F_SWINGS, V_SWINGS = 0.005, 0.002
+"""What counts as swinging (Hz, pu). An oscillation that stays is ten times as large."""
+
+LEAST = 1e-5
+"""Swings below this (Hz, pu) are drawn as this: what is left of a transient, or rounding."""
+
+
+def places(swept: SweepData) -> Result:
+    """Swing at the end of the run against delay, for each place, with predicted limits."""
+    limits = _limits(swept)
+    panels, rows = [], []
+    for index, title, y_label, shown in _ROWS:
+        for on, place, k_q in shown:
+            curves, lines = [], []
+            for style, case in enumerate(CASES):
+                x, y = swept.curve(DELAY, index, {"case": case, ON: on, K_Q: k_q})
+                curves.append(Curve(x=x, y=np.maximum(y, LEAST), style=style))
+                limit = limits[index, on != LINKS, case]
+                if np.isfinite(limit) and limit <= x[-1]:
+                    lines.append(Line(x=limit, style=style))
+                calm, wild = _between(x, y < (F_SWINGS if index == "f_swing_Hz" else V_SWINGS))
+                rows.append((title, place, case, limit, calm, wild))
+            panels.append(
+                Panel(
+                    title=f"{title}: late {place}",
+                    x_label=f"delay of {place} (s)",
+                    y_label=y_label,
+                    curves=curves,
+                    lines=lines,
+                    level=F_SWINGS if index == "f_swing_Hz" else V_SWINGS,
+                    log="y",
+                    x_range=(-0.01, 0.62),
+                    y_range=(LEAST, 1.0),
+                )
+            )
+    page = Page(
+        title="Where a delay sits decides whether it destabilises",
+        panels=panels,
+        columns=3,
+        names={style: swept.base.cases[case].title for style, case in enumerate(CASES)},
+        looks={},
+        height=2.9,
+    )
+    columns = ("what swings", "late", "graph", "predicted limit (s)", "calm up to (s)", "swings from (s)")
+    return Result(page=page, table=Table(columns=columns, rows=rows))
+
+
+_PLACES = ((LINKS, "links"), (MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
+
+_ROWS = (
+    ("f_swing_Hz", "f, V_set left alone", "swing of f (Hz)", tuple((on, name, ALONE) for on, name in _PLACES)),
+    ("V_swing_pu", "V, whole law", "swing of V (pu)", tuple((on, name, WHOLE) for on, name in _PLACES)),
+)
+"""Rows of the figure: frequency where the voltage is left alone, and voltage where nothing is."""
+
+
+def _limits(swept: SweepData) -> dict[tuple[str, bool, str], float]:
+    """Predicted limits (s) by what swings, whether links of the plant are late, and graph."""
+    found = {}
+    for case in CASES:
+        fleet = swept.fleet(case)
+        found["f_swing_Hz", False, case] = delay_limit(fleet, "neighbours", longest_s=1.0)
+        found["f_swing_Hz", True, case] = delay_limit(fleet, "local loop", longest_s=1.0)
+        found["V_swing_pu", False, case] = _var_link_limit(swept, case)
+        found["V_swing_pu", True, case] = var_delay_limit(fleet, swept.answers)
+    return found
+
+
+def _var_link_limit(swept: SweepData, case: str) -> float:
+    """Longest delay (s) of the links up to which the law for voltage and vars decays; infinite: all of the sweep."""
+    T_c = swept.base.time.T_c_s
+    for n in range(1, round(max(swept.values(DELAY)) / T_c) + 1):
+        if var_growth(swept.fleet(case), swept.response, link_delay_s=n * T_c) > 0.0:
+            return round((n - 1) * T_c, 9)
+    return np.inf
+
+
+def _between(x: Floats, calm: Flags) -> tuple[float, float]:
+    """The last delay up to which all is calm, and the next one; infinite where nothing ever swings."""
+    first = int(np.argmin(calm)) if not calm.all() else len(x)
+    return float(x[first - 1]) if first else 0.0, float(x[first]) if first < len(x) else np.inf

@@ -1,0 +1,122 @@
+"""The command `gridpeers reproduce`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+import gridpeers as gp
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, check_choice, fail, refuse, require
+from papers.singhal2022.reproduce.parts import CHOICES, chosen
+
+_NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
+
+
+def reproduce(
+    driver: Annotated[
+        str, typer.Option(help="processes: one process per agent, over Zenoh; inprocess: all in one.", metavar="NAME")
+    ] = "processes",
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHAT", help="tables: what has tables, without figures; figures; or a part by its scenario's name."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="Seed instead of the scenarios' own, also of random graphs.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Random graphs at a time; one per core when left out.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the report, new or empty; runs/reproduce/TIME when left out."),
+    ] = None,
+) -> None:
+    """Run all experiments of the paper, and write one report.
+
+    Every table, figure and claim of ours stands beside the paper's.
+
+    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
+    2 bad usage, 3 a run broke.
+
+    Example:  gridpeers reproduce --driver inprocess
+    """
+    check_choice("--driver: ", "driver", driver, ("processes", "inprocess"))
+    if only is not None:
+        check_choice("--only: ", "part", only, CHOICES)
+    require(_NEEDED | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, out)
+
+
+def _reproduce(
+    driver: Literal["processes", "inprocess"], only: str | None, seed: int | None, jobs: int | None, out: Path | None
+) -> None:
+    from datetime import datetime
+
+    from rich.console import Console
+
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.remaining import remaining
+    from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
+    from papers.singhal2022.reproduce.found import Reproduction
+    from papers.singhal2022.reproduce.report_writing import write
+    from papers.singhal2022.reproduce.work import Work
+
+    now = datetime.now().astimezone()
+    try:
+        folder = new_folder(out, "reproduce", now)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+
+    console = Console()
+    work = Work(chosen(only), driver, folder / "runs", seed, jobs)
+    results = []
+    try:
+        with interruptible():
+            with remaining(console, work.total_s) as tell:
+                for result in work.do(tell, figures=only != "tables"):
+                    results.append(result)
+            whole = Reproduction(
+                results=tuple(results),
+                driver=driver,
+                seed=work.seed,
+                started=now.isoformat(sep=" ", timespec="minutes"),
+                only=only or "",
+            )
+            write(whole, work, folder)
+    except gp.ScenarioError as error:
+        set_broken(folder, "; ".join(error.mistakes))
+        refuse(error)
+    except (RuntimeError, OSError) as error:
+        why = refusal(folder, error) if isinstance(error, OSError) else str(error)
+        set_broken(folder, why)
+        fail([f"a run broke: {why}", f"what came until then is in {shown(folder)}/"], BROKEN)
+    except OutputLostError as error:
+        set_broken(folder, str(error))
+        raise
+    except KeyboardInterrupt as error:
+        set_broken(folder, "interrupted")
+        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+    for line in _told(whole):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    console.print(f"Report: {shown(folder / 'report.html')}", markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(CLAIM_FAILED if whole.failed else PASSED)
+
+
+def _told(whole: object) -> list[str]:
+    """The end in lines: every claim that does not hold, and the counts."""
+    from papers.singhal2022.headline import headline
+    from papers.singhal2022.reproduce.found import Reproduction
+
+    assert isinstance(whole, Reproduction)
+    lines = []
+    for result in whole.results:
+        for verdict in result.verdicts:
+            if verdict.status != "PASS":
+                lines.append(f"{verdict.status:7}  {result.part.name}: {verdict.claim.text}  {verdict.found}")
+                lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
+    took = f"It took {whole.wall_s:.0f} s, {whole.cpu_s:.0f} s of processor time."
+    return [*lines, *headline(whole.numbers), whole.claims, took]

@@ -1,0 +1,104 @@
+"""The plant as a process: `LockstepPlant` or `RealtimePlant` on a Zenoh session."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import sys
+from collections.abc import Callable
+from time import monotonic, time_ns
+
+from msgspec.structs import replace
+
+from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
+from plant.plant_interface import LivePlant
+from plant.realtime.realtime_plant import RealtimePlant
+from wire.driver.drive import StoppedError, drive, perform, serve
+from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.session import Session
+from wire.messages import PLANT
+
+LISTENING, COMPILING, READY = "listening", "compiling", "ready"
+"""Words on standard output, one a line: the rendezvous is there; the step is being compiled, which takes up to a minute
+at the very first start; agents are awaited."""
+
+
+def build(config: PlantConfig) -> LivePlant:
+    """Build the configuration's plant."""
+    from plant.build import build_plant  # numba and scipy take a second: only once the rendezvous is there
+
+    return build_plant(config)
+
+
+def run_plant(
+    config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] = build, make_links: MakeLinks = no_links
+) -> str:
+    """Run the plant until the end of the scenario.
+
+    The session is opened first, as it is the rendezvous: the agents find each other while the plant is built.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant, its agents and its times.
+    builder : Callable[[PlantConfig], LivePlant], optional
+        Makes the plant; tests have smaller ones.
+    make_links : MakeLinks, optional
+        Makes the emulated links to it, if there are any.
+
+    Returns
+    -------
+    str
+        Why the run broke; empty after a good end.
+
+    Raises
+    ------
+    ConfigurationError, SessionError
+        If the configuration cannot work.
+    """
+    log = logging.getLogger("plant")
+    wall = config.clock == "wall"
+    if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
+        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+    session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
+    try:
+        tell(LISTENING)
+        try:
+            tell(COMPILING)
+            plant = builder(config)
+            links = make_links(PLANT, config.links)
+            node = RealtimePlant(config, plant, links) if wall else LockstepPlant(config, plant, links)
+        except ValueError as error:
+            raise ConfigurationError(str(error)) from error
+        except RuntimeError as error:
+            return f"plant: cannot start: {error}"
+        for key in node.publications:
+            session.prepare(key)
+        for name, text in config.handout.items():
+            session.answer(node.keys.config(name), text.encode())
+        gc.freeze()  # what was built stays: later collections need not look at it
+        tell(READY)
+        try:
+            drive(node, session, log)
+        except (StoppedError, KeyboardInterrupt) as stop:
+            node.interrupt(f"the plant was asked to leave: {stop}", 0.0)
+            perform(node.take_actions(), session, log)
+            raise
+        except Exception as error:  # whatever it is: agents that are told close at once, else they seek a plant
+            node.cause = error
+            node.abort(f"plant at t = {node.t:g} s: {type(error).__name__}: {error}", monotonic())
+            serve(node, session, log)
+    finally:
+        session.close()
+    if node.cause is not None:
+        log.error("the plant broke", exc_info=node.cause)
+    if node.rejects.counts:
+        log.warning("plant: dropped messages by kind: %s", dict(node.rejects.counts))
+    return node.outcome
+
+
+def tell(word: str) -> None:
+    """Tell whoever started the process how far it is."""
+    sys.stdout.write(word + "\n")
+    sys.stdout.flush()

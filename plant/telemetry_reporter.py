@@ -1,0 +1,137 @@
+"""What the plant tells: measurements to its agents, telemetry to who records. The same in both kinds of time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import get_type_hints
+
+from msgspec.structs import replace
+
+from plant.plant_interface import PlantLike, ReadingLike
+from wire.bounds import LIMIT
+from wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
+from wire.printable import printable
+
+_NUMBER_BYTES = 9
+"""Bytes of one float in msgpack."""
+
+
+def measurement_of(
+    name: str, reading: ReadingLike, *, incarnation: int, tick: int, t: float, roster: tuple[str, ...] = ()
+) -> Measurement:
+    """Measurement of one inverter (t in s) from what its sensors read, within the range of any sensor.
+
+    Beyond it a sensor shows the end of its scale. So a plant that swings wildly still grants its ticks; what it really
+    did stands in the telemetry.
+    """
+    return Measurement(
+        sender=PLANT,
+        incarnation=incarnation,
+        seq=tick,
+        t=t,
+        to=name,
+        P=_in_W(reading.P),
+        Q=_in_W(reading.Q),
+        V=_in_V(reading.V),
+        f=_in_Hz(reading.f),
+        P_set=_in_W(reading.P_set),
+        V_set=_in_V(reading.V_set),
+        grid_connected=reading.grid_connected,
+        island=reading.island,
+        roster=roster,
+    )
+
+
+def _scale(field: str) -> Callable[[float], float]:
+    """The scale of a sensor: the bounds of what a field of a measurement may be."""
+    bounds = get_type_hints(Measurement, include_extras=True)[field].__metadata__[0]
+    low, high = float(bounds.ge), float(bounds.le)
+    return lambda value: value if low <= value <= high else min(max(value, low), high)
+
+
+_in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
+
+_LATEST = 20
+"""Events that are told to who comes late: with twice as many of the longest, an answer is still short."""
+
+
+class Reporter:
+    """Gathers rows and events between two reports.
+
+    Parameters
+    ----------
+    incarnation : int
+        Which life of the plant.
+    plant : PlantLike
+        Where the rows come from.
+    """
+
+    def __init__(self, incarnation: int, plant: PlantLike) -> None:
+        self._incarnation, self._plant = incarnation, plant
+        self._rows: list[tuple[float, ...]] = []
+        self._events: list[PlantEvent] = []
+        self._quiet: dict[float, int] = {}
+        """States that their neighbours were not told of, by run time (s)."""
+        self.seq = 0
+        """Number of the next Telemetry, or of the one that is being sent."""
+        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
+        """The latest events, for who comes late."""
+
+    def collect(self) -> None:
+        """Take what the plant has recorded."""
+        self._rows += self._plant.take_rows()
+        for event in self._plant.take_events():
+            self.note(event)
+
+    def note(self, event: PlantEvent) -> None:
+        """Add an event."""
+        event = replace(event, subject=printable(event.subject, 200), text=printable(event.text))
+        self._events.append(event)
+        self.latest.append(event)
+
+    def note_quiet(self, t: float) -> None:
+        """Count a state that its neighbours were not told of, at run time t (s)."""
+        self._quiet[t] = self._quiet.get(t, 0) + 1
+
+    def report(
+        self,
+        t: float,
+        *,
+        final: bool,
+        outcome: str,
+        reproducible: bool,
+        pacing: Pacing | None = None,
+        awaited: tuple[str, ...] = (),
+        impaired: tuple[str, ...] = (),
+        others: int = 0,
+    ) -> Iterator[Telemetry]:
+        """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
+        inverters = self._plant.inverters
+        bytes_per_row = _NUMBER_BYTES * (1 + VALUES * len(inverters)) + 8
+        at_once = max(1, LIMIT // 2 // bytes_per_row)
+        rows, events, quiet = self._rows, self._events, tuple(self._quiet.items())
+        self._rows, self._events, self._quiet = [], [], {}
+        while True:
+            part, rows = rows[:at_once], rows[at_once:]
+            yield Telemetry(
+                sender=PLANT,
+                incarnation=self._incarnation,
+                seq=self.seq,
+                t=t,
+                inverters=inverters,
+                rows=tuple(part),
+                events=() if rows else tuple(events),
+                final=final and not rows,
+                outcome=printable(outcome),
+                reproducible=reproducible,
+                pacing=pacing,
+                awaited=() if rows else awaited,
+                impaired=impaired,
+                others=others,
+                quiet=() if rows else quiet,
+            )
+            others = 0
+            self.seq += 1
+            if not rows:
+                return

@@ -1,0 +1,122 @@
+"""An order of a person to the links of a running run: as it travels, what is wrong with it, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+
+from netem.netem_errors import Mistake, seconds
+from netem.spec.change import Change, Heal
+from netem.spec.fault import LONGEST_RUN, Fault
+from netem.spec.pattern import Link, objections
+from scenarios.emulation.link_descriptions import words
+
+EVERYTHING = "{*, plant} <-> {*, plant}"
+"""Pattern of all links there are."""
+
+
+class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Either a fault or its end. When it begins to hold is said beside it; times in it do not count."""
+
+    fault: Fault | None = None
+    """What links shall do."""
+    heal: Heal | None = None
+    """On which links what holds shall end."""
+    for_s: float | None = None
+    """For how long a fault holds (s of run time); without it, until it is healed."""
+
+    @property
+    def on(self) -> str:
+        """Which links."""
+        return self._change.on
+
+    @property
+    def _change(self) -> Change:
+        """The one of the two that is given."""
+        found = self.fault or self.heal
+        if found is None or (self.fault and self.heal):
+            raise ValueError("an order is either a fault or a heal")
+        return found
+
+    def at(self, t: float) -> Change:
+        """What changes if it begins to hold at t (s of run time)."""
+        to_s = None if self.for_s is None else round(t + self.for_s, 9)
+        times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
+        return msgspec.structs.replace(self._change, **times)
+
+    def mistakes(self, microgrids: Mapping[str, str]) -> list[Mistake]:
+        """All that is wrong with it in a run of these inverters."""
+        links = [Mistake("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
+        return links + self.wrong_values()
+
+    def wrong_values(self) -> list[Mistake]:
+        """Values that cannot be meant, in whatever run."""
+        found = []
+        if self.fault is not None:
+            found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).mistakes()
+        if self.for_s is not None:
+            found += seconds("for", self.for_s, "a time of the run", high=LONGEST_RUN, above_zero=True)
+        return found
+
+    def __str__(self) -> str:
+        """As people are told.
+
+        Examples
+        --------
+        >>> print(LinkCommand(fault=Fault(on="inv1 -> inv4", delay=0.1, loss=0.2), for_s=5.0))
+        inv1 -> inv4: loss 0.2, delay 0.1 s, for 5 s
+        >>> print(LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)))
+        all links: heal
+        """
+        where = "all links" if self.on == EVERYTHING else self.on
+        if self.fault is None:
+            return f"{where}: heal"
+        faults = [words(kind, model) for kind, model in self.fault.models().items()]
+        return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
+
+    def in_words(self, impaired: Sequence[Link]) -> str:
+        """As people are told by whom it was given to, who knows which of its links have a fault when it begins to hold.
+
+        Examples
+        --------
+        >>> heal = LinkCommand(heal=Heal(on="* <-> *", from_s=0.0))
+        >>> heal.in_words([Link("inv4", "inv7"), Link("inv7", "inv4"), Link("inv1", "inv4")])
+        'inv4 <-> inv7, inv1 -> inv4: healed'
+        >>> heal.in_words([])
+        '* <-> *: no link has a fault, nothing to heal'
+        """
+        if self.fault is not None:
+            return str(self)
+        if not impaired:
+            return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, nothing to heal"
+        return f"{_listed(impaired)}: healed"
+
+    def to_text(self) -> str:
+        """As it travels."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def of_text(cls, text: str) -> LinkCommand:
+        """What has come; ValueError if it is no order."""
+        try:
+            order = msgspec.json.decode(text, type=cls)
+        except msgspec.DecodeError as error:
+            raise ValueError(f"no order to links: {error}") from None
+        if order.fault is not None and order.fault.own:  # else whoever reaches the run could have any module imported
+            raise ValueError("no order to links: a fault of your own is written in the scenario before the run")
+        order.on  # noqa: B018  that it is one of the two
+        return order
+
+
+MOST_NAMED = 8
+"""So many links are named; a partition of nine inverters hurts 36."""
+
+
+def _listed(links: Sequence[Link]) -> str:
+    """Links for people, those that have a fault both ways as one."""
+    both = {link for link in links if Link(link.dst, link.src) in links}
+    first = [link for link in links if link not in both or links.index(link) < links.index(Link(link.dst, link.src))]
+    named = [f"{link.src} {'<->' if link in both else '->'} {link.dst}" for link in first]
+    more = len(named) - MOST_NAMED
+    return ", ".join(named) if more <= 0 else f"{', '.join(named[:MOST_NAMED])} and {more} more"

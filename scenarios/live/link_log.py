@@ -1,0 +1,148 @@
+"""What emulated links did and were ordered in a run by hand: its record, and the scenario that replays it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from netem.spec.change import Change, replayed
+from netem.spec.netem import Netem
+from plant.equipment import Feeder
+from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.link_command import LinkCommand
+from scenarios.live.run_address import UsageError
+from scenarios.results.link_records import LinkRecord
+from scenarios.results.run_files import shown, write_whole
+from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.netem_tables import netem_of
+from scenarios.spec.scenario_writing import to_toml
+from wire.messages import LinkOrder, LinkReport
+
+
+class LinkLog:
+    """Takes what the plant tells of links.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As run, with its one case.
+    feeder : Feeder
+        Its feeder.
+    links : str
+        What the processes are told of links.
+    folder : Path or None
+        Where links.csv and links.json go; None for nowhere.
+    replay : Path or None
+        File of the scenario that replays the run's links: written in any case, and anew with every order.
+    by_the_way : Path or None
+        The same, but only written once there is an order.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        feeder: Feeder,
+        links: str,
+        folder: Path | None,
+        replay: Path | None,
+        by_the_way: Path | None,
+    ) -> None:
+        self._scenario, self._feeder, self._setup = scenario, feeder, Setup.of_text(links)
+        self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
+        self._record = LinkRecord(folder)
+        self._orders: dict[int, Change] = {}
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What was ordered, in its order."""
+        return tuple(change for _, change in sorted(self._orders.items()))
+
+    @property
+    def links_sha256(self) -> str:
+        """Hash of the fates of all messages on emulated links; "" if none was sent."""
+        return self._record.sha256 if any(book.sent for book in self._record.counts.values()) else ""
+
+    def __call__(self, message: LinkReport | LinkOrder) -> None:
+        """Take a report of what links did, or an order to them."""
+        if isinstance(message, LinkReport):
+            if self._folder is not None:
+                self._record(message)
+            return
+        self._orders[message.seq] = LinkCommand.of_text(message.text).at(message.t)
+        self._write_replay(message.t)
+
+    def close(self, t: float) -> list[str]:
+        """Write what is to be written, at the end of a run that came to t (s); what a person should know."""
+        self._write_replay(t)
+        told: list[str] = []
+        if self._folder is not None and self.links_sha256:
+            from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
+
+            check = LinkCheck(self._record, self._setup.netem, self._setup.microgrids, self.changes)
+            told += check.write(self._folder)
+        file = self._replay or (self._by_the_way if self._orders else None)
+        if file is not None:
+            told.append(f"the links as they were: gridpeers run {shown(file)}")
+        return told
+
+    def _write_replay(self, t: float) -> None:
+        files = [self._replay, self._by_the_way if self._orders else None]
+        text = to_toml(
+            replay_of(self._scenario, self._feeder, self.changes, t),
+            {"driver": "by hand", "python": platform.python_version()},
+        )
+        for file in files:
+            if file is not None:
+                write_whole(file, text)
+
+
+def replay_of(scenario: Scenario, feeder: Feeder, changes: Sequence[Change], t: float) -> Scenario:
+    """The scenario whose links do by schedule what they were ordered to do; of agents that it does not know, nothing.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        As run, with its one case.
+    feeder : Feeder
+        Its feeder.
+    changes : Sequence[Change]
+        What was ordered.
+    t : float
+        How far the run came (s): the scenario ends there, if it does not end later anyway.
+    """
+    ((name, case),) = scenario.cases.items()
+    microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
+    T_c = scenario.time.T_c_s
+    needed = max([t, *(change.from_s + T_c for change in changes)])
+    end = max(scenario.time.end_s, round(math.ceil(needed / T_c - 1e-6) * T_c, 9))
+    return msgspec.structs.replace(
+        scenario,
+        name="",
+        paper="",
+        time=msgspec.structs.replace(scenario.time, end_s=end),
+        netem=replayed(netem_of(scenario, name), changes, microgrids),
+        cases={name: msgspec.structs.replace(case, netem=Netem())},
+    )
+
+
+def check_new(option: str, file: Path | None) -> None:
+    """Raise UsageError if a file is there already, or cannot be made where it is to be."""
+    if file is None:
+        return
+    try:
+        if file.exists():
+            raise UsageError(f"{option} {file}: is there already; move it, or give another name")
+        if not file.absolute().parent.is_dir():
+            raise UsageError(f"{option} {file}: there is no folder {file.parent}; make it first")
+        with contextlib.suppress(FileExistsError):  # what another run was killed at
+            trial = file.with_name(f"{file.name}.partial")
+            trial.touch(exist_ok=False)
+            trial.unlink()
+    except OSError as error:
+        raise UsageError(f"{option} {file}: cannot be written: {error.strerror}; give another name") from None

@@ -1,0 +1,76 @@
+"""Where a run by hand leaves what it leaves: a run folder if one was asked for, else only logs while it lasts."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+
+from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_status, write_whole
+from scenarios.run import versions
+from scenarios.spec import Scenario
+from scenarios.spec.scenario_writing import to_toml
+
+BY_HAND = "by hand"
+"""The driver of such a run, as files name it."""
+
+
+class Folders:
+    """Folders of a run by hand.
+
+    Parameters
+    ----------
+    logs : Path
+        For the logs of processes.
+    record : Path or None
+        For history.csv and events.csv, a folder in the run folder; None if nothing is recorded.
+    whole : Path or None
+        The run folder; None if there is none.
+    """
+
+    def __init__(self, logs: Path, record: Path | None = None, whole: Path | None = None) -> None:
+        self.logs, self.record, self.whole = logs, record, whole
+
+    def complete(self) -> None:
+        """Have status.txt say that all is there."""
+        if self.whole is not None:
+            set_status(self.whole, "complete")
+
+    def broken(self, why: str) -> None:
+        """Have status.txt say why not."""
+        if self.whole is not None:
+            set_broken(self.whole, why)
+
+
+@contextmanager
+def folders(out: Path | None, scenario: Scenario) -> Iterator[Folders]:
+    """Make the folders of a run.
+
+    Parameters
+    ----------
+    out : Path or None
+        What `--out` says.
+    scenario : Scenario
+        As run, with its one case.
+
+    Raises
+    ------
+    FolderError
+        If the folder has something in it, is a file, or cannot be made or written.
+    """
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
+            yield Folders(Path(logs))
+        return
+    whole = new_folder(out, scenario.name, datetime.now().astimezone())
+    try:
+        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": BY_HAND} | versions()))
+        (whole / "log").mkdir()
+    except OSError as error:
+        why = refusal(whole, error)
+        set_broken(whole, why)
+        raise FolderError(why) from None
+    (case,) = scenario.cases
+    yield Folders(whole / "log", whole / case, whole)

@@ -1,0 +1,143 @@
+"""What the plant of a run by hand is started with, and what it hands to the agents that come."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from plant.equipment import Feeder
+from plant.plant_config import PlantConfig
+from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
+from scenarios.spec import Scenario
+from scenarios.spec.configs import configs
+from scenarios.spec.netem_tables import netem_of, setup_of
+from wire.suggestion import suggestion
+
+SPEEDS = (0.1, 50.0)
+"""Least and greatest speed (s of run time per s of wall time) that is of any use, in a run by hand or of a scenario."""
+
+
+class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """What the options of `gridpeers plant` and `gridpeers up` say."""
+
+    run: str
+    """Name of the run."""
+    case: str = ""
+    """Case of the scenario; the last one if empty."""
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
+    wait: float = 30.0
+    """How long (s) the plant waits for its agents."""
+    duration: float | None = None
+    """Run time (s) after which the run ends; None for no end."""
+    strict: bool = False
+    """Whether the run breaks when the plant cannot keep pace."""
+
+
+def chosen_case(scenario: Scenario, case: str) -> str:
+    """Name of the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
+
+    Raises
+    ------
+    UsageError
+        If there is no such case.
+    """
+    if case and case not in scenario.cases:
+        raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
+    return case or list(scenario.cases)[-1]
+
+
+def set_up(
+    scenario: Scenario, feeder: Feeder, wishes: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Configurations of the plant and of all agents, spare ones last.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A checked scenario.
+    feeder : Feeder
+        Its feeder.
+    wishes : LiveOptions
+        Options of the command.
+    listen : str
+        Where the plant listens.
+    beyond : tuple[str, ...], optional
+        What the plant connects to itself, e.g. a Zenoh router.
+
+    Raises
+    ------
+    UsageError
+        If an option cannot be used.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> plant, agents = set_up(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    >>> plant.end, plant.settings.spares, agents[-1].name
+    (None, ('inv10',), 'inv10')
+    """
+    _check(wishes)
+    case = chosen_case(scenario, wishes.case)
+    plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
+    # links are emulated even if none has a fault yet: somebody may give them some while the run goes on
+    links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_text()
+    live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed, "links": links}
+    first = [agent for agent in agents if agent.name in plant.agents]
+    everyone = tuple(
+        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
+    )
+    end = None if wishes.duration is None else max(1, round(wishes.duration / plant.T_c)) * plant.T_c
+    plant = msgspec.structs.replace(
+        plant,
+        **live,
+        settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
+        moves=(),  # by hand, people let agents leave and join
+        end=end,
+        connect=beyond,
+        wait_for_agents=min(wishes.wait, LONGEST),  # JSON has no infinity
+        strict=wishes.strict,
+        handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
+    )
+    return plant, everyone
+
+
+def real_nodes(scenario: Scenario) -> str:
+    """What people have to do to agents whose processes are theirs, as the scenario would have it; empty if nothing.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With its one case.
+    """
+    (case,) = scenario.cases
+    nodes = [node for node in netem_of(scenario, case).nodes if node.kill or node.pause]
+    if not nodes:
+        return ""
+    names = ", ".join(dict.fromkeys(node.name for node in nodes))
+    return f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
+
+
+def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
+    """Configurations of the spare inverters' agents: as the others', but for the nameplate."""
+    for row in feeder.spares:
+        yield msgspec.structs.replace(
+            like,
+            name=row.name,
+            kind=row.kind,
+            microgrid=row.microgrid,
+            P_rated=row.P_rated,
+            V_nom=row.V_nom,
+            m_p=row.m_p,
+            m_q=row.m_q,
+        )
+
+
+def _check(wishes: LiveOptions) -> None:
+    least, greatest = SPEEDS
+    if not least <= wishes.speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {wishes.speed:g}")
+    check_wait(wishes.wait)
+    check_duration(wishes.duration)

@@ -1,0 +1,66 @@
+"""What the figures of a run by hand share: the whole run, with all that people did in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import msgspec
+
+from plant.equipment import Feeder
+from scenarios.live.numbers.departures import Compared
+from scenarios.results.drawing import Drawing, Mark, drawing_of
+from scenarios.results.history import History
+from scenarios.results.island_membership import taken_part
+from scenarios.results.joins_and_leaves import as_they_came
+from scenarios.spec import Scenario
+from wire.messages import PlantEvent
+
+PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
+"""Words of the plant, as figures have them."""
+
+
+def drawing_by_hand(
+    compared: Compared, scenario: Scenario, feeder: Feeder, case: str, history: History, events: Sequence[PlantEvent]
+) -> Drawing:
+    """Return what to draw: all events by name, and a line where people departed otherwise from the scenario.
+
+    Parameters
+    ----------
+    compared : Compared
+        The run beside its scenario.
+    scenario, feeder : Scenario, Feeder
+        What was to be run.
+    case : str
+        Name of the case.
+    history : History
+        The record.
+    events : Sequence[PlantEvent]
+        What the plant told.
+    """
+    reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
+    came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
+    taken, plates = taken_part(scenario, feeder, history)
+    drawing = drawing_of(compared.happened, feeder, plates, {case: taken}, came)
+    marks = [*drawing.events, *_by_hand(compared.departures)]
+    return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
+
+
+def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
+    """Marks of what people did, and of what befell agents; one for all of a moment."""
+    by_time: dict[float, list[PlantEvent]] = {}
+    for event in departures:
+        if event.t > 0.0:
+            by_time.setdefault(event.t, []).append(event)
+    for t, of in by_time.items():
+        what = ", ".join(dict.fromkeys(text for event in of if (text := _in_short(event))))
+        yield Mark("by hand" if any(event.kind == "switch" for event in of) else "", t, what)
+
+
+def _in_short(event: PlantEvent) -> str:
+    """What somebody did, in two words; "" where that takes more."""
+    if event.kind == "link":
+        return "links"
+    match = re.match(r"(?:switch )?(\S+)(?: \(.*\))? (opened|closed|joined|left|died)\b", event.text)
+    return f"{match[1]} {PRESENT[match[2]]}" if match else ""

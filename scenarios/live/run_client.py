@@ -1,0 +1,279 @@
+"""A command's client to a run: it connects, sees who is there, asks, listens and goes. No run depends on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from time import monotonic
+from types import TracebackType
+
+from scenarios.live.run_address import (
+    ENDPOINT,
+    RUN,
+    InUseError,
+    RunAddress,
+    UsageError,
+    accepting,
+    claim,
+    near,
+    next_port,
+)
+from wire.codec import RejectedError, decode
+from wire.driver.session import Session
+from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
+from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAnswer, Telemetry
+
+VISITOR = "visitor"
+
+REMINDER = 2.0
+"""A wait is said again after so long (s), then after twice as long, and so on."""
+
+RENEWAL = 2.0
+"""Time (s) between two looks at whether the session has gone astray."""
+
+LOOKING = 1.5
+"""Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
+
+
+class NobodyError(ValueError):
+    """What was looked for is not there; the message says where it was looked for, how long, and what to do."""
+
+
+class RunClient:
+    """A session at a run.
+
+    Parameters
+    ----------
+    where : RunAddress
+        The run and its endpoints.
+    meet_agents : bool, optional
+        Whether to connect to the agents too, to hear what they publish; the plant alone is enough to ask it.
+    """
+
+    def __init__(self, where: RunAddress, *, meet_agents: bool = False) -> None:
+        self.where, self.keys = where, Keys(where.run)
+        self._meet_agents = meet_agents
+        self._heard: list[str] = []
+        """Keys that are listened to."""
+        self._runs: set[str] = set()
+        self._open()
+
+    def _open(self) -> None:
+        self.epochs: set[int] = set()
+        """Epochs of the plants of this run whose tokens are there."""
+        self.agents: dict[str, set[str]] = {}
+        """Tokens of agents: inverter -> its instances."""
+        self._runs.clear()
+        self._session = Session(VISITOR, connect=self.where.connect, clock="wall", meets_all=self._meet_agents)
+        for key in (self.keys.answer(self._session.id), *self._heard):
+            self._session.subscribe(key)
+        self._session.watch(self.keys.any_alive)
+        self._session.watch(ANY_ALIVE_PLANT)
+
+    def renew(self) -> None:
+        """Come again with a new session, as the old one does not hear what it should."""
+        self._session.close()
+        self._open()
+
+    def __enter__(self) -> RunClient:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._session.close()
+
+    @property
+    def plant(self) -> bool:
+        """Whether the plant's token is there."""
+        return bool(self.epochs)
+
+    @property
+    def runs(self) -> set[str]:
+        """Names of the runs whose plants are there."""
+        return self._runs
+
+    def read(self, key: str, payload: bytes) -> AnyMessage | None:
+        """Message of the bytes that came on a key, if it is one, and of whom the key says.
+
+        If that is the plant, of the one that is there. What the plant passes on from others it has checked itself.
+        """
+        try:
+            message = decode(payload)
+        except RejectedError:  # nothing depends on a visitor
+            return None
+        of_plant = message.sender == PLANT and message.incarnation in self.epochs
+        match self.keys.parts(key), message:
+            case ("status", name), AgentStatus():
+                believed = message.sender == name
+            case ("telemetry",), Telemetry():
+                believed = of_plant
+            case ("answer", _), Answer():
+                believed = of_plant
+            case ("answer", _), LinkAnswer():
+                believed = True
+            case _:
+                believed = False
+        return message if believed else None
+
+    @property
+    def id(self) -> str:
+        """Id of the session, in the key of its answers."""
+        return self._session.id
+
+    def listen(self, key: str) -> None:
+        """Have messages on a key come in."""
+        self._heard.append(key)
+        self._session.subscribe(key)
+
+    def fetch(self, key: str) -> None:
+        """Ask a queryable; what it answers comes in as messages on that key."""
+        self._session.fetch(key)
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Publish bytes."""
+        self._session.publish(key, payload)
+
+    def take(self, seconds: float) -> Iterator[tuple[str, bytes]]:
+        """Wait (s) for something to happen; give key and bytes of the messages among it."""
+        for kind, key, payload, _ in self._session.take(1, max(0.0, seconds)):
+            if kind == "message":
+                yield key, payload
+            elif kind != "word":
+                self._note(key, there=kind == "appeared")
+
+    def _note(self, key: str, *, there: bool) -> None:
+        run = run_of_plant(key)
+        if run:
+            (self._runs.add if there else self._runs.discard)(run)
+        match self.keys.parts(key):
+            case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None:
+                (self.epochs.add if there else self.epochs.discard)(epoch)
+            case ("alive", "agent", name, instance) if there:
+                self.agents.setdefault(name, set()).add(instance)
+            case ("alive", "agent", name, instance):
+                self.agents.get(name, set()).discard(instance)
+
+    def until(self, done: Callable[[], bool], seconds: float) -> bool:
+        """Wait (s) until something holds; whether it does. Messages that come meanwhile are dropped."""
+        end = monotonic() + seconds
+        while not done():
+            left = end - monotonic()
+            if left <= 0.0:
+                return False
+            for _ in self.take(left):
+                pass
+        return True
+
+    def find_plant(self, wait: float, tell: Callable[[str], None] | None = None) -> None:
+        """Wait for the plant of the run.
+
+        Parameters
+        ----------
+        wait : float
+            Longest wait (s).
+        tell : Callable[[str], None], optional
+            Told for what one waits: now and then, ever more rarely, and at once if plants of other runs are there.
+
+        Raises
+        ------
+        NobodyError
+            If there is none in time.
+        """
+        began = looked = monotonic()
+        reminder = REMINDER
+        strangers: set[str] = set()
+        while True:
+            pause = min(looked + RENEWAL, began + reminder, began + wait) - monotonic()
+            self.until(lambda: self.plant or not self._others <= strangers, pause)
+            now = monotonic()
+            if self.plant:
+                return
+            if not self._others <= strangers:
+                strangers.update(self._others)
+                if tell is not None:
+                    tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
+            if now - began >= wait:
+                raise NobodyError(self._nobody(wait))
+            if now - looked >= RENEWAL:
+                looked = now
+                if self._session.misplaced:
+                    self.renew()
+            if now - began >= reminder:
+                reminder *= 2.0
+                if tell is not None:
+                    tell(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+
+    @property
+    def _others(self) -> set[str]:
+        """Other runs whose plants are there."""
+        return self._runs - {self.where.run}
+
+    def _nobody(self, wait: float) -> str:
+        if not self._session.peers():
+            if mute := accepting(self.where.connect):
+                return (
+                    f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
+                    "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
+                    "--connect where the plant is"
+                )
+            return (
+                f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
+                "(gridpeers plant SCENARIO), or say by --connect where it is"
+            )
+        others = sorted(self._others)
+        there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
+        return (
+            f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
+            f"start one (gridpeers plant SCENARIO --run {self.where.run}), or give another name by --run"
+        )
+
+
+def claim_for_run(listen: str) -> str:
+    """Return the endpoint where a plant will be able to listen, a free port for port 0.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be listened on. If another run is there, the message names it.
+    """
+    try:
+        return claim("--listen", listen)
+    except InUseError:
+        where = near(listen)
+        there = runs_at(where) if accepting((where,)) else []
+        if not there:
+            raise
+        first = "" if (there[0], where) == (RUN, ENDPOINT) else f" --run {there[0]} --connect {where}"
+        beside = next_port(listen)
+        raise UsageError(
+            f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
+            f"gridpeers status{first} shows it, gridpeers down{first} ends it; to have both, give this one a name and "
+            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {near(beside)})"
+        ) from None
+
+
+def runs_at(endpoint: str) -> list[str]:
+    """Names of the runs whose plants are at an endpoint; none if nobody says so within `LOOKING` seconds."""
+    with RunClient(RunAddress(run=RUN, connect=(endpoint,))) as client:
+        client.until(lambda: bool(client.runs), LOOKING)
+        return sorted(client.runs)
+
+
+def check_alone(run: str, beyond: tuple[str, ...]) -> None:
+    """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    beyond : tuple[str, ...]
+        What the plant will connect to; without any, it cannot meet another plant.
+    """
+    if not beyond:
+        return
+    with RunClient(RunAddress(run=run, connect=beyond)) as client:
+        if client.until(lambda: client.plant, LOOKING):
+            raise UsageError(
+                f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
+                f"(gridpeers down --run {run} --connect {beyond[0]}), or give this run another name"
+            )

@@ -1,0 +1,204 @@
+"""What a visitor has heard of a run, put together: telemetry of the plant, status of the agents, tokens, nameplates.
+
+Pure: messages and the time are arguments.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from scenarios.live.show.events import line_of
+from scenarios.live.show.snapshot import Line, Snapshot
+from scenarios.short_names import in_order, short
+from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+SILENT = 1.5
+"""An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""
+
+_PER_INVERTER = 6
+"""Values of one inverter in a row of telemetry."""
+
+_KEPT = 100
+"""Events that are remembered."""
+
+
+class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """What the plant answers to "status", as far as it is shown; see `plant.realtime.run_commands`."""
+
+    phase: str
+    """gathering, running or closing."""
+    t: float
+    """Run time (s)."""
+    speed: float
+    """Run time per wall time (s/s)."""
+    pacing: Pacing
+    agents: tuple[str, ...] = ()
+    """Agents that take part."""
+    events: tuple[PlantEvent, ...] = ()
+    """The latest, oldest first."""
+    impaired: tuple[str, ...] = ()
+    """Agents between whom and the plant an emulated fault holds."""
+
+
+class RunMonitor:
+    """What is known of a run.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    """
+
+    def __init__(self, run: str) -> None:
+        self._run = run
+        self._plates: dict[str, AgentConfig] = {}
+        self._inverters: tuple[str, ...] = ()
+        self._row: tuple[float, ...] = ()
+        self._t: float | None = None
+        self._told: float | None = None
+        self._end: str | None = None
+        """Once the run has ended, why it broke; empty if it did not."""
+        self._life = 0
+        """Which life of the plant it is of."""
+        self._latest = 0.0
+        """Run time of its latest telemetry (s)."""
+        self._pacing: Pacing | None = None
+        self._impaired: tuple[str, ...] = ()
+        self._standing: PlantStatus | None = None
+        self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
+        self._status: dict[str, tuple[AgentStatus, float]] = {}
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of all inverters that were spoken of, in order."""
+        others = sorted(
+            (set(self._status) | set(self._plates)) - set(self._inverters), key=lambda name: (len(name), name)
+        )
+        return self._inverters + tuple(others)
+
+    @property
+    def has_plates(self) -> bool:
+        """Whether the nameplates of all inverters in the telemetry are here."""
+        return self._plates.keys() >= set(self._inverters)
+
+    def plate(self, config: AgentConfig) -> None:
+        """Note who an agent is."""
+        self._plates[config.name] = config
+
+    def standing(self, standing: PlantStatus) -> None:
+        """Note how the plant says the run stands."""
+        self._standing, self._impaired = standing, standing.impaired
+        if standing.phase != "gathering":
+            self._t, self._pacing = standing.t, standing.pacing
+        self._events.extend(standing.events)
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        """Note what the plant tells; `now` is the visitor's clock (s)."""
+        if message.incarnation != self._life:
+            if self._life:
+                self._events.clear()
+                self._standing = None
+            self._life, self._latest = message.incarnation, 0.0
+        if message.t < self._latest:
+            return  # published again for a recorder that has missed it
+        self._latest = message.t
+        if message.inverters != self._inverters:
+            self._row = ()
+        self._inverters, self._t, self._told = message.inverters, message.t, now
+        self._end = message.outcome if message.final else None
+        self._pacing = message.pacing or self._pacing
+        self._impaired = message.impaired
+        if message.rows:
+            self._row = message.rows[-1]
+        self._events.extend(event for event in message.events if event not in self._events)
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Note how an agent fares."""
+        self._status[message.sender] = (message, now)
+
+    def look(self, present: Collection[str], now: float) -> Snapshot:
+        """See it at one moment.
+
+        Parameters
+        ----------
+        present : Collection[str]
+            Inverters whose agents have a token.
+        now : float
+            The visitor's clock (s).
+        """
+        pace, current = self._pace(), True
+        if self._end is not None:
+            pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
+        elif self._told is not None and now - self._told > SILENT:
+            pace, current = f"the plant has been silent for {now - self._told:.0f} s", False
+        names = dict.fromkeys((*self.inverters, *in_order(present)))
+        return Snapshot(
+            run=self._run,
+            t=self._t,
+            pace=pace,
+            impaired=self._impaired if current else (),
+            lines=tuple(self._line(name, name in present, current, now) for name in names),
+            events=tuple(line_of(event) for event in self._events),
+        )
+
+    def _line(self, name: str, present: bool, current: bool, now: float) -> Line:
+        """One inverter; what the plant told of it only if that is current."""
+        f = P = Q = V = P_set = V_set = None
+        if current and name in self._inverters and self._row:
+            start = 1 + _PER_INVERTER * self._inverters.index(name)
+            f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
+        plate = self._plates.get(name)
+        status, at = self._status.get(name, (None, now))
+        if not present or now - at > SILENT:
+            status = None
+        ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
+        return Line(
+            name=name,
+            kind=plate.kind if plate else "",
+            island=status.island if status else "",
+            f=f,
+            P=None if P is None else P / 1e3,
+            P_set=None if P_set is None else P_set / 1e3,
+            P_share=None if P is None or plate is None else P / plate.P_rated,
+            Q=None if Q is None else Q / 1e3,
+            V=None if V is None or plate is None else V / plate.V_nom,
+            V_set=None if V_set is None or plate is None else V_set / plate.V_nom,
+            ages={neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used},
+            received=status.received if status else None,
+            sent=status.sent if status else None,
+            lost=status.lost if status else None,
+            rejected=status.rejected if status else None,
+            impaired=status.impaired if status else (),
+            note=self._note(name, present, status, now - at),
+        )
+
+    def _pace(self) -> str:
+        """How well the plant keeps real time, in a few words."""
+        pacing, standing = self._pacing, self._standing
+        if pacing is None or pacing.steps == 0:
+            return "waits for its agents" if standing is not None and standing.phase == "gathering" else ""
+        speed = f"speed {standing.speed:g}   " if standing is not None else ""
+        text = f"{speed}pace: {100.0 * (1.0 - pacing.late / pacing.steps):.2f} % of steps in time"
+        text += f" (p50 {1e3 * pacing.p50:.1f} ms, p99 {1e3 * pacing.p99:.1f} ms)"
+        return text + (f", fell behind by {pacing.slipped:.1f} s" if pacing.slipped > 0.0 else "")
+
+    def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
+        """What a person should know of an agent; age (s) is that of its last status."""
+        if not present:
+            return "no agent"
+        if status is None:
+            return f"silent for {age:.0f} s" if name in self._status else "has not told yet"
+        if status.phase != "running":
+            return f"waits for {status.waits_for}" if status.waits_for else status.phase
+        unused = [neighbour for neighbour in status.neighbours if neighbour not in status.used]
+        apart = [neighbour for neighbour in unused if self._island(neighbour) not in ("", status.island)]
+        silent = [neighbour for neighbour in unused if neighbour not in apart]
+        parts = (f"apart: {short(apart)}" if apart else "", f"without {short(silent)}" if silent else "")
+        return "; ".join(part for part in parts if part)
+
+    def _island(self, name: str) -> str:
+        return self._status[name][0].island if name in self._status else ""

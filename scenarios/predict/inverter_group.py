@@ -1,0 +1,187 @@
+"""What a prediction is made for: the inverters of one island under one rule of control, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.agent_config import Control, Gains
+from agents.topology import adjacency
+from plant.equipment import F_NOM, Feeder, InverterRow
+from plant.plant_config import GflParameters, GfmParameters
+from scenarios.results.history import Flags, Floats
+from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.agentless import without_agent
+from scenarios.spec.graph import graph_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fleet:
+    """N inverters that share one frequency.
+
+    Examples
+    --------
+    Three alike, one of them a leader, on a path:
+
+    >>> A = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    >>> fleet = Fleet(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
+    >>> fleet.kappa.round(2).tolist(), fleet.weight.round(2).tolist()
+    ([14.29, 14.29, 14.29], [0.33, 0.33, 0.33])
+    """
+
+    names: tuple[str, ...]
+    """Names, order of all arrays."""
+    GFM: Flags
+    """Which are grid-forming: the leaders, g_i = 1."""
+    A: Floats
+    """Adjacency c_ij (1), row = receiver, as `agents.topology.adjacency` gives it."""
+    acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """Which run the secondary law; the others keep their set-points. All, if left out."""
+    shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """Which have an agent: the sharing index is theirs, as in a run (`Plates.shares`). All, if left out."""
+    s: Floats = field(default_factory=lambda: np.zeros(0))
+    """Ratings (W); all alike, if left out."""
+    m_p: Floats = field(default_factory=lambda: np.zeros(0))
+    """P-f droops (pu per pu); 0.01, if left out."""
+    m_q: Floats = field(default_factory=lambda: np.zeros(0))
+    """Q-V droops (pu per pu); 0.05, if left out."""
+    gains: Gains = field(default_factory=Gains)
+    """Of the law; its limits are not part of a linear model."""
+    f_nom: float = F_NOM
+    """Nominal frequency (Hz)."""
+    T_c: float = 0.02
+    """Control period (s)."""
+    gfm: GfmParameters = field(default_factory=GfmParameters)
+    """Of the plant's GFM."""
+    gfl: GflParameters = field(default_factory=GflParameters)
+    """Of the plant's GFL."""
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        defaults = {"acts": True, "shares": True, "s": 1.0, "m_p": 0.01, "m_q": 0.05}
+        for name, value in defaults.items():
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, np.full(n, value))
+        if self.A.shape != (n, n):
+            raise ValueError(f"A must be {n} x {n}, one row per name, got {self.A.shape}")
+
+    @property
+    def n(self) -> int:
+        """Number N of inverters."""
+        return len(self.names)
+
+    @property
+    def leads(self) -> Flags:
+        """Who integrates the frequency error: GFM that run the law."""
+        leads: Flags = self.GFM & self.acts
+        return leads
+
+    @property
+    def kappa(self) -> Floats:
+        """Rates m_p / k_p (1/s)."""
+        return self.m_p / self.gains.k_p
+
+    @property
+    def weight(self) -> Floats:
+        """Part w_i of each inverter in the frequency, (s_i/m_i) / sum (s_j/m_j): e = sum w_i y_i - load."""
+        part = self.s / self.m_p
+        return np.asarray(part / part.sum())
+
+    @property
+    def heard(self) -> Floats:
+        """Links that carry something into the law: rows of those that run it."""
+        return np.where(self.acts[:, None], self.A, 0.0)
+
+    @property
+    def degree(self) -> Floats:
+        """Number d_i of neighbours that each listens to."""
+        return np.asarray(self.heard.sum(axis=1))
+
+    def part(self, which: NDArray[np.bool_]) -> Fleet:
+        """The fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
+        at = np.flatnonzero(which)
+        arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
+        return Fleet(
+            names=tuple(self.names[i] for i in at.tolist()),
+            A=self.A[np.ix_(at, at)],
+            gains=self.gains,
+            f_nom=self.f_nom,
+            T_c=self.T_c,
+            gfm=self.gfm,
+            gfl=self.gfl,
+            **arrays,
+        )
+
+
+def fleet_of(
+    scenario: Scenario,
+    feeder: Feeder,
+    case: str,
+    *,
+    roster: Collection[str] | None = None,
+    island: Collection[str] | None = None,
+) -> Fleet:
+    """The inverters of one case of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Checked.
+    feeder : Feeder
+        Its feeder.
+    case : str
+        Name of the case.
+    roster : Collection[str], optional
+        Who takes part in the run; the graph's rule is applied to these. Those of the start, if left out.
+    island : Collection[str], optional
+        Who stands in the island; the others are not heard. All of the roster, if left out.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> fleet = fleet_of(*load_scenario("islanding"), "IV")
+    >>> fleet.n, fleet.A.sum(), fleet.leads.sum()
+    (9, np.float64(72.0), np.int64(3))
+    """
+    rule = scenario.cases[case]
+    present = {row.name for row in feeder.inverters} if roster is None else set(roster)
+    rows = {row.name: row for row in inverters_of(scenario, feeder) if row.name in present}
+    graph, own_graph = graph_of(rule)
+    control = Control(
+        secondary=rule.secondary,
+        graph=graph,
+        own_graph=own_graph,
+        links=rule.links,
+        without=rule.without,
+        gains=rule.gains,
+    )
+    without = without_agent(scenario, case)
+    GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
+    fleet = Fleet(
+        names=tuple(rows),
+        GFM=GFM,
+        A=_adjacency(control, rows, without),
+        acts=np.array([control.acts(name, row.kind) and name not in without for name, row in rows.items()], bool),
+        shares=np.array([name not in without for name in rows], bool),
+        s=np.array([row.P_rated for row in rows.values()]),
+        m_p=np.array([row.m_p for row in rows.values()]),
+        m_q=np.array([row.m_q for row in rows.values()]),
+        gains=rule.gains,
+        f_nom=feeder.f_nom,
+        T_c=scenario.time.T_c_s,
+        gfm=scenario.plant.gfm,
+        gfl=scenario.plant.gfl,
+    )
+    return fleet if island is None else fleet.part(np.array([name in island for name in rows], bool))
+
+
+def _adjacency(control: Control, rows: Mapping[str, InverterRow], without: Collection[str]) -> Floats:
+    """Adjacency of all inverters; those without an agent have no link."""
+    A = np.zeros((len(rows), len(rows)))
+    at = [i for i, name in enumerate(rows) if name not in without]
+    A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))
+    return A

@@ -1,0 +1,266 @@
+r"""The whole loop, law and plant, as one linear map from tick to tick, with delays in ticks and losses.
+
+The law is that of `agents.laws.consensus`, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c) and
+b_i = 1 - exp(-kappa_i T_c):
+
+.. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e_i(k - m_i)
+
+where the mean is over y_j(k-1-n_ij). Delays in whole ticks: n_ij of a link beyond the one period that every state
+takes, m_i of the measurement, o of the own value in the comparison, s_i of the set-point on its way to the plant, which
+holds y_i(k-s_i).
+
+**Loss.** Of a lossy link the last value received is held. If each message is lost with probability p by itself, its
+mean obeys exactly H(k) = (1-p) y_j(k-1-n) + p H(k-1), as the draw is independent of what was sent. Its mean age is that
+of a delay of p/(1-p) ticks. The model follows the means; how far one run strays from them it does not tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from agents.laws.consensus import towards
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.response import PlantModel, response
+from scenarios.results.history import Floats
+
+Link = tuple[str, str]
+"""(src, dst)."""
+
+AT_REST = 1e-9
+"""Singular values of 1 - M below this belong to what the law never moves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ticks:
+    """Delays in control periods, and losses; a number holds for all, a mapping for whom it names (0 for the rest)."""
+
+    link: int | Mapping[Link, int] = 0
+    """Of neighbours' states beyond the one period they always take, by (src, dst)."""
+    measurement: int | Mapping[str, int] = 0
+    """Plant to agent, by inverter."""
+    setpoint: int | Mapping[str, int] = 0
+    """Agent to plant, by inverter."""
+    own: int = 0
+    """Of the own value where it is compared with the neighbours'; a correct agent has 0."""
+    loss: float | Mapping[Link, float] = 0.0
+    """Probability that a state is lost, by (src, dst); the last one heard is held."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """What happened, at the ticks after the load's step."""
+
+    t: Floats
+    """Time since the step (s)."""
+    e: Floats
+    """Frequency error (pu)."""
+    power: Floats
+    """m_p p of each inverter (pu frequency), shape (T, N)."""
+    set_point: Floats
+    """m_p P_set of each inverter (pu frequency), shape (T, N)."""
+
+
+@dataclass(kw_only=True)
+class _Delays:
+    """Ticks, spread out; rows are receivers."""
+
+    link: list[list[int]]
+    measurement: list[int]
+    setpoint: list[int]
+    loss: list[list[float]]
+    lossy: list[tuple[int, int]] = field(default_factory=list)
+    """(receiver, sender) of links that lose and carry something."""
+    depth: int = 1
+    """H: how many past set-points of everybody the loop needs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loop:
+    """Law and plant of one fleet under given delays.
+
+    Examples
+    --------
+    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
+    >>> Loop(fleet=nine).spectral_radius < 1.0
+    True
+    >>> Loop(fleet=nine, ticks=Ticks(measurement=40)).spectral_radius < 1.0
+    False
+    """
+
+    fleet: Fleet
+    ticks: Ticks = field(default_factory=Ticks)
+    plant: PlantModel = "lagged"
+    muted: int = 0
+    """Links with at least so many ticks of delay carry nothing yet; 0: all do. For the ticks after an islanding."""
+
+    @cached_property
+    def _delays(self) -> _Delays:
+        """The delays of every link and inverter, checked."""
+        fleet, names, ticks = self.fleet, self.fleet.names, self.ticks
+        found = _Delays(
+            link=[[_of(ticks.link, (src, dst)) for src in names] for dst in names],
+            measurement=[_of(ticks.measurement, name) for name in names],
+            setpoint=[_of(ticks.setpoint, name) for name in names],
+            loss=[[_of(ticks.loss, (src, dst)) for src in names] for dst in names],
+        )
+        every = (ticks.own, *found.measurement, *found.setpoint, *(n for row in found.link for n in row))
+        if any(n < 0 or n != int(n) for n in every):
+            raise ValueError(f"a delay is a whole number of control periods, 0 or more, got {min(every)}")
+        wrong = [p for row in found.loss for p in row if not 0.0 <= p < 1.0]
+        if wrong:
+            raise ValueError(f"loss is a probability from 0 to below 1, got {wrong[0]:g}; write 0.3 for 30 %")
+        found.lossy += [
+            (i, j) for i in range(fleet.n) for j in range(fleet.n) if fleet.heard[i, j] and found.loss[i][j] > 0.0
+        ]
+        found.depth = 1 + max(ticks.own, *found.setpoint, *(n for row in found.link for n in row))
+        return found
+
+    @property
+    def _heard(self) -> Floats:
+        """Links that carry something, without those that are muted."""
+        if not self.muted:
+            return self.fleet.heard
+        return np.where(np.array(self._delays.link) < self.muted, self.fleet.heard, 0.0)
+
+    @property
+    def gains(self) -> tuple[Floats, Floats]:
+        """Law's factors a_i (part of the way to the neighbours' mean) and g_i b_i (of the frequency error)."""
+        fleet = self.fleet
+        pairs = zip(fleet.kappa.tolist(), self._heard.sum(axis=1).tolist(), strict=True)
+        a = np.array([towards(kappa, d, fleet.T_c) for kappa, d in pairs])
+        return a, np.where(fleet.leads, 1.0 - np.exp(-fleet.kappa * fleet.T_c), 0.0)
+
+    @cached_property
+    def _built(self) -> tuple[Floats, Floats, Floats]:
+        """Map of the state, and the rows that read e and the powers from it.
+
+        The state: y(k-1), ..., y(k-H); x(k); e(k-1), ..., e(k-M); held values; the load.
+        """
+        fleet, plant = self.fleet, response(self.fleet, self.plant)
+        delays, n, states = self._delays, self.fleet.n, len(plant.A)
+        link, measurement, setpoint, loss = delays.link, delays.measurement, delays.setpoint, delays.loss
+        H, M = delays.depth, max(delays.measurement)
+        x0 = H * n
+        e0, held0 = x0 + states, x0 + states + M
+        load = held0 + len(delays.lossy)
+        one = np.eye(load + 1)
+
+        def y(back: int, i: int) -> Floats:
+            """y_i(k - back)."""
+            row: Floats = one[(back - 1) * n + i]
+            return row
+
+        before = np.array([y(1 + setpoint[i], i) for i in range(n)])
+        x = one[x0:e0]
+        e_now = plant.C @ x + plant.D @ before + plant.F * one[load]
+        powers = plant.C_p @ x + plant.D_p @ before + np.outer(plant.F_p, one[load])
+
+        held = {}
+        for k, (i, j) in enumerate(delays.lossy):
+            held[i, j] = (1.0 - loss[i][j]) * y(1 + link[i][j], j) + loss[i][j] * one[held0 + k]
+
+        (a, b), audible, new = self.gains, self._heard, []
+        degree = audible.sum(axis=1)
+        for i in range(n):
+            row = y(1, i)
+            if degree[i]:
+                row = row - a[i] * y(1 + self.ticks.own, i)
+                for j in np.flatnonzero(audible[i]).tolist():
+                    heard = held[i, j] if (i, j) in held else y(1 + link[i][j], j)
+                    row = row + (a[i] * audible[i, j] / degree[i]) * heard
+            if fleet.leads[i]:
+                row = row - b[i] * (one[e0 + measurement[i] - 1] if measurement[i] else e_now)
+            new.append(row)
+        now = np.array([y(setpoint[i], i) if setpoint[i] else new[i] for i in range(n)])
+        moved = plant.A @ x + plant.B @ now + np.outer(plant.E, one[load])
+        rows = [*new, *one[: (H - 1) * n], *moved]
+        rows += [e_now, *one[e0 : held0 - 1]] if M else []
+        rows += [*held.values(), one[load]]
+        return np.array(rows), e_now, powers
+
+    @property
+    def matrix(self) -> Floats:
+        """Map of the state of one tick to that of the next, the constant load last in it."""
+        return self._built[0]
+
+    @cached_property
+    def _free(self) -> Floats:
+        """The map without what is constant by itself: the load and who does not run the law."""
+        matrix = self.matrix
+        frozen = np.zeros(matrix.shape[0], bool)
+        frozen[-1] = True
+        frozen[: self._delays.depth * self.fleet.n] = np.tile(~self.fleet.acts, self._delays.depth)
+        keep = np.flatnonzero(~frozen)
+        return np.asarray(matrix[np.ix_(keep, keep)])
+
+    @cached_property
+    def resting(self) -> int:
+        """How many combinations of set-points the law never moves: 0 where frequency and sharing both come back.
+
+        One for each further group that nothing connects with the leaders' frequency; delays do not change it.
+        """
+        free = Loop(fleet=self.fleet, plant="quasi-steady")._free
+        singular = np.linalg.svd(np.eye(len(free)) - free, compute_uv=False)
+        return int((singular < AT_REST).sum())
+
+    @cached_property
+    def spectral_radius(self) -> float:
+        """Largest magnitude of an eigenvalue (1), those of what never moves left out; below 1 the loop is stable."""
+        values = np.linalg.eigvals(self._free)
+        values = values[np.argsort(np.abs(values - 1.0))][self.resting :]
+        return float(np.abs(values).max(initial=0.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether every mode that moves decays."""
+        return self.spectral_radius < 1.0 - 1e-12
+
+    def run(self, ticks: int, start: Floats, load: float, *, islanding: bool = False) -> Path:
+        """Step of the load: until t = 0 all stand still at nominal frequency, from then on the load is another.
+
+        Parameters
+        ----------
+        ticks : int
+            How many control periods to follow.
+        start : Floats
+            m_p P_set of each at the start (pu frequency).
+        load : float
+            From t = 0 on, in pu frequency: the mean m_p p that carries it.
+        islanding : bool, optional
+            Whether the island is new. Agents leave out states that were sent in another island than theirs (but at the
+            very tick of the change), so a link with n ticks of delay carries nothing at the ticks 2 to n + 1.
+
+        Notes
+        -----
+        The measurement of the event's own tick is taken before it, so the first that tells of it is the next one.
+        """
+        matrix, e_row, power_rows = self._built
+        plant, fleet = response(self.fleet, self.plant), self.fleet
+        n, states, H, lossy = fleet.n, len(plant.A), self._delays.depth, self._delays.lossy
+        z = np.zeros(matrix.shape[0])
+        z[: H * n] = np.tile(start, H)
+        x = plant.rest(start, float(fleet.weight @ start))
+        z[H * n : H * n + states] = plant.A @ x + plant.B @ start + plant.E * load
+        if lossy:
+            z[-1 - len(lossy) : -1] = start[[j for _, j in lossy]]
+        z[-1] = load
+        e, powers, set_points = np.zeros(ticks), np.zeros((ticks, n)), np.zeros((ticks, n))
+        step = sp.csr_array(matrix)
+        longest = max(n for row in self._delays.link for n in row) if islanding else 0
+        steps = {n: sp.csr_array(replace(self, muted=n).matrix) for n in range(1, longest + 1)}
+        for k in range(ticks):
+            e[k], powers[k] = e_row @ z, power_rows @ z
+            z = steps.get(k, step) @ z  # this is tick k + 1, and mute are links with n >= k
+            set_points[k] = z[:n]
+        t: Floats = np.arange(1.0, ticks + 1.0) * fleet.T_c
+        return Path(t, e, powers, set_points)
+
+
+def _of(value: float | Mapping[Any, Any], key: object) -> Any:
+    return value.get(key, 0) if isinstance(value, Mapping) else value

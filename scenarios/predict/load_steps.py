@@ -1,0 +1,103 @@
+"""What an event asks of each island: its load before and after, from the scenario's own plant on droop alone.
+
+Without agents and messages the plant runs through the events once (a second or so); what its inverters deliver at the
+end of each window is the load that control has to share. It is the load at the voltages of droop, a percent or two off
+what is drawn once the voltage is restored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from plant.build import build_plant
+from plant.dynamics import PlantError
+from plant.equipment import Feeder
+from plant.feeder import GRID, Plant, raise_for_trip
+from plant.plant_config import PlantConfig
+from scenarios.predict.times import LoadStep
+from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.configs import configs
+
+
+@dataclass(frozen=True, kw_only=True)
+class IslandStep:
+    """One island after one event."""
+
+    label: str
+    """Name of the event."""
+    t_s: float
+    """When (s)."""
+    roster: tuple[str, ...]
+    """Everybody on the network then."""
+    members: tuple[str, ...]
+    """Who stands in the island."""
+    load: LoadStep | None
+    """What they carry before and after; None if they come from several islands."""
+
+
+class LoadError(RuntimeError):
+    """The plant has no solution on droop alone; the message says where."""
+
+
+def load_steps(scenario: Scenario, feeder: Feeder) -> tuple[IslandStep, ...]:
+    """Islands without the grid after each event, and their steps of load.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Checked.
+    feeder : Feeder
+        Its feeder.
+
+    Raises
+    ------
+    LoadError
+        If the plant has no solution.
+    """
+    config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    rating = {row.name: row.P_rated for row in inverters_of(scenario, feeder)}
+    try:
+        return _through(scenario, config, rating)
+    except PlantError as error:
+        raise LoadError(f"on droop alone: {error}") from error
+
+
+def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) -> tuple[IslandStep, ...]:
+    plant, T = build_plant(config), scenario.time.T_c_s
+    on = set(plant.inverters) - set(config.settings.spares)
+    ends = [event.t_s for event in scenario.events[1:]] + [scenario.time.end_s]
+    before, found = _carried(plant, rating, on), []
+    for event, end in zip(scenario.events, ends, strict=True):
+        while (plant.tick + 1) * T <= end + 1e-9:
+            if plant.tick == round(event.t_s / T):
+                for name in (*event.leave, *event.join):
+                    plant.connect(name, name in event.join)
+                on = (on - set(event.leave)) | set(event.join)
+            plant.advance()
+        raise_for_trip(plant.take_events())
+        after = _carried(plant, rating, on)
+        roster = tuple(name for name in plant.inverters if name in on)
+        for members, (load, connected) in after.items():
+            if connected:
+                continue
+            former = [names for names in before if set(members) & set(names)]
+            step = None
+            if len(former) == 1:
+                start, fed = before[former[0]]
+                new = fed or former[0][0] != members[0]  # an island is known by its first inverter
+                step = LoadStep(start_pu=start, load_pu=load, islanding=new, joining=event.join)
+            found.append(IslandStep(label=event.label, t_s=event.t_s, roster=roster, members=members, load=step))
+        before = after
+    return tuple(found)
+
+
+def _carried(plant: Plant, rating: dict[str, float], on: set[str]) -> dict[tuple[str, ...], tuple[float, bool]]:
+    """Mean p (pu) of each island's inverters, and whether the grid feeds it."""
+    islands: dict[str, dict[str, float]] = {}
+    for name, reading in plant.measure().items():
+        if name in on:
+            islands.setdefault(reading.island, {})[name] = reading.P
+    return {
+        tuple(P): (sum(P.values()) / sum(rating[name] for name in P), island == GRID) for island, P in islands.items()
+    }

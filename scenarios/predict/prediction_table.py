@@ -1,0 +1,170 @@
+"""Predictions of a case as text for people, within 100 columns: each number with its unit and what it means."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+
+from scenarios.predict.closed_form import (
+    SETTLING,
+    Kind,
+    Modes,
+    delay_limit_closed,
+    equivalent_delay,
+    groups,
+    modes,
+    settling,
+)
+from scenarios.predict.delay_limits import delay_limit
+from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.linear_model import Loop
+from scenarios.predict.load_steps import IslandStep
+from scenarios.predict.sensitivity import Sensitivity
+from scenarios.predict.times import Times, predicted_times
+from scenarios.predict.vars import var_delay_limit, var_modes
+
+WIDTH = 100
+"""Columns."""
+
+Row = tuple[str, str, str, str]
+"""Quantity, by the continuous law, by ours in discrete time, what it means."""
+
+
+def case_text(title: str, fleet: Fleet, steps: Sequence[tuple[IslandStep, Fleet]], plant: Sensitivity | None) -> str:
+    """Everything that is predicted of one case.
+
+    Parameters
+    ----------
+    title : str
+        Heads the table.
+    fleet : Fleet
+        Everybody on the network at the start.
+    steps : sequence of (IslandStep, Fleet)
+        Islands after each event, and the inverters in them.
+    plant : Sensitivity, optional
+        For voltage and vars.
+    """
+    if not fleet.acts.any():
+        words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
+        return "\n".join([title, *_wrapped(words, "  ")])
+    found = modes(fleet)
+    lines = [title, *_wrapped(_words(fleet, found), "  ")]
+    lines += _aligned([("", "continuous", "our law", ""), *_rows(fleet, found)])
+    for step, island in steps:
+        lines += _event(step, island, whole=set(step.members) == set(step.roster))
+    lines += _vars(fleet, plant)
+    return "\n".join(lines)
+
+
+def _words(fleet: Fleet, found: Modes) -> str:
+    apart, leaders = groups(fleet), [name for name, leads in zip(fleet.names, fleet.leads, strict=True) if leads]
+    acting = int(fleet.acts.sum())
+    text = f"{acting} of {fleet.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
+    text += f"kappa {found.kappa:.3g} 1/s; T_c {fleet.T_c:g} s. "
+    if not leaders:
+        text += "Nobody leads, so nobody corrects the frequency. "
+    if len(apart) > 1:
+        text += f"The graph is not connected; its {len(apart)} parts ({' | '.join(' '.join(part) for part in apart)}) "
+        text += "agree on power within themselves only, so sharing among all never comes. "
+    if idle := int((fleet.shares & ~fleet.acts).sum()):
+        text += f"The other {idle} with an agent keep their set-points and take no part in sharing. "
+    if agentless := [name for name, shares in zip(fleet.names, fleet.shares, strict=True) if not shares]:
+        text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
+    return text.rstrip()
+
+
+def _rows(fleet: Fleet, found: Modes) -> list[Row]:
+    loop = Loop(fleet=fleet)
+    slowest = settling(-math.log(loop.spectral_radius) / fleet.T_c) if loop.stable else math.inf
+    kinds: tuple[Kind, ...] = ("neighbours", "disagreement", "local loop")
+    limits = {kind: delay_limit(fleet, kind) for kind in kinds}
+    closed = {kind: delay_limit_closed(fleet, kind) for kind in kinds}
+    return [
+        ("links", f"{found.links}", "", "undirected, among those that run the law"),
+        ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
+        ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
+        ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
+        ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
+        ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
+        ("2 % settling", _s(found.frequency_settling_s, "never"), _s(slowest, "never"), "four time constants of it"),
+        ("sharing 2 %", _s(found.sharing_settling_s, "never"), "", "the same of the sharing mode"),
+        ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
+        (
+            "delay: links",
+            _s(closed["neighbours"], "any"),
+            _limit(limits["neighbours"]),
+            "agent to agent, own value fresh",
+        ),
+        (
+            "delay: both",
+            _s(closed["disagreement"], "any"),
+            _limit(limits["disagreement"]),
+            "own value as late as neighbours'",
+        ),
+        (
+            "delay: plant",
+            _s(closed["local loop"], "any"),
+            _limit(limits["local loop"]),
+            "f as measured, or P_set, late",
+        ),
+        ("loss 50 %", "", _s(equivalent_delay(fleet.T_c, 0.5), ""), "held: as so much more delay on the links"),
+        ("loss 90 %", "", _s(equivalent_delay(fleet.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
+    ]
+
+
+def _event(step: IslandStep, island: Fleet, *, whole: bool) -> list[str]:
+    where = "" if whole else f" ({', '.join(step.members)})"
+    head = f"  {step.label} at {step.t_s:g} s{where}"
+    if not island.GFM.any():
+        return _wrapped(f"{head.strip()}: no GFM, so the island is dead", "  ")
+    if step.load is None:
+        return _wrapped(f"{head.strip()}: islands join, which is not predicted", "  ")
+    load = f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings"
+    return _wrapped(f"{head.strip()}: {load}: {_sentence(predicted_times(island, load=step.load))}", "  ")
+
+
+def _sentence(times: Times) -> str:
+    if times.report_s is not None:
+        return (
+            f"restored in {times.report_s:.2f} s (abs(f - f_nom) < 0.01 Hz for good in {times.restore_s:.2f} s, "
+            f"MPSI < 0.01 in {times.share_s:.2f} s)"
+        )
+    if times.restore_s is not None:
+        return f"frequency back in {times.restore_s:.2f} s, equal power never: {times.note}"
+    return f"not restored: {times.note}"
+
+
+def _vars(fleet: Fleet, plant: Sensitivity | None) -> list[str]:
+    if plant is None:
+        return ["  Voltage and vars: left out by --no-vars."]
+    if not all(name in plant.names for name in fleet.names):
+        return ["  Voltage and vars: not predicted with spare inverters."]
+    found, limit = var_modes(fleet, plant), var_delay_limit(fleet, plant)
+    if found.spectral_radius >= 1.0:
+        text = f"unstable on a plant without lags, spectral radius {found.spectral_radius:.4f}"
+    else:
+        text = f"slowest mode to 2 % in {found.settling_s:.2f} s; stable up to {_limit(limit)} of delay of measurement "
+        text += "or set-point (on a plant without lags; right to about one control period)"
+        text = text.replace("up to any of delay", "with any delay up to 1 s")
+    return _wrapped(f"Voltage and vars: {text}.", "  ")
+
+
+def _rate(rate: float) -> str:
+    return "none" if math.isinf(rate) else f"{rate:.2f} 1/s"
+
+
+def _s(seconds: float, without: str) -> str:
+    return without if math.isinf(seconds) else f"{seconds * 1e3:.1f} ms" if seconds < 0.0995 else f"{seconds:.2f} s"
+
+
+def _limit(seconds: float) -> str:
+    return "unstable" if math.isnan(seconds) else _s(seconds, "any")
+
+
+def _aligned(rows: Sequence[Row]) -> list[str]:
+    return [f"  {name:15}{left:>12}{right:>12}   {words}".rstrip() for name, left, right, words in rows]
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  ")

@@ -1,0 +1,106 @@
+"""Who stands in which island after each event of a scenario, and the part of a history that is one island's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from plant.equipment import Feeder
+from plant.network import Network
+from scenarios.results.history import Floats, History, Plates
+from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
+
+Islands = dict[str, tuple[str, ...]]
+"""Inverters of each island; an island is known by its first inverter."""
+
+
+class Spell(NamedTuple):
+    """A time during which there are several islands."""
+
+    start: float
+    """From the event that made them (s)."""
+    end: float
+    """To the next event, or for good (s)."""
+    islands: Islands
+
+
+Quantity = Callable[[History, Plates], Floats]
+"""A measure of each row."""
+
+
+def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
+    """Islands with inverters in them after each event, by its label.
+
+    Switches alone decide: an inverter that has left is still counted where it stands.
+
+    Examples
+    --------
+    >>> from scenarios.spec import load_scenario
+    >>> islands_of(*load_scenario("microgrid-switching"))["event2"]["inv4"]
+    ('inv4', 'inv5', 'inv6')
+    """
+    network = Network(feeder)
+    closed = network.closed0
+    rows = inverters_of(scenario, feeder)
+    found = {}
+    for event in scenario.events:
+        closed = closed - {network.switch_name(name) for name in event.open}
+        closed = closed | {network.switch_name(name) for name in event.close}
+        members = [tuple(row.name for row in rows if row.bus in buses) for buses in network.islands(closed)]
+        known = {names[0]: names for names in members if names}
+        found[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
+    return found
+
+
+def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[History, Plates]:
+    """The columns of some inverters alone, as if there were no others."""
+    at = np.array([history.inverters.index(name) for name in names])
+    columns = {
+        field.name: getattr(history, field.name)[:, at]
+        for field in fields(history)
+        if field.name not in ("inverters", "t")
+    }
+    mine = {field.name: getattr(plates, field.name)[at] for field in fields(plates) if field.name != "names"}
+    return replace(history, inverters=names, **columns), replace(plates, names=names, **mine)
+
+
+def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[History, Plates]:
+    """Return a history without the spare inverters that nobody ever started, and nameplates in its order.
+
+    In a run by hand all spare inverters have columns; in others those have that the scenario lets join.
+    """
+    rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
+    own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
+    names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
+    return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
+
+
+def spells_of(scenario: Scenario, feeder: Feeder) -> tuple[Spell, ...]:
+    """When there are several islands, and which."""
+    starts = [event.t_s for event in scenario.events]
+    found = islands_of(scenario, feeder).values()
+    times = zip(starts, [*starts, inf][1:], found, strict=True)
+    return tuple(Spell(start, end, islands) for start, end, islands in times if len(islands) > 1)
+
+
+def worst(quantity: Quantity, nominal: float, spells: Sequence[Spell]) -> Quantity:
+    """The measure of the island in which it is farthest from its nominal value, while there are several.
+
+    A mean over islands hides what is wrong in them: one is too fast, another too slow.
+    """
+
+    def measure(history: History, plates: Plates) -> Floats:
+        found = quantity(history, plates)
+        for spell in spells:
+            rows = (history.t > spell.start) & (history.t <= spell.end)
+            each = np.stack([quantity(*part_of(history, plates, names))[rows] for names in spell.islands.values()])
+            far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
+            found[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
+        return found
+
+    return measure

@@ -1,0 +1,150 @@
+"""The links and agents of a scenario that suffer: checked, and put together for one case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from pathlib import Path
+
+import msgspec
+
+from netem.models.own_fault import FAULTS
+from netem.netem_errors import Mistake
+from netem.spec.netem import Netem
+from netem.spec.node_fault import NodeFault
+from netem.spec.trace_file import with_traces
+from plant.equipment import Feeder
+from plant.plant_config import Move
+from scenarios.emulation.emulation_config import Setup
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.plugins import placed_plugin
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_model import Scenario
+
+
+def netem_of(scenario: Scenario, case: str) -> Netem:
+    """What all links and agents do in a case: the scenario's entries, then the case's own, with the scenario's seed."""
+    common, own = scenario.netem, scenario.cases[case].netem
+    return Netem(
+        seed=scenario.seed,
+        links=(*common.links, *own.links),
+        partitions=(*common.partitions, *own.partitions),
+        nodes=(*common.nodes, *own.nodes),
+    )
+
+
+def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> Setup:
+    """What the processes are told of a case's faults: islands resolved, as the scenario's switches make them."""
+    if any(partition.by == "island" for partition in netem.partitions):
+        netem = netem.over(_islands_over_time(scenario, feeder))
+    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
+    return Setup(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
+
+
+def deaths_of(netem: Netem) -> tuple[Move, ...]:
+    """Agents that die on schedule."""
+    return tuple(Move(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
+
+
+def _islands_over_time(scenario: Scenario, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
+    """From when on (s) each inverter stands in which island, named after the first bus in it."""
+    from plant.network import Network  # scipy: only for who parts by island
+
+    network = Network(feeder)
+    closed = set(network.closed0)
+    timeline = []
+    for t_s, opened, shut in [(0.0, (), ()), *((event.t_s, event.open, event.close) for event in scenario.events)]:
+        closed.difference_update(map(network.switch_name, opened))
+        closed.update(map(network.switch_name, shut))
+        islands = network.islands(frozenset(closed))
+        rows = (*feeder.inverters, *feeder.spares)
+        of = {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows}
+        timeline.append((t_s, of))
+    return timeline
+
+
+def is_calm(netem: Netem) -> bool:
+    """Whether there is no entry at all."""
+    return not (netem.links or netem.partitions or netem.nodes)
+
+
+def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenario:
+    """The scenario with the delays of its trace files, which are seen from its folder."""
+
+    def read(netem: Netem, path: str) -> Netem:
+        netem, wrong = with_traces(_with_folders(netem, folder), folder)
+        _add(wrong, path, mistakes)
+        return netem
+
+    cases = {
+        name: msgspec.structs.replace(case, netem=read(case.netem, f"case.{name}."))
+        for name, case in scenario.cases.items()
+    }
+    return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
+
+
+def _with_folders(netem: Netem, folder: Path) -> Netem:
+    """The entries with the folder of each fault of somebody's own that stands beside the file."""
+    if not any(fault.own for fault in netem.links):
+        return netem
+    replace = msgspec.structs.replace
+    own = [tuple(placed_plugin(it, FAULTS, folder) for it in fault.own) for fault in netem.links]
+    return replace(netem, links=tuple(replace(fault, own=it) for fault, it in zip(netem.links, own, strict=True)))
+
+
+def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -> None:
+    """Links, groups and agents exist, values are plausible, and no two entries contradict each other.
+
+    Without a feeder, which could not be read, nobody's name is known, and the rest is checked.
+    """
+    rows = inverters_of(scenario, feeder) if feeder else ()
+    names = tuple(row.name for row in rows) if feeder else None
+    microgrids = {row.name: row.microgrid for row in rows}
+    T_c = scenario.time.T_c_s
+    end_s = inf if mistakes.touch("time.end_s", "time") else scenario.time.end_s
+
+    def wrong_in(netem: Netem) -> list[Mistake]:
+        nodes = [mistake for i, node in enumerate(netem.nodes) for mistake in _wrong_node(f"node[{i}]", node, T_c)]
+        return netem.mistakes(names, microgrids, end_s) + nodes
+
+    common = wrong_in(scenario.netem)
+    _add(common, "", mistakes)
+    for name, case in scenario.cases.items():
+        path = f"case.{name}."
+        own = wrong_in(case.netem)
+        _add(own, path, mistakes)
+        if not common and not own and not is_calm(case.netem):
+            where = _paths_in(scenario.netem, path)
+            for mistake in wrong_in(netem_of(scenario, name)):
+                mistakes.add(where(mistake.path), mistake.text)
+
+
+def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Mistake]:
+    """What a run asks of an entry beyond what it says by itself."""
+    found = []
+    ticks = node.from_s / T_c
+    if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
+        near = max(1, round(ticks)) * T_c
+        text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; write {near:g}"
+        found.append(Mistake(f"{path}.from_s", text))
+    if node.skew is not None and (node.from_s or node.to_s is not None):
+        found.append(Mistake(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
+    return found
+
+
+def _add(wrong: list[Mistake], path: str, mistakes: Mistakes) -> None:
+    for mistake in wrong:
+        mistakes.add(path + mistake.path, mistake.text)
+
+
+def _paths_in(common: Netem, case: str) -> Callable[[str], str]:
+    """From the path of an entry among all of a case to where it is written: behind the common ones come the own."""
+    before = {"link": len(common.links), "partition": len(common.partitions), "node": len(common.nodes)}
+
+    def where(path: str) -> str:
+        kind, _, rest = path.partition("[")
+        index, _, rest = rest.partition("]")
+        place = int(index) - before[kind]
+        return f"{case}{kind}[{place}]{rest}" if place >= 0 else path
+
+    return where

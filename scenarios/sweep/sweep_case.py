@@ -1,0 +1,180 @@
+"""One run of a sweep, in whatever process it is done: from a checked scenario to a row of numbers.
+
+Nothing that a run can do ends the sweep: a plant without solution, and an error of the program too, is a row that
+says why.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import threading
+from collections import OrderedDict
+from dataclasses import asdict
+from functools import lru_cache
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from plant.build import build_plant
+from plant.feeder import Plant
+from plant.plant_config import PlantConfig
+from plant.tables import read_feeder
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.emulation.emulation_config import Setup
+from scenarios.results import metrics
+from scenarios.results.history import History, Plates
+from scenarios.results.joins_and_leaves import as_they_came
+from scenarios.results.link_records import LinkRecord
+from scenarios.results.message_counts import messages_saved
+from scenarios.results.own.measuring import own_measures
+from scenarios.results.record import Tape
+from scenarios.results.settling import settling
+from scenarios.spec import Scenario
+from scenarios.spec.agent_schedule import inverters_of
+from scenarios.spec.agentless import without_agent
+from scenarios.spec.configs import configs
+from scenarios.spec.scenario_changes import as_in
+
+KEPT_PLANTS = 4
+"""Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
+
+_kept = threading.local()  # a worker of Dask may be a thread among others
+
+_feeder = lru_cache(maxsize=8)(read_feeder)
+
+
+class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a run."""
+
+    number: int
+    """Its place in the plan, from 0."""
+    status: Literal["ran", "broke"]
+    """Whether it reached its end."""
+    why: str = ""
+    """Why it broke."""
+    sha256: str = ""
+    """Of the bytes that history.csv would have."""
+    links_sha256: str = ""
+    """Of all verdicts of the emulated links; "" without."""
+    trips: str = ""
+    """Who tripped, when and why; "" when nobody did. What is measured is of those that are left."""
+    metric_warnings: str = ""
+    """What of the scenario's own metrics has no value, and why; "" when all have."""
+    link_warnings: str = ""
+    """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
+    measures: dict[str, float | None] = {}
+    """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
+    "event1.steady", 1 where all of them are steady values, else 0;
+    and over all emulated links how many messages fared how, e.g. "links_dropped"."""
+
+
+def run_one(number: int, scenario: Scenario, case: str) -> SweepRow:
+    """Run one case in this thread and measure it."""
+    return run_with_history(number, scenario, case)[0]
+
+
+def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History | None]:
+    """Run one case in this thread and measure it; its history is None if it broke."""
+    try:
+        return _run(number, scenario, case)
+    except Exception as error:
+        text = str(error)
+        known = type(error).__name__ in ("PlantError", "RecordError")
+        return SweepRow(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}"), None
+
+
+def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History | None]:
+    feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
+    plant, agents = configs(scenario, feeder, case)
+    tape = Tape()
+    links = LinkRecord()
+    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant), on_links=links)
+    if outcome.broke:
+        return SweepRow(number=number, status="broke", why=outcome.broke), None
+    recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
+    history = History.of(recorded.inverters, recorded.rows)
+    plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
+    measures: dict[str, float | None] = {}
+    windows = metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
+    with np.errstate(all="ignore"):  # what is no number is told as such
+        for window in windows:
+            steady, settled = (of(history, plates, window, feeder.f_nom) for of in (metrics.measure, settling))
+            numbers = asdict(steady) | asdict(settled)
+            reasons = numbers.pop("reasons")
+            measures |= flat(window.label, numbers | {"steady": float(not reasons)})
+    saved = messages_saved(recorded.quiet, windows, len(agents), scenario.time.T_c_s)
+    own = own_measures(scenario, feeder, plates, {case: history}, {case: windows}, {case: saved}).get(case, {})
+    for label, found in own.items():
+        measures |= flat(label, dict(found.values))
+    failed = [f"{label}: {name} {text}" for label, found in own.items() for name, text in found.reasons.items()]
+    done = SweepRow(
+        number=number,
+        status="ran",
+        metric_warnings="; ".join(failed),
+        sha256=recorded.sha256,
+        links_sha256=links.sha256 if links.counts else "",
+        trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
+        link_warnings=_warnings(plant.links, links),
+        measures=measures | _accounts(links),
+    )
+    return done, history
+
+
+def _accounts(links: LinkRecord) -> dict[str, float | None]:
+    """Messages over all emulated links together; nothing where there are none."""
+    books = links.counts.values()
+    if not books:
+        return {}
+    return {
+        "links_sent": float(sum(book.sent for book in books)),
+        "links_delivered": float(sum(book.delivered for book in books)),
+        "links_dropped": float(sum(sum(book.dropped.values()) for book in books)),
+    }
+
+
+def _warnings(links: str, record: LinkRecord) -> str:
+    """Hold what emulated links did against what they were told, as every run does."""
+    if not record.counts:
+        return ""
+    from scenarios.results.link_check import LinkCheck  # scipy.stats takes longer to import than a run
+
+    setup = Setup.of_text(links)
+    check = LinkCheck(record, setup.netem, setup.microgrids)
+    return "; ".join((*check.warnings, *check.failures))
+
+
+def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
+    """Measures of one window as columns.
+
+    Examples
+    --------
+    >>> flat("event1", {"MPSI": 0.25, "t_restore_s": None, "p": {"inv1": 0.5}})
+    {'event1.MPSI': 0.25, 'event1.t_restore_s': None, 'event1.p.inv1': 0.5}
+    """
+    found: dict[str, float | None] = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found |= flat(f"{label}.{name}", value)
+        else:
+            found[f"{label}.{name}"] = value if value is not None and math.isfinite(value) else None
+    return found
+
+
+def plant_at_start(config: PlantConfig) -> Plant:
+    """A plant at t = 0, copied from one that this thread has built before for the same settings.
+
+    To factor the network and find the operating point is a fifth of a run, and what agents are told is no part of it.
+    A copy gives the same bytes as a new plant: a test holds it to that.
+    """
+    if not hasattr(_kept, "plants"):
+        _kept.plants = OrderedDict()
+    plants: OrderedDict[bytes, Plant] = _kept.plants
+    key = msgspec.json.encode((config.settings, config.T_c, config.record_step))  # tables in it have no hash
+    if key not in plants:
+        plants[key] = build_plant(config)
+        if len(plants) > KEPT_PLANTS:
+            plants.popitem(last=False)
+    plants.move_to_end(key)
+    return copy.deepcopy(plants[key])

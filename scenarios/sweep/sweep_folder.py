@@ -1,0 +1,167 @@
+"""The folder of a sweep: what it holds, whose it is, and which runs are done already.
+
+`runs.jsonl` is a journal: a line per finished run, written and flushed to the disk before the next. A line that was
+cut off by a kill has no line feed; it is removed when the sweep goes on, and its run is done again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+
+import msgspec
+
+from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
+from scenarios.run import versions
+from scenarios.spec.scenario_writing import to_toml
+from scenarios.sweep.file import Plan
+from scenarios.sweep.sweep_case import SweepRow
+
+MANIFEST, JOURNAL, LOCK = "sweep.json", "runs.jsonl", ".lock"
+
+
+def folder_of(out: Path | None, name: str) -> Path:
+    """Folder of a sweep: the same every time, so that the same command goes on with what was interrupted."""
+    return RUNS / "sweeps" / name if out is None else out
+
+
+class SweepFolder:
+    """The folder of one sweep, locked while it is open.
+
+    Parameters
+    ----------
+    folder : Path
+        New, empty, or this sweep's from before.
+    plan : Plan
+        The sweep.
+
+    Raises
+    ------
+    FolderError
+        If it belongs to something else, was begun with other versions, or is in use. Nothing is changed then.
+    """
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        self.path, self._size = folder, len(plan.runs)
+        self.done: dict[int, SweepRow] = {}
+        """Finished runs by number."""
+        whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
+        try:
+            known = _check(folder, whole)
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(folder)
+            if not known:
+                write_whole(folder / "sweep.toml", plan.text)
+                write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
+                write_whole(folder / MANIFEST, json.dumps(whole, indent=2) + "\n")
+            set_status(folder, "running")
+            self.done = _read(folder / JOURNAL, len(plan.runs))
+            self._journal = (folder / JOURNAL).open("ab")
+        except OSError as error:
+            raise FolderError(
+                f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
+            ) from None
+
+    def __enter__(self) -> SweepFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError):  # a run that found no room; those that are kept are on the disk already
+            self._journal.close()
+        os.close(self._lock)
+
+    @property
+    def kept(self) -> int:
+        """Number of finished runs that will be found again; Ctrl-C can come between keeping a run and counting it."""
+        return len(_read(self.path / JOURNAL, self._size))
+
+    def add(self, done: SweepRow) -> None:
+        """Keep a finished run."""
+        self._journal.write(msgspec.json.encode(done) + b"\n")
+        self._journal.flush()
+        os.fsync(self._journal.fileno())
+        self.done[done.number] = done
+
+
+def _check(folder: Path, whole: Mapping[str, object]) -> bool:
+    """Whether the folder is this sweep's from before; FolderError if it is something else's."""
+    where = f"--out {shown(folder)}"
+    if folder.exists() and not folder.is_dir():
+        raise FolderError(f"{where}: this is a file; give a folder")
+    manifest = folder / MANIFEST
+    if not manifest.is_file():
+        rest = (
+            [path.name for path in folder.iterdir() if path.name not in (LOCK, "sweep.toml", "scenario.toml")]
+            if (folder.is_dir())
+            else []
+        )
+        if any(not name.endswith(".partial") for name in rest):
+            raise FolderError(f"{where}: there are other things in it ({min(rest)}); give a new folder, or a sweep's")
+        return False
+    try:
+        found = json.loads(manifest.read_text(encoding="utf-8"))
+        name, runs, mark, made_with = (found[key] for key in ("name", "runs", "fingerprint", "versions"))
+    except (ValueError, KeyError, TypeError):
+        raise FolderError(f"{where}: its {MANIFEST} cannot be read; give another folder by --out") from None
+    if mark != whole["fingerprint"]:
+        same = "as it was before its file, its scenario or its feeder was changed" if name == whole["name"] else "now"
+        raise FolderError(
+            f'{where}: holds the sweep "{name}" of {runs} runs {same}, not "{whole["name"]}" of {whole["runs"]}; '
+            "give another folder by --out, or remove this one"
+        )
+    now = _versions()
+    other = [f"{key} {was}, here is {now.get(key, 'none')}" for key, was in made_with.items() if now.get(key) != was]
+    if other:
+        raise FolderError(
+            f"{where}: was begun with {'; '.join(other)}: rows of both would not compare to the last digit; go on with "
+            "the same versions, or begin in another folder by --out"
+        )
+    return True
+
+
+def _locked(folder: Path) -> int:
+    """Lock the folder for this process; the system opens the lock however the process ends."""
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise FolderError(f"--out {shown(folder)}: another `gridpeers sweep` is at work in it; let it end") from None
+    return handle
+
+
+def _read(journal: Path, runs: int) -> dict[int, SweepRow]:
+    """Finished runs; what a kill has left of a line is cut off."""
+    if not journal.exists():
+        return {}
+    text = journal.read_bytes()
+    whole = text[: text.rfind(b"\n") + 1]
+    if len(whole) < len(text):
+        with journal.open("r+b") as file:
+            file.truncate(len(whole))
+    found = {}
+    for number, line in enumerate(whole.splitlines(), start=1):
+        try:
+            done = msgspec.json.decode(line, type=SweepRow)
+        except msgspec.MsgspecError:
+            raise FolderError(
+                f"{shown(journal)}:{number}: this line is damaged; remove it, and its run is done again"
+            ) from None
+        if not 0 <= done.number < runs:
+            raise FolderError(
+                f"{shown(journal)}:{number}: there is no run {done.number} in this sweep; remove the line"
+            )
+        found[done.number] = done
+    return found
+
+
+def _versions() -> dict[str, str]:
+    """Versions that the numbers depend on; Zenoh has no part in a run in one process."""
+    return {name: version for name, version in versions().items() if name != "eclipse-zenoh"}
