@@ -53,8 +53,8 @@ def save(
     files = []
     for kind in formats:
         unfinished, file = folder / f".{name}.{kind}", folder / f"{name}.{kind}"
-        with mpl.rc_context(PAGE | _REPRODUCIBLE):
-            figure.savefig(unfinished, format=kind, metadata=dict(_UNDATED[kind]), dpi=dpi or PAGE["savefig.dpi"])
+        with mpl.rc_context(PAGE | _REPRODUCIBLE), unfinished.open("wb") as stream:  # closed whatever goes wrong
+            figure.savefig(stream, format=kind, metadata=dict(_UNDATED[kind]), dpi=dpi or PAGE["savefig.dpi"])
         unfinished.replace(file)
         files.append(file)
     return tuple(files)
