@@ -271,9 +271,10 @@ class LockstepAgent(AgentNode):
         if self._tick is None or seq == self._tick:
             self._early[name] = message, payload
             return
+        if seq > self._tick:  # the others go on without this agent: word that it is off the roster is on its way
+            return
         if seq != self._tick - 1:
-            kind = "stale" if seq < self._tick else "unexpected"
-            raise RejectedError(kind, f"State({seq}) of {name} before tick {self._tick}")
+            raise RejectedError("stale", f"State({seq}) of {name} before tick {self._tick}")
         self._barrier.came(name)
         self._use(message, payload)
         self._compute(now)
