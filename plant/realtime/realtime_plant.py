@@ -28,7 +28,6 @@ from plant.realtime.run_commands import RunCommands
 from plant.realtime.silence_detector import SilenceDetector
 from plant.telemetry_reporter import measurement_of
 from wire.admission import FASTER
-from wire.clock import time_of
 from wire.codec import encode
 from wire.links import Links, is_usable
 from wire.messages import (
@@ -37,7 +36,6 @@ from wire.messages import (
     Command,
     Leave,
     LinkAnswer,
-    LinkOrder,
     LinkReport,
     Nameplate,
     PlantEvent,
@@ -322,34 +320,10 @@ class RealtimePlant(PlantNode):
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:
         answer = self._commands.answer(command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
-        if answer.ok and command.verb == "link":
-            self.link_commands.send(self.members.nameplates, now)
-        elif answer.ok and command.verb == "links":
-            self.link_commands.ask(self.members.nameplates, self.t, command.reply_to)
+        if answer.ok:
+            self._commands.follow_up(command, now)
         if command.verb == "telemetry" and self.phase != "running":
             self._publish_again(self.kept.take_all())
-        if answer.ok and command.verb == "down":
-            self.close("the run was ended by command", now)
-
-    def command_links(self, text: str, reply_to: str, now: float) -> tuple[LinkOrder, str, tuple[str, ...]]:
-        """Have links carry out a command, from one control period after the due tick on: till then all know it.
-
-        Returns
-        -------
-        tuple[LinkOrder, str, tuple[str, ...]]
-            As `LinkCommandSender.give` does.
-
-        Raises
-        ------
-        ValueError
-            If it is no command to links, or the run has no emulated links.
-        """
-        overdue = max(0, int((now - self.pacer.due) / self.pacer.period))
-        t = time_of(self.tick + 1 + overdue, self.config.T_c) if self.phase == "running" else self.t
-        order, said, receivers = self.link_commands.give(text, t, reply_to)
-        noted = f"order {order.seq} to links: {said}" + (f", from t = {t:.2f} s on" if receivers else "")
-        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=noted))
-        return order, said, receivers
 
     def _connect(self, name: str, on: bool, now: float) -> None:
         """Put an inverter on the network, or take it off."""
@@ -448,6 +422,10 @@ class RealtimePlant(PlantNode):
     def events(self) -> tuple[PlantEvent, ...]:
         """The latest events, oldest first."""
         return tuple(self._reporter.latest)
+
+    def note_links(self, text: str) -> None:
+        """Note a command to links among the events."""
+        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=text))
 
     def _note(self, subject: str, text: str) -> None:
         self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:.2f} s"))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from wire.bounds import LIMIT
+from wire.clock import time_of
 from wire.messages import PLANT, Answer, Command
 from wire.printable import printable
 
@@ -27,7 +28,7 @@ class RunCommands:
         self._node = node
 
     def answer(self, command: Command, now: float) -> Answer:
-        """Carry a command out, but for "down", which is the plant's own; return its outcome."""
+        """Carry a command out, as far as that goes before its answer; return the answer."""
         node = self._node
         try:
             if node.phase not in ("gathering", "running") and command.verb != "telemetry":
@@ -43,6 +44,17 @@ class RunCommands:
             ok=ok,
             text=printable(text, LIMIT),
         )
+
+    def follow_up(self, command: Command, now: float) -> None:
+        """Do what a command entails once its answer is out."""
+        node = self._node
+        agents = node.members.nameplates
+        if command.verb == "link":
+            node.link_commands.send(agents, now)
+        elif command.verb == "links":
+            node.link_commands.ask(agents, node.t, command.reply_to)
+        elif command.verb == "down":
+            node.close("the run was ended by command", now)
 
     def _do(self, command: Command, now: float) -> str:
         node, verb, argument = self._node, command.verb, command.argument
@@ -71,14 +83,20 @@ class RunCommands:
         return f"switch {argument}: {verb} at t = {node.t:.2f} s"
 
     def _command_links(self, command: Command, now: float) -> dict[str, Any]:
-        """Return the command's number, from when on it holds (s), what it does, and the agents that are sent it."""
+        """Return the command's number, from when on it holds (s), what it does, and the agents that are sent it.
+
+        It holds from one control period after the due tick on: till then all know it.
+        """
         node = self._node
         agents = self._agents(present=True)
-        if command.verb == "link":
-            order, said, receivers = node.command_links(command.argument, command.reply_to, now)
-            return {"number": order.seq, "t": order.t, "asked": agents, "said": said, "receivers": receivers}
-        assert node.link_commands.links is not None  # a run without any is an error
-        return {"number": 0, "t": node.t, "asked": agents}
+        if command.verb == "links":
+            assert node.link_commands.links is not None  # a run without any is an error
+            return {"number": 0, "t": node.t, "asked": agents}
+        overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
+        t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
+        order, said, receivers = node.link_commands.give(command.argument, t, command.reply_to)
+        node.note_links(f"order {order.seq} to links: {said}" + (f", from t = {t:.2f} s on" if receivers else ""))
+        return {"number": order.seq, "t": order.t, "asked": agents, "said": said, "receivers": receivers}
 
     def _agents(self, *, present: bool) -> list[str]:
         met = self._node.members.nameplates
