@@ -65,11 +65,10 @@ def read(line: str) -> Word:
     Change(values={'delay': 0.2, 'jitter': 0.05}, directions=('back',))
     >>> read("stall 3")
     Stall(duration=3.0)
-    >>> read("delay fast")
+    >>> read("delay fast")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    netem.relay.relay_commands.WordError: delay: "fast" is no number; write e.g. "delay 0.2" (units: s, bytes/s,
-    probability)
+    netem.relay.relay_commands.WordError: delay: "fast" is no number; write e.g. "delay 0.2" ...
     """
     words = line.split()
     if len(words) == 1:

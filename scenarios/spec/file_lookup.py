@@ -34,8 +34,7 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    scenarios.spec.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? The sweeps of the catalogue are
-    ...
+    scenarios.spec.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? ...
     """
     names = names_in(folder)
     if name in names:
