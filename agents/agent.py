@@ -18,35 +18,9 @@ from agents.island_detector import IslandDetector
 from agents.laws.call import LawError, begun, decided
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING, Law, Neighbour, Own
+from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
-from wire.codec import RejectedError, decode, encode
 from wire.messages import OFF, Measurement, Nameplate, State
-
-
-def nameplate_of(config: AgentConfig) -> Nameplate:
-    """Make the nameplate of an agent from its configuration."""
-    return Nameplate(
-        sender=config.name,
-        incarnation=config.incarnation,
-        seq=0,
-        t=0.0,
-        kind=config.kind,
-        microgrid=config.microgrid,
-        P_rated=config.P_rated,
-        V_nom=config.V_nom,
-        f_nom=config.f_nom,
-        m_p=config.m_p,
-        m_q=config.m_q,
-    )
-
-
-def check_nameplate(config: AgentConfig) -> None:
-    """Raise ValueError if everybody would refuse the nameplate of an agent, as a value in it cannot be."""
-    try:
-        decode(encode(nameplate_of(config)))
-    except RejectedError as rejected:
-        raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
-
 
 SPEAKS = 0.5
 """Part of the age at which neighbours drop a state, after which they are told at the latest, whatever the law says."""
@@ -111,12 +85,12 @@ class Agent:
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.acts(config.name, config.kind)
         handling = config.control.handling
-        self._worth = StalenessWeights(handling)
+        self._weights = StalenessWeights(handling)
         self._silent_at_most = SPEAKS * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
         self._stops = handling.anti_windup == "conditional"
         self._is_told_islands = handling.islands == "switches"
-        self._slips = IslandDetector(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
-        self._follows_P, self._follows_V = SaturationDetector(handling.T_sat), SaturationDetector(handling.T_sat)
+        self._detector = IslandDetector(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
+        self._saturation_P, self._saturation_V = SaturationDetector(handling.T_sat), SaturationDetector(handling.T_sat)
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
@@ -142,11 +116,11 @@ class Agent:
 
     def _drop(self, name: str) -> None:
         self._heard.pop(name, None)
-        self._worth.forget(name)
-        if self._slips is not None:
-            self._slips.forget(name)
+        self._weights.forget(name)
+        if self._detector is not None:
+            self._detector.forget(name)
 
-    def let_go(self) -> None:
+    def restart(self) -> None:
         """Have the next tick start from the set-points that its measurement shows, as the first one does."""
         self._P_set = self._V_set = None
         self._law_runs = False
@@ -161,7 +135,7 @@ class Agent:
         state = self._heard.get(name)
         if state is not None and state.island == OFF:
             return False
-        if state is None or self._slips is not None:
+        if state is None or self._detector is not None:
             return state is not None and name not in self._apart
         return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
 
@@ -184,7 +158,7 @@ class Agent:
         if state.quiet:
             return  # its law does not tell: what it told last stands
         self._heard[state.sender] = state
-        self._worth.arrived(state.sender)
+        self._weights.arrived(state.sender)
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
@@ -214,17 +188,17 @@ class Agent:
         if self.fault:
             return self.stand_still(measurement)
         if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds
-            self.let_go()
+            self.restart()
             return self._state(measurement, measurement.P_set, measurement.V_set)
         config = self.config
         self._islands = (measurement.island, self._islands[0] or measurement.island)
-        if self._slips is not None:
-            self._apart = self._out_of_step(self._slips, measurement, neighbours)
+        if self._detector is not None:
+            self._apart = self._out_of_step(self._detector, measurement, neighbours)
         if not self._takes_part or measurement.grid_connected or self._P_set is None or self._V_set is None:
             # On hold the set-points follow the plant's, so that the law starts without a bump when the island forms.
             self._P_set, self._V_set = measurement.P_set, measurement.V_set
-            self._follows_P.begin()
-            self._follows_V.begin()
+            self._saturation_P.begin()
+            self._saturation_V.begin()
             self._law_runs = False
         counted = self._counted(measurement.t, neighbours, ages)  # on hold too: what is usual of a link is learnt there
         shared, send = NOTHING, True
@@ -251,7 +225,7 @@ class Agent:
 
         When the agent goes on, it begins from the set-points that the plant holds.
         """
-        self.let_go()
+        self.restart()
         return replace(self._state(measurement, measurement.P_set, measurement.V_set), Q=0.0, island="", idle=True)
 
     def _state(self, measurement: Measurement, P_set: float, V_set: float) -> State:
@@ -264,28 +238,28 @@ class Agent:
             V_set=V_set,
             Q=measurement.Q,
             island=measurement.island if self._is_told_islands or measurement.island == OFF else "",
-            angle=None if self._slips is None else self._slips.angle,
+            angle=None if self._detector is None else self._detector.angle,
         )
 
     def _out_of_step(
-        self, slips: IslandDetector, measurement: Measurement, neighbours: Sequence[str]
+        self, detector: IslandDetector, measurement: Measurement, neighbours: Sequence[str]
     ) -> frozenset[str]:
         """Neighbours that the frequency tells to stand in another island; on the grid nobody does."""
         t = measurement.t
         if measurement.grid_connected:
-            slips.restart()
-        slips.sensed(t, measurement.f)
+            detector.restart()
+        detector.sensed(t, measurement.f)
         for name in neighbours:
             if name in self._heard:
-                slips.heard(name, self._heard[name].t, self._heard[name].angle)
-        return frozenset(name for name in neighbours if slips.apart(name, t))
+                detector.heard(name, self._heard[name].t, self._heard[name].angle)
+        return frozenset(name for name in neighbours if detector.apart(name, t))
 
     def _own(self, m: Measurement) -> Own:
         """Return the own inverter as the law sees it."""
         config, e = self.config, (m.f - self.config.f_nom) / self.config.f_nom
         assert self._P_set is not None
         assert self._V_set is not None
-        P_saturated, V_saturated = self._in_vain(m, e) if self._stops else (0, 0)
+        P_saturated, V_saturated = self._saturated_sides(m, e) if self._stops else (0, 0)
         return Own(
             name=config.name,
             leader=self._leader,
@@ -312,14 +286,14 @@ class Agent:
         """Return age (s) and weight of the last state of each neighbour that counts."""
         heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
         aged = {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
-        return {name: (aged[name], weight) for name, weight in self._worth.at_tick(aged).items()}
+        return {name: (aged[name], weight) for name, weight in self._weights.at_tick(aged).items()}
 
-    def _in_vain(self, measurement: Measurement, e: float) -> tuple[int, int]:
+    def _saturated_sides(self, measurement: Measurement, e: float) -> tuple[int, int]:
         """Sides on which P and V have long been off (3), (7) and (4), (8) with the set-points that the plant holds."""
         config, m = self.config, measurement
         P = m.P / config.P_rated + e / config.m_p
         V = m.V / config.V_nom / config.m_q + m.Q / config.P_rated
         return (
-            self._follows_P.short_side(m.P_set / config.P_rated, P, m.t),
-            self._follows_V.short_side(m.V_set / config.V_nom / config.m_q, V, m.t),
+            self._saturation_P.saturated_side(m.P_set / config.P_rated, P, m.t),
+            self._saturation_V.saturated_side(m.V_set / config.V_nom / config.m_q, V, m.t),
         )

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from math import inf
 
-from agents.agent import Agent, check_nameplate
+from agents.agent import Agent
 from agents.agent_config import AgentConfig
 from agents.laws.law import Law
 from agents.neighbour_states import NeighbourStates
+from agents.own_nameplate import check_nameplate
 from wire.actions import Listen
 from wire.codec import RejectedError, encode
 from wire.links import Links, arrived, is_usable

@@ -106,8 +106,8 @@ class SaturationDetector:
 
     Examples
     --------
-    >>> power = SaturationDetector(T_sat=0.25)
-    >>> [power.short_side(should=1.0, does=0.8, t=t) for t in (1.0, 1.125, 1.25)], power.short_side(1.0, 1.0, t=1.5)
+    >>> P = SaturationDetector(T_sat=0.25)
+    >>> [P.saturated_side(should=1.0, does=0.8, t=t) for t in (1.0, 1.125, 1.25)], P.saturated_side(1.0, 1.0, t=1.5)
     ([0, 0, 1], 0)
     """
 
@@ -122,7 +122,7 @@ class SaturationDetector:
         self._side = 0
         self._since.clear()
 
-    def short_side(self, should: float, does: float, t: float) -> int:
+    def saturated_side(self, should: float, does: float, t: float) -> int:
         """1 where the inverter gives less than it should and cannot more, -1 where more and cannot less, else 0.
 
         Parameters

@@ -141,7 +141,7 @@ class RealtimeAgent(AgentNode):
         if self.session_broken:
             self.session_broken = False
             self._health.next_session()
-            self._agent.let_go()
+            self._agent.restart()
             self._forget_everybody()
 
     def expire(self, now: float) -> None:
@@ -299,7 +299,7 @@ class RealtimeAgent(AgentNode):
             self._say(why)
         self._used_neighbours = ()
         self.states.clear()
-        self._agent.let_go()
+        self._agent.restart()
 
     def _tick(self, at: float) -> None:
         """Tick at this time (s of run time on the own clock), if there is a measurement to tick with."""

@@ -7,8 +7,8 @@ from typing import Literal
 
 import msgspec
 
-from agents.agent import check_nameplate
 from agents.agent_config import AgentConfig
+from agents.own_nameplate import check_nameplate
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus, RunMonitor
 from scenarios.live.show.snapshot import Snapshot

@@ -196,8 +196,8 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
     follows, sign = SaturationDetector(T_sat=0.5), 1 if up else -1
     does = [sign * (1.0 - exp(-k * T / lag)) for k in range(300)]
 
-    assert {follows.short_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
-    assert [follows.short_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
+    assert {follows.saturated_side(float(sign), y, k * T) for k, y in enumerate(does)} == {0}
+    assert [follows.saturated_side(2.0 * sign, does[-1], (300 + k) * T) for k in range(27)] == [0] * 25 + [sign] * 2
 
 
 def test_the_default_is_the_papers() -> None:

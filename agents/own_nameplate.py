@@ -1,0 +1,32 @@
+"""The nameplate by which an agent is known to the others. Pure."""
+
+from __future__ import annotations
+
+from agents.agent_config import AgentConfig
+from wire.codec import RejectedError, decode, encode
+from wire.messages import Nameplate
+
+
+def nameplate_of(config: AgentConfig) -> Nameplate:
+    """Make the nameplate of an agent from its configuration."""
+    return Nameplate(
+        sender=config.name,
+        incarnation=config.incarnation,
+        seq=0,
+        t=0.0,
+        kind=config.kind,
+        microgrid=config.microgrid,
+        P_rated=config.P_rated,
+        V_nom=config.V_nom,
+        f_nom=config.f_nom,
+        m_p=config.m_p,
+        m_q=config.m_q,
+    )
+
+
+def check_nameplate(config: AgentConfig) -> None:
+    """Raise ValueError if everybody would refuse the nameplate of an agent, as a value in it cannot be."""
+    try:
+        decode(encode(nameplate_of(config)))
+    except RejectedError as rejected:
+        raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
