@@ -40,7 +40,7 @@ WINDOWS = ((0.5, 1.0), (2.0, 2.5), (5.5, 6.0))
 
 
 def ripple(removed: tuple[str, ...], switches: tuple[str, ...], gfl: GflParameters) -> str:
-    """Peak-to-peak power (kW) in each window."""
+    """Return the peak-to-peak power (kW) in each window."""
     feeder = read_feeder("microgrid123", "main")
     feeder = replace(feeder, inverters=tuple(unit for unit in feeder.inverters if unit.name not in removed))
     events = tuple(SwitchEvent(t=0.1, switch=name, action="open") for name in switches)

@@ -76,7 +76,7 @@ def swept(cases: Mapping[str, Mapping[str, Any]], end_s: float = 7.0, **plant: f
 
 
 def shown(row: Row, event: str, names: tuple[str, ...]) -> str:
-    """Values of one event of a run."""
+    """Return the values of one event of a run."""
     values = [row[f"{event}.{name}"] for name in names]
     return " / ".join("never" if np.isnan(x) else f"{x:.3f}" for x in values)
 

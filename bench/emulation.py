@@ -15,11 +15,11 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
-import platform
 import statistics
 from time import process_time
 
 import msgspec
+from machine import machine
 
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
@@ -81,7 +81,7 @@ def main() -> None:
         for name, value in took.items():
             times[name].append(value / base)
             fastest[name] = min(fastest[name], value)
-    print(f"{platform.system()}, Python {platform.python_version()}, load {os.getloadavg()[0]:.1f}")
+    print(machine())
     print(f"islanding, case {arguments.case}, {end:g} s simulated, {arguments.rounds} rounds; processor time\n")
     print(f"plain lock-step run in one process   {1e3 * statistics.median(plain):6.0f} ms\n")
     print("ratio to the plain run               median   (lowest to highest)    fastest to fastest")

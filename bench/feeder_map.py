@@ -39,7 +39,7 @@ HALO: Any = [withStroke(linewidth=2.0, foreground="white")]
 
 
 def colours_of(feeder: Feeder) -> dict[str, str]:
-    """Colour of each zone."""
+    """Return the colour of each zone."""
     zones = {bus.name: bus.zone for bus in feeder.buses}
     beside = {"", zones[feeder.source.bus] if feeder.source is not None else ""}
     first = [row.microgrid for row in feeder.inverters]
@@ -48,7 +48,7 @@ def colours_of(feeder: Feeder) -> dict[str, str]:
 
 
 def load_of(feeder: Feeder, buses: set[str]) -> float:
-    """Real load (W, at nominal voltage) at some buses."""
+    """Return the real load (W, at nominal voltage) at some buses."""
     return sum(phase.real for load in feeder.loads if load.bus in buses for phase in load.S)
 
 

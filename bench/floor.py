@@ -22,7 +22,7 @@ HELLO_PERIOD = 0.02
 
 
 def measure(peers: int, rounds: int) -> float:
-    """Time (s) of so many rounds with so many peers, their start not counted."""
+    """Return the time (s) of so many rounds with so many peers, their start not counted."""
     endpoint = rendezvous(())
     names = [f"p{i}" for i in range(peers)]
     command = [sys.executable, __file__, endpoint, str(rounds), json.dumps(names)]

@@ -18,8 +18,8 @@ from itertools import permutations
 from pathlib import Path
 from time import monotonic
 
-from latency import load, say, two_hosts
-from speed import machine
+from latency import two_hosts
+from machine import load, machine, say
 from watched import NotInTimeError, Watched, describe
 
 from scenarios.drivers.rendezvous import rendezvous
@@ -54,7 +54,7 @@ def wait(fleet: Watched, seconds: float) -> None:
 
 
 def sessions(logs: Path) -> int:
-    """How often agents said that they open a new session."""
+    """Return how often agents said that they open a new session."""
     return sum(path.read_text().count("opens a new session") for path in logs.glob("inv*.log"))
 
 
@@ -77,7 +77,7 @@ def healed(fleet: Watched) -> bool:
 
 
 def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int, int]:
-    """Times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
+    """Return the times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
     here = [name for name in fleet.names if name not in AWAY]
     took, disturbed, deaf = [], 0, 0
     for i in range(repeat):

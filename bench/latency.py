@@ -23,8 +23,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Literal
 
+from machine import load, machine, say
 from ping import TICK, one_way, round_trip
-from speed import machine
 from watched import HOLD, RUN, NotInTimeError, Watched, describe
 
 from scenarios.drivers.rendezvous import rendezvous
@@ -199,16 +199,6 @@ def two_hosts() -> Iterator[Hosts | None]:
     except NoHostsError as error:
         print(f"no cut: network namespaces cannot be made here: {error}")
         yield None
-
-
-def say(text: str) -> None:
-    """Show how far it is."""
-    print(f"{text} ...", file=sys.stderr, flush=True)
-
-
-def load() -> str:
-    """Load of the machine, which others may use too."""
-    return ", ".join(f"{value:.1f}" for value in os.getloadavg())
 
 
 def main() -> int:

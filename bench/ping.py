@@ -39,14 +39,14 @@ class StampedInbox(Inbox):
 
 
 def stamp_of(payload: bytes, offset: int = 0) -> float:
-    """Time (s) that stands in a payload."""
+    """Return the time (s) that stands in a payload."""
     return float(unpack_from("<q", payload, offset)[0]) * 1e-9
 
 
 def one_way(
     size: int, count: int, *, key: str, receiver: tuple[str, ...], sender: tuple[str, ...], connect: tuple[str, ...]
 ) -> list[float]:
-    """Times (s) that so many messages of so many bytes took at the rate of ticks.
+    """Return the times (s) that so many messages of so many bytes took at the rate of ticks.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def one_way(
 
 
 def round_trip(size: int, count: int, *, key: str, endpoint: str) -> list[float]:
-    """Times (s) of so many messages there and back, each sent when the one before is back."""
+    """Return the times (s) of so many messages there and back, each sent when the one before is back."""
     return _pair(("ping", key, size, count, (endpoint,), ()), ("echo", key, size, count, (), (endpoint,)))
 
 

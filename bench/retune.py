@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def best(found: dict[Point, dict[str, float | None]]) -> Point:
-    """The best point by the rule above."""
+    """Return the best point by the rule above."""
 
     def rank(point: Point) -> tuple[float, float, float]:
         MQSI = found[point]["event1.MQSI"]

@@ -19,9 +19,9 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from machine import machine
 from matplotlib.figure import Figure
 from ping import TICK
-from speed import machine
 
 from netem.relay import Faults, Relay
 from netem.tc import steps_without_netem, try_out
@@ -46,7 +46,7 @@ Times = list[float]
 
 
 def by_kernel(loss: float, count: int) -> list[Times]:
-    """Times (s) over TCP and over UDP in a network namespace whose loopback loses packets."""
+    """Return the times (s) over TCP and over UDP in a network namespace whose loopback loses packets."""
     name = f"gpsockets{os.getpid()}"
     subprocess.run(["ip", "netns", "add", name], check=True)
     try:
@@ -59,7 +59,7 @@ def by_kernel(loss: float, count: int) -> list[Times]:
 
 
 def by_relay(loss: float, count: int, seed: int) -> list[Times]:
-    """Times (s) over TCP and over UDP through relays that lose."""
+    """Return the times (s) over TCP and over UDP through relays that lose."""
     tcp, udp = free_endpoint("tcp"), free_endpoint("udp")
     with (
         Relay("tcp/127.0.0.1:0", tcp, seed=seed) as first,
@@ -74,7 +74,7 @@ def by_relay(loss: float, count: int, seed: int) -> list[Times]:
 
 
 def describe(label: str, times: Times) -> str:
-    """One line of numbers: the lost are not among those whose times are told."""
+    """Return one line of numbers: the lost are not among those whose times are told."""
     came = np.array([time for time in times if time < LOST]) * 1e3
     p50, p90, p99 = np.percentile(came, [50, 90, 99])
     lost = len(times) - len(came)

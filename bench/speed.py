@@ -13,18 +13,17 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
-import platform
 import statistics
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
-from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import floor
+from machine import machine
 
 import wire.codec
 from agents.agent import Agent
@@ -81,20 +80,8 @@ def main() -> None:
     print(f"start to end         : in one process {whole / one:5.2f}")
 
 
-def machine() -> str:
-    """One line on what this was measured with."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [row.partition(":")[2].strip() for row in cpuinfo.read_text().splitlines() if "model name" in row]
-        model = names[0] if names else model
-    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("eclipse-zenoh", "numba", "msgspec"))
-    return f"{model}, {os.cpu_count()} cores{load}; {platform.system()}, Python {platform.python_version()}, {versions}"
-
-
 def run_in_process(plant_config: Any, agent_configs: Any, folder: Path) -> float:
-    """Time (s) of one case in this process, plant built and history written included."""
+    """Return the time (s) of one case in this process, plant built and history written included."""
     began = perf_counter()
     with Recorder(folder) as recorder:
         outcome = run_inprocess(plant_config, agent_configs, recorder)
@@ -114,7 +101,7 @@ def run_fleet(plant_config: Any, agent_configs: Any, folder: Path) -> tuple[floa
 
 
 def breakdown(plant_config: Any, agent_configs: Any) -> dict[str, float]:
-    """Seconds by part of a warm run in one process, timed at the borders of the parts."""
+    """Return the seconds by part of a warm run in one process, timed at the borders of the parts."""
     spent: defaultdict[str, float] = defaultdict(float)
 
     def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -164,7 +151,7 @@ def breakdown(plant_config: Any, agent_configs: Any) -> dict[str, float]:
 
 
 def verdict(seconds: float, target: float) -> str:
-    """Whether a target is met."""
+    """Return whether a target is met."""
     return f"{'meets' if seconds < target else 'MISSES'} the target of {target:g} s"
 
 

@@ -15,12 +15,13 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
-import platform
 import resource
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter, process_time
+
+from machine import machine
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
@@ -69,7 +70,7 @@ def main() -> None:
         workers = resource.getrusage(resource.RUSAGE_CHILDREN)
         after = loop(plan.runs[half : 2 * half], folder / "after")
     one, all_cores = 2 * half / (before + after), len(plan.runs) / swept
-    print(f"{cores()} cores, load {os.getloadavg()[0]:.1f}; {platform.system()}, Python {platform.python_version()}")
+    print(machine())
     print(f"islanding, case IV: {plan.base.time.end_s:g} s simulated a run\n")
     print(f"{len(plan.runs)} samples checked            {read:7.2f} s   {1e3 * read / len(plan.runs):.1f} ms a sample")
     print(f"plain loop, {2 * half} runs           {before + after:7.2f} s   {one:6.2f} runs per second")
@@ -80,7 +81,7 @@ def main() -> None:
 
 
 def loop(runs: Sequence[Run], folder: Path) -> float:
-    """Time (s) of runs one after the other."""
+    """Return the time (s) of runs one after the other."""
     from plant.tables import read_feeder
 
     began = perf_counter()
@@ -99,7 +100,7 @@ def loop(runs: Sequence[Run], folder: Path) -> float:
 
 
 def sweep(plan: Plan, folder: Path) -> float:
-    """Time (s) of all runs on all cores, the start of the workers included."""
+    """Return the time (s) of all runs on all cores, the start of the workers included."""
     began = perf_counter()
     with SweepFolder(folder, plan) as opened:
         for done in on_this_machine(list(enumerate(plan.runs)), cores()):

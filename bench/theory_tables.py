@@ -20,7 +20,7 @@ from gridpeers.theory import (
     delay_limit,
     feeder_of,
     first_window,
-    fleet_of,
+    inverter_group_of,
     load_steps,
     predicted_times,
     sensitivity,
@@ -37,7 +37,7 @@ CUT = {"without": [["inv4", "inv7"]]}
 
 
 def star(hub: int) -> dict[str, Any]:
-    """Links of one inverter with each of the others."""
+    """Return the links of one inverter with each of the others."""
     return {"graph": "links", "links": [[f"inv{hub}", f"inv{i}"] for i in range(1, 10) if i != hub]}
 
 
@@ -70,31 +70,31 @@ def scenario() -> gp.Scenario:
 
 
 def name(title: str) -> str:
-    """Name of the case of a graph."""
+    """Return the name of the case of a graph."""
     return "".join(c for c in title if c.isalnum())
 
 
 @cache
 def calm() -> Spec:
-    """The scenario with its first event alone."""
+    """Return the scenario with its first event alone."""
     return first_window(scenario().spec, 3.0)
 
 
 @cache
 def load() -> LoadStep:
-    """The step of load of islanding."""
+    """Return the step of load of islanding."""
     (step,) = load_steps(calm(), feeder_of(scenario().spec))
     assert step.load is not None
     return step.load
 
 
 def fleet(title: str) -> Any:
-    """The inverters on a graph."""
-    return fleet_of(scenario().spec, feeder_of(scenario().spec), name(title))
+    """Return the inverters on a graph."""
+    return inverter_group_of(scenario().spec, feeder_of(scenario().spec), name(title))
 
 
 def measured(titles: tuple[str, ...], end_s: float, d: float) -> dict[tuple[str, float], str]:
-    """Times to restore and to share on the plant, by graph and k_q."""
+    """Return the times to restore and to share on the plant, by graph and k_q."""
     link = [{"on": "* <-> *", "delay": d}] if d else None
     rows = gp.sweep(
         scenario().replace({"time.end_s": end_s, "link": link}),
@@ -110,7 +110,7 @@ def measured(titles: tuple[str, ...], end_s: float, d: float) -> dict[tuple[str,
 
 
 def both(restore_s: float | None, share_s: float | None) -> str:
-    """Two times in words; never as None or not a number."""
+    """Return two times in words; never as None or not a number."""
     return " | ".join("never" if t is None or np.isnan(t) else f"{t:.3g}" for t in (restore_s, share_s))
 
 

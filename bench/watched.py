@@ -303,6 +303,6 @@ class Watched:
 
 
 def describe(samples: Sequence[float]) -> str:
-    """Columns of n, p50, p95 and max (ms)."""
+    """Return the columns of n, p50, p95 and max (ms)."""
     p50, p95, worst = (1e3 * float(np.percentile(samples, q)) for q in (50, 95, 100))
     return f"{len(samples):6} {p50:9.2f} {p95:9.2f} {worst:9.2f}"

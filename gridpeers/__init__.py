@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
     from plant.equipment import Feeder
-    from scenarios.results.claims.claim import Claim
-    from scenarios.results.own.claim_registry import CLAIMS
+    from scenarios.results.benchmark_registry import CLAIMS
+    from scenarios.results.claims import Claim
     from scenarios.results.own.metric import METRICS
-    from scenarios.results.own.window_data import WindowData
+    from scenarios.results.own.window_metrics import WindowData
     from scenarios.results.run_files import FolderError
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
-    "Claim": "scenarios.results.claims.claim",
+    "Claim": "scenarios.results.claims",
     "Comparison": "gridpeers.studies.comparison",
     "Feeder": "plant.equipment",
     "FolderError": "scenarios.results.run_files",
@@ -64,9 +64,9 @@ _HOME = {
     "ScenarioError": "scenarios.spec.scenario_errors",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.parameters",
-    "WindowData": "scenarios.results.own.window_data",
+    "WindowData": "scenarios.results.own.window_metrics",
     "catalogue": "scenarios.spec.loading",
-    "claim": "scenarios.results.own.claim_registry:CLAIMS.register",
+    "claim": "scenarios.results.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.law_registry:LAWS.register",

@@ -5,12 +5,19 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from scenarios.results.benchmark_registry import BENCHMARKS, Benchmark, benchmark_of
-from scenarios.results.claims.claim import Claim, Judge, Verdict, judge
+from scenarios.results.benchmark_registry import (
+    BENCHMARKS,
+    DIGITS,
+    HEADINGS,
+    UNITS,
+    Benchmark,
+    Published,
+    Quantity,
+    benchmark_of,
+)
+from scenarios.results.claims import Claim, Judge, Verdict, judge
 from scenarios.results.findings import Findings, label
 from scenarios.results.metrics import F_BAND, MPSI_BAND, Steady
-from scenarios.results.published import Published
-from scenarios.results.quantities import DIGITS, HEADINGS, UNITS, Quantity
 from scenarios.results.settling import Settling
 
 __all__ = [

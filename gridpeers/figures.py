@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.plots.saving import Format, save
-from scenarios.results.plots.style import PAGE, case_styles
+from scenarios.results.plots.style import PAGE, Format, case_styles, save
 
 __all__ = [
     "PAGE",

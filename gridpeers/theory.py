@@ -11,13 +11,12 @@ from netem.spec.netem import Netem
 from plant.equipment import Feeder
 from plant.tables import read_feeder
 from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import Fleet, fleet_of
+from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.predict.load_steps import load_steps
-from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
 from scenarios.predict.var_response import VarResponse, var_growth, var_response
-from scenarios.predict.vars import var_delay_limit
+from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
 from scenarios.spec import Case
 from scenarios.spec import Scenario as Spec
 from scenarios.spec.scenario_changes import as_in
@@ -25,7 +24,7 @@ from scenarios.spec.scenario_changes import as_in
 __all__ = [
     "Case",
     "Feeder",
-    "Fleet",
+    "InverterGroup",
     "LoadStep",
     "Loop",
     "Sensitivity",
@@ -36,7 +35,7 @@ __all__ = [
     "delay_limit",
     "feeder_of",
     "first_window",
-    "fleet_of",
+    "inverter_group_of",
     "load_steps",
     "predicted_times",
     "sensitivity",

@@ -24,19 +24,17 @@ from scenarios.drivers.ports import endpoint
 from scenarios.emulation.emulation_config import Setup
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.claims import judge
+from scenarios.results.claims import judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
 from scenarios.results.link_records import LinkRecord
-from scenarios.results.message_counts import messages_saved
-from scenarios.results.metrics import windows
+from scenarios.results.metrics import messages_saved, windows
 from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
-from scenarios.results.own.measuring import own_measures
-from scenarios.results.own.own_claim import judged
+from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.report import Report, plain
+from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.agentless import with_agent
@@ -77,7 +75,7 @@ class Request(RunMetrics):
     """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
 
 
-def run(request: Request, progress: Progress) -> Report:
+def run(request: Request, progress: Progress) -> RunReport:
     """Run all cases and write the whole folder.
 
     Raises
@@ -101,7 +99,7 @@ def run(request: Request, progress: Progress) -> Report:
         raise BrokenRunError(text) from error
 
 
-def _logged(request: Request, progress: Progress) -> Report:
+def _logged(request: Request, progress: Progress) -> RunReport:
     """Run all cases; what breaks them is in the log, an error of the program with its traceback."""
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
@@ -118,7 +116,7 @@ def _logged(request: Request, progress: Progress) -> Report:
             raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
 
 
-def _run(request: Request, progress: Progress, log: TextIO) -> Report:
+def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     scenario, folder, place = request.scenario, request.folder, shown(request.folder)
     write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
     recorded, notes = {}, []
@@ -176,7 +174,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> Report:
     if request.lasting:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
     benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
-    report = Report(
+    report = RunReport(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
         found=found,

@@ -1,1 +1,1 @@
-"""Our plant against GridLAB-D; see `bench.gridlabd.__main__`."""
+"""Our plant against GridLAB-D; see `bench.gridlabd.compare_gridlabd`."""

@@ -71,7 +71,7 @@ class Core:
             function.restype, function.argtypes = result, arguments
 
     def clock(self) -> int:
-        """Time (s)."""
+        """Return the time (s)."""
         return ctypes.c_int64.in_dll(self._library, "global_clock").value
 
     def module(self, name: str) -> Any:

@@ -144,7 +144,7 @@ class Twin:
         self.tick += 1
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Rows of every step since the last call, laid out as those of `Plant.take_rows`."""
+        """Return the rows of every step since the last call, laid out as those of `Plant.take_rows`."""
         rows, self._rows = tuple(self._rows), []
         return rows
 

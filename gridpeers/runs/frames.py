@@ -8,33 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from scenarios.results.history import History
 from scenarios.results.link_records import COLUMNS
 from scenarios.sweep.column_labels import unit_of
-
-UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
-"""Units of a history's index and quantities."""
-
-
-def history_frame(history: History) -> pd.DataFrame:
-    """Return a case with columns (inverter, quantity) over time; the units are in its `attrs`.
-
-    Examples
-    --------
-    >>> row = (0.0, 60.0, 3e5, 1e4, 2400.0, 3.1e5, 2401.0)
-    >>> frame = history_frame(History.of(("inv1",), [row]))
-    >>> float(frame["inv1"]["P"][0.0]), frame.attrs["units"]["P"]
-    (300000.0, 'W')
-    """
-    quantities = [name for name in UNITS if name != "t"]
-    values = np.stack([getattr(history, name) for name in quantities], axis=2).reshape(len(history.t), -1)
-    columns = pd.MultiIndex.from_product([history.inverters, quantities], names=["inverter", "quantity"])
-    frame = pd.DataFrame(values, index=pd.Index(history.t, name="t"), columns=columns)
-    frame.attrs["units"] = dict(UNITS)
-    return frame
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

@@ -21,14 +21,13 @@ from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
 from scenarios.results.benchmark_registry import benchmark_of
-from scenarios.results.claims import Verdict, judge
+from scenarios.results.claims import Verdict, judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, Plates, read_history
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import windows
-from scenarios.results.own.measuring import own_measures
-from scenarios.results.own.own_claim import judged
+from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.spec import scenario_model as model
 from scenarios.spec.agent_schedule import inverters_of
@@ -227,7 +226,7 @@ class Result:
     @cached_property
     def history(self) -> pd.DataFrame:
         """Terminal quantities over time: columns (inverter, quantity), index t (s), units in `attrs["units"]`."""
-        return frames.history_frame(self.record)
+        return self.record.frame()
 
     @cached_property
     def metrics(self) -> pd.DataFrame:

@@ -19,11 +19,11 @@ from scenarios.sweep.file.paths import flatten
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Run = Result | Results | str | Path
+RunSource = Result | Results | str | Path
 """A result, results of several cases, or the folder of either."""
 
 
-def compare(a: Run, b: Run, *, names: tuple[str, str] = ("a", "b")) -> Comparison:
+def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) -> Comparison:
     """Compare two runs.
 
     Parameters

@@ -11,20 +11,20 @@ import pandas as pd
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
-from scenarios.predict.closed_form import Kind, delay_limit_closed, modes
+from scenarios.predict.closed_form import DelayKind, delay_limit_closed, modes
 from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import Fleet, fleet_of
+from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.predict.load_steps import IslandStep, LoadError, load_steps
 from scenarios.predict.prediction_table import case_text
-from scenarios.predict.sensitivity import Sensitivity, sensitivity
 from scenarios.predict.times import predicted_times
+from scenarios.predict.vars import Sensitivity, sensitivity
 from scenarios.run import BrokenRunError
 from scenarios.spec import ScenarioError
 from scenarios.spec import scenario_model as model
 from scenarios.spec.law_choice import PAPER, law_of
 from scenarios.spec.netem_tables import is_calm, netem_of
 
-_LIMITS: dict[str, Kind] = {
+_LIMITS: dict[str, DelayKind] = {
     "agent to agent": "neighbours",
     "agent to agent, own value as late": "disagreement",
     "plant to agent or back": "local loop",
@@ -70,11 +70,13 @@ def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[
         raise BrokenRunError(f"{spec.name}: {error}") from error
     found = {}
     for name, rule in spec.cases.items():
-        islands = [(step, fleet_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps]
+        islands = [
+            (step, inverter_group_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps
+        ]
         title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
         if not is_calm(netem_of(spec, name)):
             title += "; without its faults of links and nodes, which these numbers leave out"
-        found[name] = Prediction(title, fleet_of(spec, feeder, name), islands, plant)
+        found[name] = Prediction(title, inverter_group_of(spec, feeder, name), islands, plant)
     return found
 
 
@@ -85,16 +87,20 @@ class Prediction:
     ----------
     title : str
         Scenario and case.
-    fleet : Fleet
+    fleet : InverterGroup
         The inverters at the start, and who listens to whom.
-    islands : list of (IslandStep, Fleet)
+    islands : list of (IslandStep, InverterGroup)
         Islands after each event.
     plant : Sensitivity or None
         How voltage and vars answer; None leaves them out.
     """
 
     def __init__(
-        self, title: str, fleet: Fleet, islands: list[tuple[IslandStep, Fleet]], plant: Sensitivity | None
+        self,
+        title: str,
+        fleet: InverterGroup,
+        islands: list[tuple[IslandStep, InverterGroup]],
+        plant: Sensitivity | None,
     ) -> None:
         self.title = title
         """Scenario and case."""

@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-from gridpeers.runs import frames
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
@@ -24,8 +23,7 @@ from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file.plan import Plan, Run
 from scenarios.sweep.file.sweep_model import Sweep
 from scenarios.sweep.file.sweep_reading import Base, plan_of
-from scenarios.sweep.sweep_case import SweepRow, run_one, run_with_history
-from scenarios.sweep.sweep_columns import FATE, columns_of
+from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of, run_one, run_with_history
 from wire.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
@@ -93,7 +91,7 @@ def sweep(
     for end, history in _results(runs, _jobs(plan, jobs), histories=histories):
         done[end.number] = end
         if history is not None:
-            kept[end.number] = frames.history_frame(history)
+            kept[end.number] = history.frame()
         if progress is not None:
             progress(len(done), len(runs))
     columns = columns_of(plan, done)

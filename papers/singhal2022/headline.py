@@ -11,7 +11,7 @@ from papers.singhal2022.tables import Cell, PaperTable
 from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
 
 
-class Number(NamedTuple):
+class ComparedNumber(NamedTuple):
     """A number of the paper with ours."""
 
     cell: Cell
@@ -19,28 +19,28 @@ class Number(NamedTuple):
     """Not a number where ours is not steady."""
 
 
-def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[Number]:
-    """All numbers of tables that were run, ours beside the paper's."""
+def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[ComparedNumber]:
+    """Return all numbers of tables that were run, ours beside the paper's."""
     return [
-        Number(cell, float("nan") if found.reason(cell) else found.value(cell))
+        ComparedNumber(cell, float("nan") if found.reason(cell) else found.value(cell))
         for table in tables
         for cell in table.cells
         if found.has(cell)
     ]
 
 
-def headline(all_numbers: Sequence[Number]) -> list[str]:
+def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
     """Lines on what is within its tolerance, what is not judged by one, and V_error beside its own size."""
     return [*_judged(all_numbers), *_by_factor(all_numbers), *_relative(all_numbers)]
 
 
-def within(all_numbers: Iterable[Number], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
-    """How many numbers pass a judgement, and how many it is about."""
+def within(all_numbers: Iterable[ComparedNumber], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
+    """Return how many numbers pass a judgement, and how many it is about."""
     passed = [judge(cell, ours) for cell, ours in all_numbers]
     return sum(map(bool, passed)), sum(verdict is not None for verdict in passed)
 
 
-def _judged(all_numbers: Sequence[Number]) -> list[str]:
+def _judged(all_numbers: Sequence[ComparedNumber]) -> list[str]:
     near, judged = within(all_numbers, Cell.within)
     if not judged:
         return []
@@ -48,8 +48,8 @@ def _judged(all_numbers: Sequence[Number]) -> list[str]:
     return [f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it."]
 
 
-def _by_factor(all_numbers: Sequence[Number]) -> list[str]:
-    """The numbers that the first line leaves out."""
+def _by_factor(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    """Return the numbers that the first line leaves out."""
     left = [number for number in all_numbers if number.cell.tolerance.value is None]
     if not left:
         return []
@@ -63,7 +63,7 @@ def _by_factor(all_numbers: Sequence[Number]) -> list[str]:
     ]
 
 
-def _relative(all_numbers: Sequence[Number]) -> list[str]:
+def _relative(all_numbers: Sequence[ComparedNumber]) -> list[str]:
     about = [number for number in all_numbers if number.cell.relative is not None]
     if not about:
         return []
@@ -75,15 +75,15 @@ def _relative(all_numbers: Sequence[Number]) -> list[str]:
     ]
 
 
-def _farthest(some: Sequence[Number], off: Callable[[Cell, float], float]) -> str:
-    """The number that is farthest off, ours for the paper's; one that is no number is farther than all."""
+def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float]) -> str:
+    """Return the number that is farthest off, ours for the paper's; one that is no number is farther than all."""
     cell, ours = max(some, key=lambda one: math.inf if math.isnan(one.ours) else off(*one))
     shown = "not steady" if math.isnan(ours) else f"{ours:.{cell.digits + 1}f}"
     return f"{shown} for {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
 
 
-def _tables(some: Iterable[Number]) -> str:
-    """Tables by their numbers, e.g. "Tables I and II"."""
+def _tables(some: Iterable[ComparedNumber]) -> str:
+    """Return the tables by their numbers, e.g. "Tables I and II"."""
     named = list(dict.fromkeys(number.cell.table for number in some))
     if len(named) == 1:
         return f"Table {named[0]}"

@@ -10,14 +10,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gridpeers.benchmarks import DIGITS, Published, Quantity
-from papers.singhal2022.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, Number, Tolerance
+from papers.singhal2022.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, TableNumber, Tolerance
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell(Published):
     """One number of a table."""
 
-    table: Number
+    table: TableNumber
 
     @property
     def tolerance(self) -> Tolerance:
@@ -35,7 +35,7 @@ class Cell(Published):
         return max(V_RELATIVE.value * self.paper, 0.5 * 10.0**-self.digits)
 
     def within_relative(self, ours: float) -> bool | None:
-        """Whether our number is near enough beside its own size; None where that is not judged."""
+        """Return whether our number is near enough beside its own size; None where that is not judged."""
         return None if self.relative is None else abs(ours - self.paper) <= self.relative
 
     def within_factor(self, ours: float) -> bool | None:
@@ -49,7 +49,7 @@ class Cell(Published):
 class PaperTable:
     """A table of the paper, with our experiment that has its numbers."""
 
-    number: Number
+    number: TableNumber
     experiment: str
     """Key `paper` of its scenario."""
     title: str
@@ -62,14 +62,17 @@ class PaperTable:
 
 
 def tables_of(experiment: str) -> tuple[PaperTable, ...]:
-    """Tables of an experiment, named as in the scenario's key `paper`."""
+    """Return the tables of an experiment, named as in the scenario's key `paper`."""
     return tuple(table for table in TABLES if table.experiment == experiment)
 
 
 def _cells(
-    table: Number, columns: tuple[tuple[str, Quantity], ...], rows: dict[str, tuple[float, ...]], island: bool = False
+    table: TableNumber,
+    columns: tuple[tuple[str, Quantity], ...],
+    rows: dict[str, tuple[float, ...]],
+    island: bool = False,
 ) -> Iterator[Cell]:
-    """Cells of a table with a row per case (or per island of case IV) and columns (event, quantity)."""
+    """Return the cells of a table with a row per case (or per island of case IV) and columns (event, quantity)."""
     for row, numbers in rows.items():
         for (event, quantity), paper in zip(columns, numbers, strict=True):
             digits = 3 if (table, quantity) == ("III", "MQSI") else DIGITS[quantity]

@@ -7,7 +7,7 @@ from typing import Literal
 
 from gridpeers.benchmarks import Quantity
 
-Number = Literal["I", "II", "III", "IV", "V"]
+TableNumber = Literal["I", "II", "III", "IV", "V"]
 """Number of a table of the paper."""
 
 
@@ -34,7 +34,7 @@ class Bound:
 _PRINTED_F = Tolerance(0.005, "the paper prints 0.00: all that rounds to it")
 _PLACES = "depends on where loads, inverters and capacitors stand, which the paper does not print"
 
-TABLE: dict[tuple[Number, Quantity], Tolerance] = {
+TABLE: dict[tuple[TableNumber, Quantity], Tolerance] = {
     ("I", "f_error_Hz"): Tolerance(
         0.01,
         "the paper prints 0.01 Hz; that is 65 kW of 3900 kW, less than what our loads may differ from its loads",

@@ -2,12 +2,12 @@
 
 For experiments that draw predictions beside measurements:
 
-    from scenarios.predict.inverter_group import fleet_of
+    from scenarios.predict.inverter_group import inverter_group_of
     from scenarios.predict.times import LoadStep, predicted_times
     from scenarios.predict.delay_limits import delay_limit
     from scenarios.predict.closed_form import delay_limit_closed, modes
 
-    fleet = fleet_of(scenario, feeder, "IV")
+    fleet = inverter_group_of(scenario, feeder, "IV")
     predicted_times(fleet, link_delay_s=0.1, loss=0.3)     Times(restore_s, share_s, stable, note)
     delay_limit(fleet, "local loop")                       s, exact for law and plant in discrete time
     delay_limit_closed(fleet, "disagreement")              s, by the continuous equations

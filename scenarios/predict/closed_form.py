@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.results.history import Floats
 
 SETTLING = 4.0
@@ -26,28 +26,28 @@ SETTLING = 4.0
 ZERO = 1e-9
 """Rates and eigenvalues below this are zeros with rounding (1/s)."""
 
-Kind = Literal["neighbours", "disagreement", "local loop"]
+DelayKind = Literal["neighbours", "disagreement", "local loop"]
 """What comes late: the neighbours' values alone; own and neighbours' values alike; measurement or set-point."""
 
 
-def laplacian(fleet: Fleet) -> Floats:
-    """Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only.
+def laplacian(fleet: InverterGroup) -> Floats:
+    """Return Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only.
 
     Examples
     --------
-    >>> laplacian(Fleet(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))).tolist()
+    >>> laplacian(InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
     A = fleet.A[np.ix_(fleet.acts, fleet.acts)]
     return np.asarray(np.diag(A.sum(axis=1)) - A)
 
 
-def groups(fleet: Fleet) -> tuple[tuple[str, ...], ...]:
-    """Who is connected with whom by links, among those that run the law, in the order of the names.
+def groups(fleet: InverterGroup) -> tuple[tuple[str, ...], ...]:
+    """Return who is connected with whom by links, among those that run the law, in the order of the names.
 
     Examples
     --------
-    >>> groups(Fleet(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=np.diag([1.0, 0.0], k=1)))
+    >>> groups(InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=np.diag([1.0, 0.0], k=1)))
     (('a', 'b'), ('c',))
     """
     acting = [name for name, acts in zip(fleet.names, fleet.acts.tolist(), strict=True) if acts]
@@ -93,7 +93,7 @@ class Modes:
 
 
 def settling(rate: float) -> float:
-    """Time (s) in which a mode falls to 2 %; infinite when it does not fall.
+    """Return the time (s) in which a mode falls to 2 %; infinite when it does not fall.
 
     Examples
     --------
@@ -103,8 +103,8 @@ def settling(rate: float) -> float:
     return math.inf if rate <= ZERO else SETTLING / rate
 
 
-def modes(fleet: Fleet) -> Modes:
-    """Modes of a fleet's secondary law by the continuous equations.
+def modes(fleet: InverterGroup) -> Modes:
+    """Return the modes of a fleet's secondary law by the continuous equations.
 
     Raises
     ------
@@ -122,7 +122,8 @@ def modes(fleet: Fleet) -> Modes:
     Nine alike, three leaders, everybody hears everybody:
 
     >>> from agents.agent_config import Gains
-    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
+    >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
+    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
     >>> found = modes(nine)
     >>> round(found.lambda_2, 6), round(found.frequency_rate, 6), round(found.slowest_rate, 6)
     (9.0, 4.0, 4.0)
@@ -149,12 +150,12 @@ def modes(fleet: Fleet) -> Modes:
 
 
 def _zeroed(value: float) -> float:
-    """An eigenvalue without the rounding that makes 0 a little more or less."""
+    """Return an eigenvalue without the rounding that makes 0 a little more or less."""
     return 0.0 if abs(value) < ZERO else float(value)
 
 
-def delay_limit_closed(fleet: Fleet, kind: Kind) -> float:
-    """Longest delay (s) with which the continuous law is stable, the same on every link.
+def delay_limit_closed(fleet: InverterGroup, kind: DelayKind) -> float:
+    """Return the longest delay (s) with which the continuous law is stable, the same on every link.
 
     - "neighbours": infinite on every graph (Atay 2013 without leaders; with them docs/theory.md).
     - "disagreement": pi / (2 kappa lambda_max), Olfati-Saber and Murray (2004).
@@ -164,7 +165,8 @@ def delay_limit_closed(fleet: Fleet, kind: Kind) -> float:
     Examples
     --------
     >>> from agents.agent_config import Gains
-    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9), gains=Gains(k_p=0.01 / 12))
+    >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
+    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
     >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)
     (0.0145, 0.3927)
     """
@@ -179,7 +181,7 @@ def delay_limit_closed(fleet: Fleet, kind: Kind) -> float:
 
 
 def equivalent_delay(T: float, loss: float) -> float:
-    """Mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
+    """Return the mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
 
     Examples
     --------

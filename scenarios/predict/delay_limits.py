@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from scenarios.predict.closed_form import Kind
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.closed_form import DelayKind
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.predict.response import PlantModel, response
 
@@ -15,13 +15,15 @@ ANGLES = 600
 """Angles at which delay-independence is tried, between 1e-3 rad and pi, evenly in their logarithm."""
 
 
-def delay_limit(case: Fleet, kind: Kind | str, *, plant: PlantModel = "lagged", longest_s: float = 3.0) -> float:
-    """Longest delay (s), the same for all, up to which the loop in discrete time is stable.
+def delay_limit(
+    case: InverterGroup, kind: DelayKind | str, *, plant: PlantModel = "lagged", longest_s: float = 3.0
+) -> float:
+    """Return the longest delay (s), the same for all, up to which the loop in discrete time is stable.
 
     Parameters
     ----------
-    case : Fleet
-        From `fleet_of`.
+    case : InverterGroup
+        From `inverter_group_of`.
     kind : str
         "neighbours": agent to agent, own value fresh. "disagreement": own value as late as the neighbours'. "local
         loop": plant to agent, or agent to plant, which are the same to the loop.
@@ -65,8 +67,8 @@ def delay_limit(case: Fleet, kind: Kind | str, *, plant: PlantModel = "lagged", 
     return math.inf
 
 
-def first_crossing(case: Fleet, *, plant: PlantModel = "lagged") -> float:
-    """Shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
+def first_crossing(case: InverterGroup, *, plant: PlantModel = "lagged") -> float:
+    """Return the shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
 
     With own values apart from the neighbours' the loop is F(z) y = z^{-n} S y. A mode can stand on the unit circle, z =
     exp(j theta), only where an eigenvalue of F^{-1} S has magnitude 1; its angle then is n theta. Infinite if there is

@@ -20,7 +20,7 @@ from scenarios.spec.graph import graph_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fleet:
+class InverterGroup:
     """N inverters that share one frequency.
 
     Examples
@@ -28,7 +28,7 @@ class Fleet:
     Three alike, one of them a leader, on a path:
 
     >>> A = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    >>> fleet = Fleet(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
+    >>> fleet = InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
     >>> fleet.kappa.round(2).tolist(), fleet.weight.round(2).tolist()
     ([14.29, 14.29, 14.29], [0.33, 0.33, 0.33])
     """
@@ -101,11 +101,11 @@ class Fleet:
         """Number d_i of neighbours that each listens to."""
         return np.asarray(self.heard.sum(axis=1))
 
-    def part(self, which: NDArray[np.bool_]) -> Fleet:
-        """The fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
+    def part(self, which: NDArray[np.bool_]) -> InverterGroup:
+        """Return the fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
         at = np.flatnonzero(which)
         arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
-        return Fleet(
+        return InverterGroup(
             names=tuple(self.names[i] for i in at.tolist()),
             A=self.A[np.ix_(at, at)],
             gains=self.gains,
@@ -117,15 +117,15 @@ class Fleet:
         )
 
 
-def fleet_of(
+def inverter_group_of(
     scenario: Scenario,
     feeder: Feeder,
     case: str,
     *,
     roster: Collection[str] | None = None,
     island: Collection[str] | None = None,
-) -> Fleet:
-    """The inverters of one case of a scenario.
+) -> InverterGroup:
+    """Return the inverters of one case of a scenario.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def fleet_of(
     Examples
     --------
     >>> from scenarios.spec import load_scenario
-    >>> fleet = fleet_of(*load_scenario("islanding"), "IV")
+    >>> fleet = inverter_group_of(*load_scenario("islanding"), "IV")
     >>> fleet.n, fleet.A.sum(), fleet.leads.sum()
     (9, np.float64(72.0), np.int64(3))
     """
@@ -161,7 +161,7 @@ def fleet_of(
     )
     without = without_agent(scenario, case)
     GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
-    fleet = Fleet(
+    fleet = InverterGroup(
         names=tuple(rows),
         GFM=GFM,
         A=_adjacency(control, rows, without),
@@ -180,7 +180,7 @@ def fleet_of(
 
 
 def _adjacency(control: Control, rows: Mapping[str, InverterRow], without: Collection[str]) -> Floats:
-    """Adjacency of all inverters; those without an agent have no link."""
+    """Return the adjacency of all inverters; those without an agent have no link."""
     A = np.zeros((len(rows), len(rows)))
     at = [i for i, name in enumerate(rows) if name not in without]
     A[np.ix_(at, at)] = np.array(adjacency(control, {name: rows[name] for name in rows if name not in without}))

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from agents.laws.consensus import towards
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.response import PlantModel, response
 from scenarios.results.history import Floats
 
@@ -86,14 +86,14 @@ class Loop:
 
     Examples
     --------
-    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
+    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
     >>> Loop(fleet=nine).spectral_radius < 1.0
     True
     >>> Loop(fleet=nine, ticks=Ticks(measurement=40)).spectral_radius < 1.0
     False
     """
 
-    fleet: Fleet
+    fleet: InverterGroup
     ticks: Ticks = field(default_factory=Ticks)
     plant: PlantModel = "lagged"
     muted: int = 0
@@ -152,7 +152,7 @@ class Loop:
         one = np.eye(load + 1)
 
         def y(back: int, i: int) -> Floats:
-            """y_i(k - back)."""
+            """Return y_i(k - back)."""
             row: Floats = one[(back - 1) * n + i]
             return row
 

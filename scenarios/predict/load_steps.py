@@ -41,7 +41,7 @@ class LoadError(RuntimeError):
 
 
 def load_steps(scenario: Scenario, feeder: Feeder) -> tuple[IslandStep, ...]:
-    """Islands without the grid after each event, and their steps of load.
+    """Return the islands without the grid after each event, and their steps of load.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) 
 
 
 def _carried(plant: Plant, rating: dict[str, float], on: set[str]) -> dict[tuple[str, ...], tuple[float, bool]]:
-    """Mean p (pu) of each island's inverters, and whether the grid feeds it."""
+    """Return the mean p (pu) of each island's inverters, and whether the grid feeds it."""
     islands: dict[str, dict[str, float]] = {}
     for name, reading in plant.measure().items():
         if name in on:

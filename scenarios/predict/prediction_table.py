@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from scenarios.predict.closed_form import (
     SETTLING,
-    Kind,
+    DelayKind,
     Modes,
     delay_limit_closed,
     equivalent_delay,
@@ -17,12 +17,11 @@ from scenarios.predict.closed_form import (
     settling,
 )
 from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop
 from scenarios.predict.load_steps import IslandStep
-from scenarios.predict.sensitivity import Sensitivity
 from scenarios.predict.times import Times, predicted_times
-from scenarios.predict.vars import var_delay_limit, var_modes
+from scenarios.predict.vars import Sensitivity, var_delay_limit, var_modes
 
 WIDTH = 100
 """Columns."""
@@ -31,16 +30,18 @@ Row = tuple[str, str, str, str]
 """Quantity, by the continuous law, by ours in discrete time, what it means."""
 
 
-def case_text(title: str, fleet: Fleet, steps: Sequence[tuple[IslandStep, Fleet]], plant: Sensitivity | None) -> str:
-    """Everything that is predicted of one case.
+def case_text(
+    title: str, fleet: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: Sensitivity | None
+) -> str:
+    """Return everything that is predicted of one case.
 
     Parameters
     ----------
     title : str
         Heads the table.
-    fleet : Fleet
+    fleet : InverterGroup
         Everybody on the network at the start.
-    steps : sequence of (IslandStep, Fleet)
+    steps : sequence of (IslandStep, InverterGroup)
         Islands after each event, and the inverters in them.
     plant : Sensitivity, optional
         For voltage and vars.
@@ -57,7 +58,7 @@ def case_text(title: str, fleet: Fleet, steps: Sequence[tuple[IslandStep, Fleet]
     return "\n".join(lines)
 
 
-def _words(fleet: Fleet, found: Modes) -> str:
+def _words(fleet: InverterGroup, found: Modes) -> str:
     apart, leaders = groups(fleet), [name for name, leads in zip(fleet.names, fleet.leads, strict=True) if leads]
     acting = int(fleet.acts.sum())
     text = f"{acting} of {fleet.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
@@ -74,10 +75,10 @@ def _words(fleet: Fleet, found: Modes) -> str:
     return text.rstrip()
 
 
-def _rows(fleet: Fleet, found: Modes) -> list[Row]:
+def _rows(fleet: InverterGroup, found: Modes) -> list[Row]:
     loop = Loop(fleet=fleet)
     slowest = settling(-math.log(loop.spectral_radius) / fleet.T_c) if loop.stable else math.inf
-    kinds: tuple[Kind, ...] = ("neighbours", "disagreement", "local loop")
+    kinds: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
     limits = {kind: delay_limit(fleet, kind) for kind in kinds}
     closed = {kind: delay_limit_closed(fleet, kind) for kind in kinds}
     return [
@@ -113,7 +114,7 @@ def _rows(fleet: Fleet, found: Modes) -> list[Row]:
     ]
 
 
-def _event(step: IslandStep, island: Fleet, *, whole: bool) -> list[str]:
+def _event(step: IslandStep, island: InverterGroup, *, whole: bool) -> list[str]:
     where = "" if whole else f" ({', '.join(step.members)})"
     head = f"  {step.label} at {step.t_s:g} s{where}"
     if not island.GFM.any():
@@ -135,7 +136,7 @@ def _sentence(times: Times) -> str:
     return f"not restored: {times.note}"
 
 
-def _vars(fleet: Fleet, plant: Sensitivity | None) -> list[str]:
+def _vars(fleet: InverterGroup, plant: Sensitivity | None) -> list[str]:
     if plant is None:
         return ["  Voltage and vars: left out by --no-vars."]
     if not all(name in plant.names for name in fleet.names):

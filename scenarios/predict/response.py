@@ -1,7 +1,7 @@
 r"""The plant as the secondary law feels it: one frequency per island, droops, and the lags between them. Linear.
 
 Everything is a pu frequency: set-points y = m_p P_set, powers pi = m_p p, the load l = P_load / sum (s_i/m_i). With w_i
-as `Fleet.weight`, the GFM (set F) share the rest of the load so that all have the same frequency:
+as `InverterGroup.weight`, the GFM (set F) share the rest of the load so that all have the same frequency:
 
 .. math:: w_F e = \sum_F w_i y_i - u, \qquad T_p \dot u = l - \sum_{GFL} w_j \pi_j - u
 
@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.results.history import Floats
 
 PlantModel = Literal["lagged", "quasi-steady"]
@@ -56,12 +56,12 @@ class Response:
     """N."""
 
     def rest(self, u: Floats, load: float) -> Floats:
-        """State in which the plant stands still under set-points u and a load (both pu frequency)."""
+        """Return the state in which the plant stands still under set-points u and a load (both pu frequency)."""
         return np.asarray(np.linalg.solve(np.eye(len(self.A)) - self.A, self.B @ u + self.E * load))
 
 
-def response(fleet: Fleet, plant: PlantModel = "lagged") -> Response:
-    """The plant of a fleet, over one control period with set-points held.
+def response(fleet: InverterGroup, plant: PlantModel = "lagged") -> Response:
+    """Return the plant of a fleet, over one control period with set-points held.
 
     Raises
     ------
@@ -73,12 +73,12 @@ def response(fleet: Fleet, plant: PlantModel = "lagged") -> Response:
     return _quasi_steady(fleet) if plant == "quasi-steady" else _lagged(fleet)
 
 
-def _follows(fleet: Fleet) -> Floats:
+def _follows(fleet: InverterGroup) -> Floats:
     """1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
     return np.where(fleet.GFM | fleet.gfl.frequency_watt, 1.0, 0.0)
 
 
-def _quasi_steady(fleet: Fleet) -> Response:
+def _quasi_steady(fleet: InverterGroup) -> Response:
     n, w, follows = fleet.n, fleet.weight, _follows(fleet)
     stiffness = float(w @ follows)
     D, F = w / stiffness, -1.0 / stiffness
@@ -95,7 +95,7 @@ def _quasi_steady(fleet: Fleet) -> Response:
     )
 
 
-def _lagged(fleet: Fleet) -> Response:
+def _lagged(fleet: InverterGroup) -> Response:
     n, w, gfl = fleet.n, fleet.weight, fleet.gfl
     forming, following = np.flatnonzero(fleet.GFM), np.flatnonzero(~fleet.GFM)
     w_F = float(w[forming].sum())

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from scenarios.predict.closed_form import groups
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Link, Loop, Path, Ticks
 from scenarios.predict.response import PlantModel
 from scenarios.results.history import Flags, Floats
@@ -63,14 +63,14 @@ class Times:
 
 
 def ticks_of(
-    fleet: Fleet,
+    fleet: InverterGroup,
     *,
     link_delay_s: float | Mapping[Link, float] = 0.0,
     measurement_delay_s: float | Mapping[str, float] = 0.0,
     setpoint_delay_s: float | Mapping[str, float] = 0.0,
     loss: float | Mapping[Link, float] = 0.0,
 ) -> Ticks:
-    """Delays in seconds as control periods of a fleet.
+    """Return the delays in seconds as control periods of a fleet.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def ticks_of(
 
     Examples
     --------
-    >>> alone = Fleet(names=("a",), GFM=np.array([True]), A=np.zeros((1, 1)))
+    >>> alone = InverterGroup(names=("a",), GFM=np.array([True]), A=np.zeros((1, 1)))
     >>> found = ticks_of(alone, link_delay_s=0.03, measurement_delay_s=0.03)
     >>> found.link, found.measurement
     (1, 2)
@@ -99,7 +99,7 @@ def ticks_of(
 
 
 def predicted_times(
-    case: Fleet,
+    case: InverterGroup,
     *,
     link_delay_s: float | Mapping[Link, float] = 0.0,
     measurement_delay_s: float | Mapping[str, float] = 0.0,
@@ -108,12 +108,12 @@ def predicted_times(
     load: LoadStep | None = None,
     plant: PlantModel = "lagged",
 ) -> Times:
-    """Times to restore and to share after a step of the load, and whether the loop is stable.
+    """Return the times to restore and to share after a step of the load, and whether the loop is stable.
 
     Parameters
     ----------
-    case : Fleet
-        From `fleet_of(scenario, feeder, case)`.
+    case : InverterGroup
+        From `inverter_group_of(scenario, feeder, case)`.
     link_delay_s : float or Mapping[(src, dst), float], optional
         Delay of the states from agent to agent (s); links that a mapping leaves out have none.
     measurement_delay_s, setpoint_delay_s : float or Mapping[name, float], optional
@@ -132,7 +132,7 @@ def predicted_times(
 
     Examples
     --------
-    >>> nine = Fleet(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
+    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
     >>> predicted_times(nine).stable, predicted_times(nine, measurement_delay_s=1.0).stable
     (True, False)
     """
@@ -162,8 +162,8 @@ def predicted_times(
     return Times(restore_s=restore, share_s=share, stable=True, note=_note(case, restore, share))
 
 
-def sharing_index(path: Path, case: Fleet) -> Floats:
-    """MPSI of each tick, (16), over the inverters that have an agent; nan where nobody has one."""
+def sharing_index(path: Path, case: InverterGroup) -> Floats:
+    """Return MPSI of each tick, (16), over the inverters that have an agent; nan where nobody has one."""
     if not case.shares.any():
         return np.full(path.t.shape, np.nan)
     power, weight = path.power[:, case.shares], case.weight[case.shares]
@@ -181,8 +181,8 @@ def _for_good(t: Floats, holds: Flags) -> float | None:
     return None if first >= t.size else round(float(t[first]), 9)
 
 
-def _beyond_limits(case: Fleet, path: Path) -> str:
-    """What those who run the law would have to carry in the end, if that is beyond their limits; else empty."""
+def _beyond_limits(case: InverterGroup, path: Path) -> str:
+    """Return what those who run the law would have to carry in the end, if that is beyond their limits; else empty."""
     acts, s, gains = case.acts, case.s, case.gains
     if not acts.any():
         return ""
@@ -194,7 +194,7 @@ def _beyond_limits(case: Fleet, path: Path) -> str:
     return f"those that run the law would have to carry {needed:.2f} pu each, their limit is {limit:.2f} pu"
 
 
-def _note(case: Fleet, restore: float | None, share: float | None) -> str:
+def _note(case: InverterGroup, restore: float | None, share: float | None) -> str:
     if restore is not None and share is not None:
         return ""
     if not case.acts.any():

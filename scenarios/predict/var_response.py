@@ -20,10 +20,9 @@ import numpy as np
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from plant.feeder import raise_for_trip
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.load_steps import LoadError
-from scenarios.predict.sensitivity import STEP, plant_in_first_window
-from scenarios.predict.vars import factors
+from scenarios.predict.vars import STEP, factors, plant_in_first_window
 from scenarios.results.history import Floats
 from scenarios.spec import Scenario
 from scenarios.spec.configs import configs
@@ -48,7 +47,7 @@ class VarResponse:
 
 
 def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
-    """Answers of the plant on droop alone, as it is at the end of the first event's window.
+    """Return the answers of the plant on droop alone, as it is at the end of the first event's window.
 
     Raises
     ------
@@ -78,12 +77,12 @@ def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
     return VarResponse(names=names, q=pulses[:, 0], v=pulses[:, 1])
 
 
-def var_growth(fleet: Fleet, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
+def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
     """Rate (1/s) at which the law for voltage and vars grows, negative where it decays, over links that are late.
 
     Parameters
     ----------
-    fleet : Fleet
+    fleet : InverterGroup
         Its inverters must be among those of the answers.
     plant : VarResponse
         From `var_response`.
@@ -99,7 +98,7 @@ def var_growth(fleet: Fleet, plant: VarResponse, *, link_delay_s: float = 0.0) -
     --------
     Two terminals whose vars answer at once to the difference of their set-points agree:
 
-    >>> pair = Fleet(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
+    >>> pair = InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
     >>> at_once = np.zeros((100, 2, 2))
     >>> at_once[0] = 5.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])
     >>> var_growth(pair, VarResponse(names=("a", "b"), q=at_once, v=0.1 * np.abs(at_once))) < 0.0

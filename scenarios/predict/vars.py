@@ -19,11 +19,86 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.laws.consensus import V_factors
+from plant.build import build_plant
+from plant.dynamics import PlantError
+from plant.equipment import Feeder
+from plant.feeder import Plant, raise_for_trip
+from plant.plant_config import PlantConfig
 from scenarios.predict.closed_form import settling
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import AT_REST
-from scenarios.predict.sensitivity import Sensitivity
+from scenarios.predict.load_steps import LoadError
 from scenarios.results.history import Floats
+from scenarios.spec import Scenario
+from scenarios.spec.configs import configs
+
+STEP = 0.002
+"""By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""
+
+REST = 2.0
+"""Time given to the plant to come to rest (s); on droop alone its slowest part has a time constant of 0.1 s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensitivity:
+    """How q and v of each inverter (row) answer to V_set of each (column), pu of own rating and nominal voltage."""
+
+    names: tuple[str, ...]
+    """Order of rows and columns."""
+    S: Floats
+    """dq / dV_set (pu per pu)."""
+    H: Floats
+    """dv / dV_set (pu per pu)."""
+
+
+def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
+    """Return the sensitivities of the plant on droop alone at the end of the first event's window.
+
+    Raises
+    ------
+    LoadError
+        If the plant has no solution there.
+    """
+    config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    rated = {row.name: row.P_rated for row in feeder.inverters}
+    nominal = {row.name: row.V_nom for row in feeder.inverters}
+    names = tuple(row.name for row in feeder.inverters)
+    try:
+        plant = plant_in_first_window(scenario, config)
+        columns = []
+        for name in names:
+            here = plant.measure()[name]
+            sides = []
+            for sign in (1.0, -1.0):
+                plant.hold(name, here.P_set, here.V_set + sign * STEP * nominal[name])
+                _rest(plant, round(REST / config.T_c))
+                read = plant.measure()
+                sides.append([[read[of].Q / rated[of], read[of].V / nominal[of]] for of in names])
+            plant.hold(name, here.P_set, here.V_set)
+            columns.append((np.array(sides[0]) - np.array(sides[1])) / (2.0 * STEP))
+    except PlantError as error:
+        raise LoadError(f"on droop alone: {error}") from error
+    return Sensitivity(names=names, S=np.array(columns)[:, :, 0].T, H=np.array(columns)[:, :, 1].T)
+
+
+def plant_in_first_window(scenario: Scenario, config: PlantConfig) -> Plant:
+    """Return the plant on droop alone, gone on to the last tick before the second event, or to the end of the run.
+
+    Raises
+    ------
+    PlantError
+        If it has no solution on the way.
+    """
+    end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
+    plant = build_plant(config)
+    _rest(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
+    return plant
+
+
+def _rest(plant: Plant, ticks: int) -> None:
+    for _ in range(ticks):
+        plant.advance()
+    raise_for_trip(plant.take_events())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +111,15 @@ class VarModes:
     """Largest magnitude of an eigenvalue (1), those of what never moves left out; below 1 it is stable."""
 
 
-def var_modes(fleet: Fleet, plant: Sensitivity, *, local: int = 0, link: int = 0) -> VarModes:
-    """Modes of the law for voltage and vars.
+def var_modes(fleet: InverterGroup, plant: Sensitivity, *, local: int = 0, link: int = 0) -> VarModes:
+    """Return the modes of the law for voltage and vars.
 
     Parameters
     ----------
-    fleet : Fleet
+    fleet : InverterGroup
         Its inverters must be among those of the sensitivities.
     plant : Sensitivity
-        From `scenarios.predict.sensitivity.sensitivity`.
+        From `scenarios.predict.vars.sensitivity`.
     local, link : int, optional
         Delays in control periods: of measurement or set-point, and of the links beyond the one period they always take.
 
@@ -57,7 +132,7 @@ def var_modes(fleet: Fleet, plant: Sensitivity, *, local: int = 0, link: int = 0
     --------
     Two terminals whose vars answer to the difference of their set-points:
 
-    >>> pair = Fleet(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
+    >>> pair = InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
     >>> plant = Sensitivity(names=("a", "b"), S=np.array([[5.0, -5.0], [-5.0, 5.0]]), H=np.full((2, 2), 0.5))
     >>> var_modes(pair, plant).spectral_radius < 1.0 < var_modes(pair, plant, local=50).spectral_radius
     True
@@ -71,8 +146,8 @@ def var_modes(fleet: Fleet, plant: Sensitivity, *, local: int = 0, link: int = 0
     return VarModes(settling_s=slowest, spectral_radius=largest)
 
 
-def var_delay_limit(fleet: Fleet, plant: Sensitivity, *, longest_s: float = 1.0) -> float:
-    """Longest delay (s) of measurements or set-points up to which the law for voltage and vars is stable.
+def var_delay_limit(fleet: InverterGroup, plant: Sensitivity, *, longest_s: float = 1.0) -> float:
+    """Return the longest delay (s) of measurements or set-points up to which the law for voltage and vars is stable.
 
     A multiple of T_c; infinite if none up to `longest_s` makes it unstable, not a number if it is unstable without.
     """
@@ -82,15 +157,15 @@ def var_delay_limit(fleet: Fleet, plant: Sensitivity, *, longest_s: float = 1.0)
     return math.inf
 
 
-def factors(fleet: Fleet) -> tuple[Floats, Floats]:
-    """Factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
+def factors(fleet: InverterGroup) -> tuple[Floats, Floats]:
+    """Return the factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
     gains, T, each = fleet.gains, fleet.T_c, zip(fleet.GFM, fleet.leads, fleet.degree.tolist(), strict=True)
     weights = [(gains.alpha * leads, gains.beta_GFM if GFM else gains.beta_GFL, d) for GFM, leads, d in each]
     a, b = np.array([V_factors(alpha, beta, d, k_q=gains.k_q, T=T) for alpha, beta, d in weights]).T
     return a, b
 
 
-def _map(fleet: Fleet, plant: Sensitivity, local: int, link: int) -> Floats:
+def _map(fleet: InverterGroup, plant: Sensitivity, local: int, link: int) -> Floats:
     """Map of V(k-1), V(k-2), ... of those that run the law to V(k), V(k-1), ...; of V alone as if `local` were -1."""
     unknown = [name for name in fleet.names if name not in plant.names]
     if unknown:

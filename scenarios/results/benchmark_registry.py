@@ -8,17 +8,97 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from scenarios.results.published import Published
 from wire.anybody import ANYTHING, named
 from wire.plugin import plugin_of
+from wire.plugin_shape import callable_objection
 from wire.printable import printable
 from wire.registry import Registry
 
 if TYPE_CHECKING:
-    from scenarios.results.claims.claim import Claim
+    from scenarios.results.claims import Claim
     from scenarios.results.findings import Findings
+
+Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]
+"""A column, named as in metrics.json."""
+
+HEADINGS: dict[Quantity, str] = {
+    "f_error_Hz": "abs(f-60) Hz",
+    "MPSI": "MPSI",
+    "V_error": "V_error pu",
+    "MQSI": "MQSI",
+}
+"""Heading of a column, with the unit."""
+
+
+def heading(quantity: Quantity, f_nom: float) -> str:
+    """Return the heading of a column of a run whose nominal frequency (Hz) need not be the paper's.
+
+    Examples
+    --------
+    >>> heading("f_error_Hz", 50.0), heading("MPSI", 50.0)
+    ('abs(f-50) Hz', 'MPSI')
+    """
+    return f"abs(f-{f_nom:g}) Hz" if quantity == "f_error_Hz" else HEADINGS[quantity]
+
+
+UNITS: dict[Quantity, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": ""}
+"""Unit as it follows a number."""
+
+DIGITS: dict[Quantity, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 2}
+"""Decimals that make sense: what is less moves from run to run of a real microgrid."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Published:
+    """One number.
+
+    Examples
+    --------
+    >>> place = {"case": "IV", "event": "event1", "quantity": "MPSI"}
+    >>> number = Published(source="Table 1", **place, paper=0.12, digits=2, limit=0.02)
+    >>> number.where, number.within(0.13), number.within(0.15)
+    ('case IV, event1', True, False)
+    """
+
+    source: str
+    """Where it is printed, e.g. "Table I"."""
+    case: str
+    """Case of our scenario."""
+    event: str
+    """Event of our scenario after which it is measured."""
+    island: str = ""
+    """First inverter of the island that it is about; "" for the whole microgrid."""
+    quantity: Quantity
+    paper: float
+    """What the publication prints."""
+    digits: int
+    """Decimals that it prints."""
+    limit: float | None = None
+    """Largest difference that passes, in its unit; None where nothing is judged by it."""
+
+    @property
+    def where(self) -> str:
+        """Place for people, e.g. "case II, event2"."""
+        return f"case {self.case}, {self.event}" + (f", island of {self.island}" if self.island else "")
+
+    def within(self, ours: float) -> bool | None:
+        """Return whether our number is near enough; None where the number is not judged.
+
+        Both count at the precision of the computation: a printed 0.14 stands for exactly 0.14.
+        """
+        return None if self.limit is None else abs(ours - self.paper) <= self.limit
+
+
+def _claim_objection(it: Any) -> str:
+    from scenarios.results.claims import Claim  # numpy, which a scenario is read without
+
+    return "" if isinstance(it, Claim) else callable_objection(it, "findings")
+
+
+CLAIMS: Registry[Any] = Registry("claim", "claims", _claim_objection)
+"""Claims by name. Those of a publication come with its benchmark (`scenarios.results.benchmark_registry`)."""
 
 
 def _nothing(found: Findings) -> Sequence[str]:
@@ -54,14 +134,14 @@ NO_BENCHMARK = Benchmark()
 """Of a scenario that nobody has published."""
 
 
-def _objection(it: Any) -> str:
+def _benchmark_objection(it: Any) -> str:
     return "" if isinstance(it, Benchmark) else "it is no gridpeers.benchmarks.Benchmark"
 
 
 BENCHMARKS: Registry[Benchmark] = Registry(
     "benchmark",
     "benchmarks",
-    _objection,
+    _benchmark_objection,
     own={
         name: f"papers.singhal2022.paper_benchmarks:{name.replace('-', '_').upper()}"
         for name in ("islanding", "intermittency", "communication", "switching", "plug-n-play", "wind-up")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from plant.equipment import Feeder
 from scenarios.results.history import History, Plates
-from scenarios.results.island_membership import Spell, islands_of, spells_of
+from scenarios.results.island_membership import IslandInterval, island_intervals, islands_of
 from scenarios.short_names import in_order, short
 from scenarios.spec import Scenario
 from scenarios.spec.agent_schedule import inverters_of
@@ -52,11 +52,11 @@ class Drawing:
     """Inverters of each island where there come to be several, by the first of them; they have a figure as well."""
     island_titles: Mapping[str, str] = field(default_factory=dict)
     """A few words on each island."""
-    spells: Sequence[Spell] = ()
+    island_intervals: Sequence[IslandInterval] = ()
     """When there are several islands; figures of all cases then show the worst."""
 
     def plates_in(self, case: str) -> Plates:
-        """Nameplates as they count in a case."""
+        """Return the nameplates as they count in a case."""
         return self.plates.without(self.without_agent.get(case, frozenset()))
 
 
@@ -84,12 +84,12 @@ def drawing_of(
         limited=tuple(limited),
         islands=most if len(most) > 1 else {},
         island_titles={name: f"microgrid {of.pop().removeprefix('MG')}" for name, of in whole.items() if len(of) == 1},
-        spells=spells_of(scenario, feeder),
+        island_intervals=island_intervals(scenario, feeder),
     )
 
 
 def happening(event: Event, scenario: Scenario) -> str:
-    """What happens at an event, in a few words.
+    """Return what happens at an event, in a few words.
 
     Examples
     --------

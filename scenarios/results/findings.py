@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 
 from plant.equipment import F_NOM, Feeder
 from scenarios.results import metrics
+from scenarios.results.benchmark_registry import Published
 from scenarios.results.history import History, Plates
 from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own.metric import Measured
-from scenarios.results.published import Published
 from scenarios.results.settling import Settling, settling
 from scenarios.spec import Scenario
 from scenarios.spec.agentless import without_agent
 from scenarios.spec.power_limits import limits_of
 
-Results = Mapping[str, Mapping[str, Steady]]
+SteadyValues = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""
 
 
@@ -26,7 +26,7 @@ SHARED = ("MPSI", "MQSI", "t_restore_s")
 
 
 def label(measure: str, f_nom: float = F_NOM) -> str:
-    """Name of a measure for people, at a nominal frequency (Hz).
+    """Return the name of a measure for people, at a nominal frequency (Hz).
 
     Examples
     --------
@@ -40,7 +40,7 @@ def label(measure: str, f_nom: float = F_NOM) -> str:
 class Findings:
     """What one experiment came to."""
 
-    results: Results
+    results: SteadyValues
     """Steady values by case and event."""
     f_nom: float = F_NOM
     """Nominal frequency (Hz)."""
@@ -64,11 +64,11 @@ class Findings:
         return bool(self.islands.get(case, {}).get(event))
 
     def value(self, cell: Published) -> float:
-        """Our number at the place of one of the paper's."""
+        """Return our number at the place of one of the paper's."""
         return float(getattr(self._steady(cell), cell.quantity))
 
     def reason(self, cell: Published) -> str:
-        """Why our number there is no steady value; "" where it is one."""
+        """Return why our number there is no steady value; "" where it is one."""
         return self._steady(cell).reasons.get(cell.quantity, "")
 
     def _steady(self, cell: Published) -> Steady:
@@ -77,7 +77,7 @@ class Findings:
         return self.results[cell.case][cell.event]
 
     def within(self, cell: Published) -> bool | None:
-        """Whether our number there is near enough to the paper's, and steady; None where it is not judged."""
+        """Return whether our number there is near enough to the paper's, and steady; None where it is not judged."""
         return cell.within(float("nan") if self.reason(cell) else self.value(cell))
 
     def unsteady(self, cases: Sequence[str], events: Sequence[str], measures: Sequence[str]) -> list[str]:
@@ -96,7 +96,7 @@ class Findings:
         return found
 
     def has(self, cell: Published) -> bool:
-        """Whether there is such a number."""
+        """Return whether there is such a number."""
         events = self.results.get(cell.case, {})
         return cell.event in events and (
             not cell.island or cell.island in self.islands.get(cell.case, {}).get(cell.event, {})

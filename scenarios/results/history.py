@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import InverterRow
 from scenarios.results.record import QUANTITIES, RowFile, Rows, header
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -41,7 +44,7 @@ class Plates:
             object.__setattr__(self, "shares", np.ones(len(self.names), bool))
 
     def without(self, names: Collection[str]) -> Plates:
-        """The same with some inverters left out of the sharing indices, as they have no agent."""
+        """Return the same with some inverters left out of the sharing indices, as they have no agent."""
         return replace(self, shares=np.array([name not in names for name in self.names], bool)) if names else self
 
     @classmethod
@@ -58,6 +61,9 @@ class Plates:
 
 
 T = TypeVar("T", "Plates", "History")
+
+UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
+"""Units of a history's time and quantities."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,11 +97,30 @@ class History:
         return on
 
     def until(self, t: float) -> History:
-        """Its rows up to a time (s), that one included."""
+        """Return its rows up to a time (s), that one included."""
         rows = self.t <= t + 1e-9
         return replace(
             self, **{field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "inverters"}
         )
+
+    def frame(self) -> pd.DataFrame:
+        """Return a table with columns (inverter, quantity) and the index t (s); `attrs["units"]` has the units.
+
+        Examples
+        --------
+        >>> row = (0.0, 60.0, 3e5, 1e4, 2400.0, 3.1e5, 2401.0)
+        >>> frame = History.of(("inv1",), [row]).frame()
+        >>> float(frame["inv1"]["P"][0.0]), frame.attrs["units"]["P"]
+        (300000.0, 'W')
+        """
+        import pandas as pd  # takes longer to import than a case to run
+
+        quantities = [name for name in UNITS if name != "t"]
+        values = np.stack([getattr(self, name) for name in quantities], axis=2).reshape(len(self.t), -1)
+        columns = pd.MultiIndex.from_product([self.inverters, quantities], names=["inverter", "quantity"])
+        frame = pd.DataFrame(values, index=pd.Index(self.t, name="t"), columns=columns)
+        frame.attrs["units"] = dict(UNITS)
+        return frame
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Rows) -> History:

@@ -19,7 +19,7 @@ Islands = dict[str, tuple[str, ...]]
 """Inverters of each island; an island is known by its first inverter."""
 
 
-class Spell(NamedTuple):
+class IslandInterval(NamedTuple):
     """A time during which there are several islands."""
 
     start: float
@@ -29,12 +29,12 @@ class Spell(NamedTuple):
     islands: Islands
 
 
-Quantity = Callable[[History, Plates], Floats]
+RowMeasure = Callable[[History, Plates], Floats]
 """A measure of each row."""
 
 
 def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
-    """Islands with inverters in them after each event, by its label.
+    """Return the islands with inverters in them after each event, by its label.
 
     Switches alone decide: an inverter that has left is still counted where it stands.
 
@@ -58,7 +58,7 @@ def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
 
 
 def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[History, Plates]:
-    """The columns of some inverters alone, as if there were no others."""
+    """Return the columns of some inverters alone, as if there were no others."""
     at = np.array([history.inverters.index(name) for name in names])
     columns = {
         field.name: getattr(history, field.name)[:, at]
@@ -80,25 +80,25 @@ def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[Hi
     return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
 
 
-def spells_of(scenario: Scenario, feeder: Feeder) -> tuple[Spell, ...]:
-    """When there are several islands, and which."""
+def island_intervals(scenario: Scenario, feeder: Feeder) -> tuple[IslandInterval, ...]:
+    """Return when there are several islands, and which."""
     starts = [event.t_s for event in scenario.events]
     found = islands_of(scenario, feeder).values()
     times = zip(starts, [*starts, inf][1:], found, strict=True)
-    return tuple(Spell(start, end, islands) for start, end, islands in times if len(islands) > 1)
+    return tuple(IslandInterval(start, end, islands) for start, end, islands in times if len(islands) > 1)
 
 
-def worst(quantity: Quantity, nominal: float, spells: Sequence[Spell]) -> Quantity:
-    """The measure of the island in which it is farthest from its nominal value, while there are several.
+def worst(quantity: RowMeasure, nominal: float, island_intervals: Sequence[IslandInterval]) -> RowMeasure:
+    """Return the measure of the island in which it is farthest from its nominal value, while there are several.
 
     A mean over islands hides what is wrong in them: one is too fast, another too slow.
     """
 
     def measure(history: History, plates: Plates) -> Floats:
         found = quantity(history, plates)
-        for spell in spells:
-            rows = (history.t > spell.start) & (history.t <= spell.end)
-            each = np.stack([quantity(*part_of(history, plates, names))[rows] for names in spell.islands.values()])
+        for interval in island_intervals:
+            rows = (history.t > interval.start) & (history.t <= interval.end)
+            each = np.stack([quantity(*part_of(history, plates, names))[rows] for names in interval.islands.values()])
             far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
             found[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
         return found

@@ -47,7 +47,7 @@ class LinkCheck:
         """Faults of somebody's own that failed."""
 
     def to_json(self) -> str:
-        """Text of links.json: the hash of all verdicts, the accounts of every link, every test."""
+        """Return the text of links.json: the hash of all verdicts, the accounts of every link, every test."""
         counts = [
             {
                 "src": src,
@@ -73,7 +73,7 @@ class LinkCheck:
         return list(self.lines())
 
     def lines(self) -> Iterable[str]:
-        """Sentences for the report."""
+        """Return the sentences for the report."""
         books = [book for book in self._record.counts.values() if book.sent]
         sent = sum(book.sent for book in books)
         dropped: Counter[str] = Counter()
@@ -99,7 +99,7 @@ def _share(part: int, whole: int) -> str:
 def _spans(
     record: LinkRecord, netem: Netem, microgrids: Mapping[str, str], changes: Sequence[Change]
 ) -> dict[Link, tuple[Span, ...]]:
-    """What each link was told over which anything was sent."""
+    """Return what each link was told over which anything was sent."""
     names = (*microgrids, PLANT)
     links = [Link(src, dst) for src in names for dst in names if (src, dst) in record.counts]
     if not changes:

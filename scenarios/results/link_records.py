@@ -83,7 +83,7 @@ class LinkRecord:
         return combined(self._sha256)
 
     def by_link(self) -> dict[tuple[str, str], LinkTrace]:
-        """All verdicts of each link (src, dst) in one."""
+        """Return all verdicts of each link (src, dst) in one."""
         parts: dict[tuple[str, str], list[LinkTrace]] = {}
         for part in self._parts():
             parts.setdefault((part.src, part.dst), []).append(part)

@@ -8,7 +8,7 @@ off the network takes no part: each row is measured over those that are present 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,7 +62,7 @@ class Window:
 
 
 def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
-    """Windows of events given as (label, time in s).
+    """Return the windows of events given as (label, time in s).
 
     Examples
     --------
@@ -74,7 +74,7 @@ def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ..
 
 
 def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
-    r"""Equal-sharing value of each row, (9).
+    r"""Return the equal-sharing value of each row, (9).
 
     .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
 
@@ -101,7 +101,7 @@ def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats
 
 
 def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
-    r"""Mean sharing index of each row: (16) with P and m_p, (17) with Q and m_q.
+    r"""Return the mean sharing index of each row: (16) with P and m_p, (17) with Q and m_q.
 
     .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
 
@@ -121,7 +121,7 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
 
 def mean_over(x: Floats, present: Flags) -> Floats:
-    """Mean of each row over those that are present in it; not a number where nobody is.
+    """Return the mean of each row over those that are present in it; not a number where nobody is.
 
     Examples
     --------
@@ -134,17 +134,17 @@ def mean_over(x: Floats, present: Flags) -> Floats:
 
 
 def mean_voltage(history: History, plates: Plates) -> Floats:
-    """Mean terminal voltage of each row (pu)."""
+    """Return the mean terminal voltage of each row (pu)."""
     return mean_over(history.V / plates.V_nom, history.present)
 
 
 def mean_frequency(history: History, plates: Plates) -> Floats:
-    """Frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
+    """Return the frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
     return mean_over(history.f[:, plates.GFM], history.present[:, plates.GFM])
 
 
 def f_in_band(history: History, plates: Plates, f_nom: float) -> Flags:
-    """Whether there is a GFM in a row, and each that is there is within `F_BAND` of f_nom (Hz)."""
+    """Return whether there is a GFM in a row, and each that is there is within `F_BAND` of f_nom (Hz)."""
     forming = history.present[:, plates.GFM]
     near = np.abs(history.f[:, plates.GFM] - f_nom) < F_BAND
     within: Flags = np.all(near | ~forming, axis=1) & np.any(forming, axis=1)
@@ -152,17 +152,17 @@ def f_in_band(history: History, plates: Plates, f_nom: float) -> Flags:
 
 
 def MPSI(history: History, plates: Plates) -> Floats:
-    """Mean power sharing index of each row, (16)."""
+    """Return the mean power sharing index of each row, (16)."""
     return sharing_index(history.P, plates.s, plates.m_p, history.present & plates.shares)
 
 
 def MQSI(history: History, plates: Plates) -> Floats:
-    """Mean var sharing index of each row, (17)."""
+    """Return the mean var sharing index of each row, (17)."""
     return sharing_index(history.Q, plates.s, plates.m_q, history.present & plates.shares)
 
 
 def V_error(history: History, plates: Plates) -> Floats:
-    """Mean of abs(V_i - 1) of each row (pu)."""
+    """Return the mean of abs(V_i - 1) of each row (pu)."""
     return mean_over(np.abs(history.V / plates.V_nom - 1.0), history.present)
 
 
@@ -205,7 +205,7 @@ def measure(history: History, plates: Plates, window: Window, f_nom: float) -> S
 def _reasons(
     history: History, plates: Plates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
 ) -> dict[str, str]:
-    """Why measures are no steady values, by name."""
+    """Return why measures are no steady values, by name."""
     present, forming = history.present, plates.GFM
     sharing_now = present & plates.shares
     dead = "de-energised: no inverter is on the network"
@@ -229,7 +229,7 @@ def _reasons(
 
 
 def _idle(x: Floats, plates: Plates, ends: Ends, present: Flags) -> str:
-    """Why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
+    """Return why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
     rows = ends.steady & present.any(axis=1)
     if not rows.any() or not present[ends.steady].any(axis=1).all():
         return ""  # dead, or without rows: told as that
@@ -251,7 +251,7 @@ def between(t: Floats, window: Window) -> NDArray[np.bool_]:
 
 
 def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
-    """Time (s) from `start` to the first row from which on all rows hold; None when the last one does not.
+    """Return the time (s) from `start` to the first row from which on all rows hold; None when the last one does not.
 
     Examples
     --------
@@ -261,3 +261,35 @@ def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
     failing = np.flatnonzero(~holds)
     first = 0 if failing.size == 0 else int(failing[-1]) + 1
     return None if first >= t.size else round(float(t[first]) - start, 9)
+
+
+def messages_saved(
+    quiet: Iterable[tuple[float, int]], windows: Sequence[Window], agents: int, T_c: float
+) -> dict[str, float]:
+    """Return the share of states that were not told, by window; nothing if every state of the run was.
+
+    Parameters
+    ----------
+    quiet : Iterable[tuple[float, int]]
+        Run time (s) and number of states that were not told at that tick.
+    windows : Sequence[Window]
+        Windows of measurement.
+    agents : int
+        Agents of the run, each of which decides once a period.
+    T_c : float
+        Control period (s).
+
+    Examples
+    --------
+    >>> messages_saved([(1.0, 3), (1.02, 1)], [Window(label="event1", start=1.0, end=1.04)], agents=4, T_c=0.02)
+    {'event1': 0.5}
+    """
+    quiet = list(quiet)
+    if not quiet:
+        return {}
+    near = 0.5 * T_c
+    saved = {}
+    for window in windows:
+        count = sum(n for t, n in quiet if window.start - near <= t < window.end - near)
+        saved[window.label] = count / (agents * max(1, round((window.end - window.start) / T_c)))
+    return saved

@@ -110,7 +110,7 @@ def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
 
 
 def _last_mean(name: str, steady: Mapping[str, Any]) -> str:
-    """What the last 0.2 s came to, for a measure that is a number without being steady."""
+    """Return what the last 0.2 s came to, for a measure that is a number without being steady."""
     value = steady[name]
     if not isinstance(value, float) or not math.isfinite(value):
         return ""

@@ -44,7 +44,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
 
 
 def page(topic: str) -> str:
-    """Markdown of one page.
+    """Return markdown of one page.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
 
 
 def _is_table(cls: type, key: str) -> bool:
-    """Whether a field is a table of its own, which has a section of its own."""
+    """Return whether a field is a table of its own, which has a section of its own."""
     if cls in (Fault, NodeFault):  # their models are written on one line; docs/netem.md has them
         return False
     kind = next(field.type for field in msgspec.structs.fields(cls) if field.encode_name == key)

@@ -10,11 +10,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.results.benchmark_registry import NO_BENCHMARK, Benchmark
+from scenarios.results.benchmark_registry import DIGITS, NO_BENCHMARK, UNITS, Benchmark, Quantity, heading
 from scenarios.results.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.metrics import Steady
-from scenarios.results.quantities import DIGITS, UNITS, Quantity, heading
 from scenarios.results.steadiness import STEADY
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
@@ -67,7 +66,7 @@ def grids(report: Report) -> tuple[Grid, ...]:
 
 
 def plain(report: Report) -> str:
-    """Text of a report for files, pipes and logs."""
+    """Return the text of a report for files, pipes and logs."""
     blocks = [_plain_grid(grid) for grid in grids(report)]
     if report.verdicts:
         width = max(len(verdict.claim.text) for verdict in report.verdicts)
@@ -112,7 +111,7 @@ def show(report: Report, console: Console) -> None:
 
 
 def _all_notes(report: Report) -> list[str]:
-    """Notes of a report, after what its sharing indices leave out."""
+    """Return the notes of a report, after what its sharing indices leave out."""
     agentless = [
         f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
         f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
@@ -154,7 +153,7 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
 
 
 def _own_grid(report: Report) -> Grid:
-    """The scenario's own metrics; "-" where there is no value, with the reason below."""
+    """Return the scenario's own metrics; "-" where there is no value, with the reason below."""
     own = report.found.own
     places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
     rows, reasons = [], []
@@ -213,7 +212,7 @@ def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Ste
 
 
 def _reasons(report: Report, quantities: tuple[Quantity, ...]) -> list[str]:
-    """A line for every number that is not shown, with what the last 0.2 s came to."""
+    """Return a line for every number that is not shown, with what the last 0.2 s came to."""
     lines = []
     for case, steady in report.found.results.items():
         for event, whole in steady.items():
@@ -247,7 +246,7 @@ def _plain_grid(grid: Grid) -> str:
 
 
 def _summary(report: Report) -> list[str]:
-    """How many claims hold, and how near the paper's tables are."""
+    """Return how many claims hold, and how near the paper's tables are."""
     return [_count(report.verdicts), *report.benchmark.lines(report.found)]
 
 

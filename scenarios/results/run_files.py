@@ -74,12 +74,12 @@ def set_broken(folder: Path, why: str) -> None:
 
 
 def no_room(error: BaseException) -> bool:
-    """Whether the system takes no more bytes, as of a full disk."""
+    """Return whether the system takes no more bytes, as of a full disk."""
     return isinstance(error, OSError) and error.errno in _NO_ROOM
 
 
 def refusal(folder: Path, error: OSError) -> str:
-    """What of a folder could not be written, and why.
+    """Return what of a folder could not be written, and why.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def shown(folder: Path) -> str:
-    """Folder as short as it can be named from here."""
+    """Return the folder as short as it can be named from here."""
     with contextlib.suppress(ValueError):
         return str(folder.resolve().relative_to(Path.cwd().resolve()))
     return str(folder)

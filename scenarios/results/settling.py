@@ -59,6 +59,6 @@ def settling(history: History, plates: Plates, window: Window, f_nom: float) -> 
 
 
 def _swing(x: Floats) -> float:
-    """Largest range of a column; who is off the network somewhere in it has none."""
+    """Return the largest range of a column; who is off the network somewhere in it has none."""
     ranges = x.max(axis=0) - x.min(axis=0)
     return float(np.nanmax(ranges)) if np.isfinite(ranges).any() else np.nan

@@ -26,7 +26,7 @@ FEWEST = 2
 """Rows that each of the two means needs at least."""
 
 
-class Bound(NamedTuple):
+class SteadyBound(NamedTuple):
     """How far a steady measure may move."""
 
     digit: float
@@ -37,16 +37,16 @@ class Bound(NamedTuple):
     """The same as a part of its value, where that is more."""
 
     def of(self, value: float) -> float:
-        """The change allowed at a value."""
+        """Return the change allowed at a value."""
         return max(self.digit, self.part * abs(value))
 
 
-BOUNDS: Mapping[str, Bound] = {
-    "f_error_Hz": Bound(0.01, "Hz"),
-    "MPSI": Bound(0.01, ""),
-    "V_error": Bound(0.001, "pu"),
-    "MQSI": Bound(0.01, "", part=0.05),
-    "p": Bound(0.01, "pu"),
+BOUNDS: Mapping[str, SteadyBound] = {
+    "f_error_Hz": SteadyBound(0.01, "Hz"),
+    "MPSI": SteadyBound(0.01, ""),
+    "V_error": SteadyBound(0.001, "pu"),
+    "MQSI": SteadyBound(0.01, "", part=0.05),
+    "p": SteadyBound(0.01, "pu"),
 }
 """Bounds by measure; frequency and power are looked at inverter by inverter."""
 
@@ -70,7 +70,7 @@ class Ends(NamedTuple):
 
 
 def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
-    """Rows at the end of a window that lasts from start to end (s) and has the rows inside."""
+    """Return the rows at the end of a window that lasts from start to end (s) and has the rows inside."""
     span = min(STEADY, 0.5 * (end - start))
     last = inside & (t >= end - span - 1e-9)
     before = inside & ~last & (t >= end - 2.0 * span - 1e-9)
@@ -79,7 +79,7 @@ def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
 
 
 def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
-    """Why a measure has no steady value; "" where it has.
+    """Return why a measure has no steady value; "" where it has.
 
     Parameters
     ----------

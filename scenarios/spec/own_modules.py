@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.results.own.claim_registry import CLAIMS
+from scenarios.results.benchmark_registry import CLAIMS
 from scenarios.results.own.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.spec.plugins import check_plugin, placed
 from scenarios.spec.scenario_errors import Mistakes

@@ -73,7 +73,7 @@ Settled indexes have the last digit that the paper prints, times a usual control
 
 
 def unit_of(name: str) -> str:
-    """Unit of a column, which its last word ends in; V_error and p are per unit.
+    """Return the unit of a column, which its last word ends in; V_error and p are per unit.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def unit_of(name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    """Words for an axis, with the unit.
+    """Return words for an axis, with the unit.
 
     A key without words of its own is named by its last part and its table, with the unit that its documentation tells.
 
@@ -114,7 +114,7 @@ def label_of(name: str) -> str:
 
 
 def _documented_unit(key: str) -> str:
-    """Unit in the documentation of a key of the scenario file; "" where there is none, or no such key."""
+    """Return the unit in the documentation of a key of the scenario file; "" where there is none, or no such key."""
     tables: Any = Scenario
     text = ""
     for step in key.split("."):
@@ -128,7 +128,7 @@ def _documented_unit(key: str) -> str:
 
 
 def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
-    """The struct that a field is, or has in a list or as an option."""
+    """Return the struct that a field is, or has in a list or as an option."""
     if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
         return annotation
     return next((found for part in typing.get_args(annotation) if (found := _struct_in(part))), None)

@@ -10,6 +10,7 @@ import copy
 import math
 import threading
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from typing import Any, Literal
@@ -27,8 +28,8 @@ from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.link_records import LinkRecord
-from scenarios.results.message_counts import messages_saved
-from scenarios.results.own.measuring import own_measures
+from scenarios.results.metrics import messages_saved
+from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Tape
 from scenarios.results.settling import settling
 from scenarios.spec import Scenario
@@ -36,6 +37,7 @@ from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.agentless import without_agent
 from scenarios.spec.configs import configs
 from scenarios.spec.scenario_changes import as_in
+from scenarios.sweep.file import Plan
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
@@ -123,7 +125,7 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History 
 
 
 def _accounts(links: LinkRecord) -> dict[str, float | None]:
-    """Messages over all emulated links together; nothing where there are none."""
+    """Return messages over all emulated links together; nothing where there are none."""
     books = links.counts.values()
     if not books:
         return {}
@@ -146,7 +148,7 @@ def _warnings(links: str, record: LinkRecord) -> str:
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
-    """Measures of one window as columns.
+    """Return the measures of one window as columns.
 
     Examples
     --------
@@ -163,7 +165,7 @@ def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
 
 
 def plant_at_start(config: PlantConfig) -> Plant:
-    """A plant at t = 0, copied from one that this thread has built before for the same settings.
+    """Return a plant at t = 0, copied from one that this thread has built before for the same settings.
 
     To factor the network and find the operating point is a fifth of a run, and what agents are told is no part of it.
     A copy gives the same bytes as a new plant: a test holds it to that.
@@ -178,3 +180,28 @@ def plant_at_start(config: PlantConfig) -> Plant:
             plants.popitem(last=False)
     plants.move_to_end(key)
     return copy.deepcopy(plants[key])
+
+
+FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256", "metric_warnings")
+"""Columns between parameters and indexes."""
+
+
+def columns_of(plan: Plan, done: Mapping[int, SweepRow]) -> dict[str, list[Any]]:
+    """Return the columns of the table by name, None where there is no value; see `table_of`."""
+    numbers = sorted(done)
+    rows, ends = [plan.runs[i] for i in numbers], [done[i] for i in numbers]
+    columns: dict[str, list[Any]] = {
+        "sample": [row.sample for row in rows],
+        "case": [row.case for row in rows],
+        "seed": [row.scenario.seed for row in rows],
+    }
+    for name in plan.parameters:
+        if name not in columns:
+            columns[name] = [row.shown[name] for row in rows]
+    for name in FATE[:-1]:
+        columns[name] = [getattr(end, name.removeprefix("history_")) or None for end in ends]
+    if any(run.scenario.metrics for run in rows):
+        columns["metric_warnings"] = [end.metric_warnings or None for end in ends]
+    for name in dict.fromkeys(name for end in ends for name in end.measures):
+        columns[name] = [end.measures.get(name) for end in ends]
+    return columns

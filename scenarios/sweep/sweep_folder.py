@@ -26,7 +26,7 @@ MANIFEST, JOURNAL, LOCK = "sweep.json", "runs.jsonl", ".lock"
 
 
 def folder_of(out: Path | None, name: str) -> Path:
-    """Folder of a sweep: the same every time, so that the same command goes on with what was interrupted."""
+    """Return the folder of a sweep: the same every time, so that the same command goes on with what was interrupted."""
     return RUNS / "sweeps" / name if out is None else out
 
 
@@ -91,7 +91,7 @@ class SweepFolder:
 
 
 def _check(folder: Path, whole: Mapping[str, object]) -> bool:
-    """Whether the folder is this sweep's from before; FolderError if it is something else's."""
+    """Return whether the folder is this sweep's from before; FolderError if it is something else's."""
     where = f"--out {shown(folder)}"
     if folder.exists() and not folder.is_dir():
         raise FolderError(f"{where}: this is a file; give a folder")
@@ -138,7 +138,7 @@ def _locked(folder: Path) -> int:
 
 
 def _read(journal: Path, runs: int) -> dict[int, SweepRow]:
-    """Finished runs; what a kill has left of a line is cut off."""
+    """Return the finished runs; what a kill has left of a line is cut off."""
     if not journal.exists():
         return {}
     text = journal.read_bytes()
@@ -163,5 +163,5 @@ def _read(journal: Path, runs: int) -> dict[int, SweepRow]:
 
 
 def _versions() -> dict[str, str]:
-    """Versions that the numbers depend on; Zenoh has no part in a run in one process."""
+    """Return the versions that the numbers depend on; Zenoh has no part in a run in one process."""
     return {name: version for name, version in versions().items() if name != "eclipse-zenoh"}

@@ -23,9 +23,8 @@ from matplotlib.ticker import MaxNLocator
 
 from scenarios.results.history import Floats
 from scenarios.results.plots import PAGE, case_style, save
-from scenarios.sweep.choice import Choice, choose, values
 from scenarios.sweep.column_labels import LEAST, WORDS, label_of
-from scenarios.sweep.statistics import Spread, spread_of
+from scenarios.sweep.statistics import Choice, Spread, choose, spread_of, values
 
 BINS = 12
 """Groups of equally many runs that a parameter drawn at random is cut into for its median."""
@@ -60,7 +59,7 @@ def draw_all(table: pa.Table, folder: Path) -> tuple[Path, ...]:
 
 
 def _curves(choice: Choice, window: str, x: str) -> Figure:
-    """Every index of a window against one parameter, a curve for each case."""
+    """Draw every index of a window against one parameter, a curve for each case."""
     figure, panels = _page(choice.indexes[window])
     for panel, index in zip(panels, choice.indexes[window], strict=True):
         never = []
@@ -105,7 +104,7 @@ def _bars(panel: Axes, spread: Spread, case: str, number: int, order: Sequence[A
 
 
 def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure:
-    """Median of every index of a window over two parameters."""
+    """Draw median of every index of a window over two parameters."""
     figure, panels = _page(choice.indexes[window])
     rows = choice.rows(case)
     xs, ys = (sorted(set(rows[name])) for name in (x, y))
@@ -138,7 +137,7 @@ def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure
 
 
 def _colours(medians: Any, index: str) -> tuple[float, float]:
-    """Ends of the scale of colours: those of the values, but so far apart that rounding has one colour."""
+    """Return the ends of the scale of colours: those of the values, but so far apart that rounding has one colour."""
     least = LEAST.get(index, 0.0)
     if not medians.count():
         return 0.0, least or 1.0

@@ -18,14 +18,13 @@ from scenarios.run import versions
 from scenarios.spec.scenario_writing import to_toml
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file import Plan
-from scenarios.sweep.sweep_case import SweepRow
-from scenarios.sweep.sweep_columns import FATE, columns_of
+from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of
 
 FILE = "results.parquet"
 
 
 def table_of(plan: Plan, done: Mapping[int, SweepRow]) -> pa.Table:
-    """Rows of the runs that are done.
+    """Return the rows of the runs that are done.
 
     Columns: `sample`, `case`, `seed`, the parameters by their path, `status` ("ran" or "broke"), `why`,
     `trips`, `link_warnings`, `history_sha256`, `links_sha256`, the indexes as "WINDOW.INDEX", and over emulated links
@@ -62,7 +61,7 @@ def _array(name: str, values: Sequence[Any], plan: Plan) -> pa.Array:
 
 
 def _column(values: Sequence[Any]) -> pa.Array:
-    """Values of a parameter: numbers and texts as such, what is neither as JSON."""
+    """Return the values of a parameter: numbers and texts as such, what is neither as JSON."""
     kinds = {type(value) for value in values}
     if kinds <= {bool}:
         return pa.array(values, pa.bool_())

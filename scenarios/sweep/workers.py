@@ -37,7 +37,7 @@ class WorkersError(RuntimeError):
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Return the cores that this process may use."""
     return int(cpu_count())
 
 

@@ -31,7 +31,7 @@ SOME = np.array([RESTART - 6, RESTART - 5, RESTART - 4, RESTART - 1, RESTART, RE
 
 
 RUNS = ((60, 24), (450, 12))
-"""Messages a run, and runs of each kind, each with a seed, and so draws, of its own; `bench/selfcheck.py` has more."""
+"""Messages a run, and runs of each kind, each with a seed, and so draws, of its own."""
 
 
 def probability(model: LossModel, seq: np.ndarray, lost: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from agents.agent import Agent
 from plant.build import build_plant
 from plant.equipment import F_NOM, Feeder
 from plant.telemetry_reporter import measurement_of
-from scenarios.predict.inverter_group import Fleet, fleet_of
+from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import Scenario, load_scenario
@@ -49,9 +49,9 @@ def scenario_of(
     return msgspec.structs.replace(scenario, cases={"x": case}, events=scenario.events[:1], time=time), feeder
 
 
-def fleet(graph: str, *, kappa: float | None = None) -> Fleet:
+def fleet(graph: str, *, kappa: float | None = None) -> InverterGroup:
     """All nine inverters on a graph."""
-    return fleet_of(*scenario_of(graph, kappa=kappa), "x")
+    return inverter_group_of(*scenario_of(graph, kappa=kappa), "x")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pytest
 from agents.agent_config import Gains
 from agents.laws.consensus import P_set_step
 from scenarios.predict.delay_limits import delay_limit, first_crossing
-from scenarios.predict.inverter_group import Fleet
+from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.results.history import Floats
 from tests.predict.graphs import GRAPHS, fleet
@@ -20,7 +20,9 @@ UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9)
 START, LOAD = 0.00647, 0.0088
 
 
-def plainly(case: Fleet, ticks: Ticks, count: int, rng: np.random.Generator | None = None) -> tuple[Floats, Floats]:
+def plainly(
+    case: InverterGroup, ticks: Ticks, count: int, rng: np.random.Generator | None = None
+) -> tuple[Floats, Floats]:
     """Errors e and set-points y under the paper's law and a quasi-steady plant, all remembered: nobody ships it."""
     n, w = case.n, case.weight
     y, e = [np.full(n, START)], [0.0]
@@ -49,7 +51,7 @@ def _of(value: object, key: object) -> int:
     return value.get(key, 0) if isinstance(value, dict) else value  # type: ignore[return-value]
 
 
-def drawn(seed: int) -> tuple[Fleet, Ticks]:
+def drawn(seed: int) -> tuple[InverterGroup, Ticks]:
     """A fleet on some graph with unequal ratings and droops, and a delay of its own for every link and inverter."""
     rng = np.random.default_rng(seed)
     case = fleet(list(GRAPHS)[seed % len(GRAPHS)])
@@ -87,7 +89,7 @@ def test_lossy_links_follow_the_mean() -> None:
     assert (np.abs(runs.mean(axis=0) - mean) <= 5.0 * error + 1e-12).all()
 
 
-def _swing(case: Fleet, ticks: Ticks, plant: str) -> float:
+def _swing(case: InverterGroup, ticks: Ticks, plant: str) -> float:
     """By what factor the swing of the set-points grows in 72 s, from 4 s on, when the transient has passed."""
     path = Loop(fleet=case, ticks=ticks, plant=plant).run(4000, np.full(9, START), LOAD)  # type: ignore[arg-type]
     around = np.abs(path.set_point - LOAD).max(axis=1)

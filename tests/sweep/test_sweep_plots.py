@@ -13,10 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.sweep.choice import choose, values
 from scenarios.sweep.column_labels import label_of
-from scenarios.sweep.statistics import spread_of
-from scenarios.sweep.sweep_columns import FATE
+from scenarios.sweep.statistics import choose, spread_of, values
+from scenarios.sweep.sweep_case import FATE
 from scenarios.sweep.sweep_plots import _curves, _heat_maps, draw_all
 
 

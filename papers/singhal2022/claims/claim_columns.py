@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from gridpeers.benchmarks import UNITS, Claim, Findings, Quantity, label
 from papers.singhal2022.tables import Cell, tables_of
-from papers.singhal2022.tolerances import V_RELATIVE, Number
+from papers.singhal2022.tolerances import V_RELATIVE, TableNumber
 
 
-def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim:
-    """The claim that all numbers of one column of a table are near the paper's."""
+def near_the_table(experiment: str, number: TableNumber, quantity: Quantity) -> Claim:
+    """Return the claim that all numbers of one column of a table are near the paper's."""
     cells = _column(experiment, number, quantity)
     tolerance = cells[0].tolerance.value
     return _near(
@@ -23,8 +23,8 @@ def near_the_table(experiment: str, number: Number, quantity: Quantity) -> Claim
     )
 
 
-def near_relatively(experiment: str, number: Number, known_miss: str = "") -> Claim:
-    """The claim that all V_error of a table are near the paper's beside their own size."""
+def near_relatively(experiment: str, number: TableNumber, known_miss: str = "") -> Claim:
+    """Return the claim that all V_error of a table are near the paper's beside their own size."""
     cells = _column(experiment, number, "V_error")
     text = (
         f"all {_WORDS.get(len(cells), str(len(cells)))} V_error within {100 * V_RELATIVE.value:g} % of Table {number}'s"
@@ -32,7 +32,7 @@ def near_relatively(experiment: str, number: Number, known_miss: str = "") -> Cl
     return _near(f"table_{number}_V_error_relative", text, cells, Cell.within_relative, known_miss)
 
 
-def _column(experiment: str, number: Number, quantity: Quantity) -> tuple[Cell, ...]:
+def _column(experiment: str, number: TableNumber, quantity: Quantity) -> tuple[Cell, ...]:
     table = next(table for table in tables_of(experiment) if table.number == number)
     return tuple(cell for cell in table.cells if cell.quantity == quantity)
 
@@ -40,7 +40,7 @@ def _column(experiment: str, number: Number, quantity: Quantity) -> tuple[Cell, 
 def _near(
     name: str, text: str, cells: Sequence[Cell], within: Callable[[Cell, float], bool | None], known_miss: str = ""
 ) -> Claim:
-    """The claim that all our numbers pass a judgement beside the paper's."""
+    """Return the claim that all our numbers pass a judgement beside the paper's."""
     unit = UNITS[cells[0].quantity]
 
     def lacking(found: Findings) -> str:
@@ -73,3 +73,18 @@ def _near(
 
 
 _WORDS = {3: "three", 5: "five", 8: "eight"}
+
+
+def ratio(before: float, after: float) -> float:
+    """Return how many times smaller; nothing left is infinitely better."""
+    return before / after if after else math.inf
+
+
+def by_event(events: Iterable[str], values: Iterable[str]) -> str:
+    """Return words on several events."""
+    return ", ".join(f"{event} {value}" for event, value in zip(events, values, strict=True))
+
+
+def seconds(t: float | None) -> str:
+    """Write a time that may never have come."""
+    return "never" if t is None else f"{t:.2f} s"

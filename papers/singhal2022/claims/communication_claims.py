@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Claim, Findings, Judge
-from papers.singhal2022.claims.claim_columns import near_relatively, near_the_table
-from papers.singhal2022.claims.wording import seconds
+from papers.singhal2022.claims.claim_columns import near_relatively, near_the_table, seconds
 from papers.singhal2022.tolerances import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
 
 EVENT, RETURN = "event1", "return"

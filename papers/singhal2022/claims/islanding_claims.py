@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from gridpeers.benchmarks import Claim, Findings, Judge, Quantity
-from papers.singhal2022.claims.claim_columns import near_relatively, near_the_table
-from papers.singhal2022.claims.wording import by_event, ratio, seconds
+from papers.singhal2022.claims.claim_columns import by_event, near_relatively, near_the_table, ratio, seconds
 from papers.singhal2022.tolerances import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
 
 CASES = ("I", "II", "III", "IV")

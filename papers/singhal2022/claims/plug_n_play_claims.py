@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from gridpeers.benchmarks import F_BAND, MPSI_BAND, Claim, Findings, Judge
-from papers.singhal2022.claims.wording import seconds
+from papers.singhal2022.claims.claim_columns import seconds
 from papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
 
 LEAVE, RETURN = "leave", "return"

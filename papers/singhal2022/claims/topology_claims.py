@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from statistics import median
 
-from gridpeers.benchmarks import MPSI_BAND, Claim, Findings
-from papers.singhal2022.graph_runs import GraphRun, graph_runs
+from gridpeers.benchmarks import MPSI_BAND, Claim, Findings, Settling, Steady
 from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphRun:
+    """A run on one random graph: how the event settled, and what it left."""
+
+    links: int
+    """Links of the graph."""
+    connected: bool
+    """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
+    settled: Settling
+    steady: Steady
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphFindings(Findings):
+    """Findings of an experiment that is one event over many graphs."""
+
+    graphs: tuple[GraphRun, ...] = ()
+
+
+def graph_runs(found: Findings) -> tuple[GraphRun, ...]:
+    """Return the runs over graphs; none of an experiment that has other findings."""
+    return found.graphs if isinstance(found, GraphFindings) else ()
+
 
 TREE = 8
 """Links of a tree of nine inverters: with fewer, no graph is connected."""
@@ -16,7 +41,7 @@ SOURCE = "section 4, figure of topologies"
 
 
 def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
-    """Median time (s) to MPSI < 0.01 by number of links; infinite where most never share."""
+    """Return the median time (s) to MPSI < 0.01 by number of links; infinite where most never share."""
     by_links: dict[int, list[float]] = {}
     for run in runs:
         t = run.settled.t_share_s
@@ -25,7 +50,7 @@ def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
 
 
 def connected(found: Findings) -> tuple[GraphRun, ...]:
-    """Runs on connected graphs."""
+    """Return the runs on connected graphs."""
     return tuple(run for run in graph_runs(found) if run.connected)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from gridpeers.benchmarks import Claim, Findings
-from papers.singhal2022.claims.wording import seconds
+from papers.singhal2022.claims.claim_columns import seconds
 from papers.singhal2022.tolerances import WITHIN
 
 CASES = ("none", "clamp", "conditional")

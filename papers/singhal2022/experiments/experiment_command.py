@@ -11,8 +11,8 @@ import gridpeers as gp
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
 
 if TYPE_CHECKING:
+    from papers.singhal2022.experiments.experiment_output import ExperimentResult
     from papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
-    from papers.singhal2022.experiments.output.experiment_result import Result
 
 
 def experiment(
@@ -59,7 +59,7 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Result:
+def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> ExperimentResult:
     """Do what is left of the sweep, and draw."""
     from gridpeers.cli.commands.sweep_command import check_packages, finish
 
@@ -67,7 +67,7 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     import pyarrow.parquet as pq
 
     from gridpeers.sweep_files import read_sweep
-    from papers.singhal2022.experiments.data.sweep_data import SweepData
+    from papers.singhal2022.experiments.experiment_data import SweepData
 
     try:
         plan = read_sweep(source.sweep)
@@ -80,14 +80,14 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Res
     return source.make(SweepData(rows=rows, base=plan.base, window=plan.base.events[0].label))
 
 
-def _told(source: FromScenario, folder: Path) -> Result:
+def _told(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
     from rich.console import Console
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import progress
     from gridpeers.output_folders import shown
-    from papers.singhal2022.experiments.data.case_data import CaseData
+    from papers.singhal2022.experiments.experiment_data import CaseData
 
     scenario = gp.load(source.scenario)
     try:
@@ -104,7 +104,7 @@ def _told(source: FromScenario, folder: Path) -> Result:
 
 
 def _title(source: FromSweep | FromScenario) -> str:
-    """The title of the file that is run."""
+    """Return the title of the file that is run."""
     from gridpeers.sweep_files import sweep_title
     from papers.singhal2022.experiments.experiment_registry import FromScenario
 

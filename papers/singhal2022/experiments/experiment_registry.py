@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from papers.singhal2022.experiments.communication_experiment import communication
-from papers.singhal2022.experiments.data.case_data import CaseData
-from papers.singhal2022.experiments.data.sweep_data import SweepData
-from papers.singhal2022.experiments.delay_experiment import delay
+from papers.singhal2022.experiments.delay_experiment import communication, delay
+from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
+from papers.singhal2022.experiments.experiment_output import ExperimentResult
 from papers.singhal2022.experiments.flapping_experiment import flapping
 from papers.singhal2022.experiments.handling_experiment import handling
 from papers.singhal2022.experiments.loss_experiment import loss
-from papers.singhal2022.experiments.output.experiment_result import Result
 from papers.singhal2022.experiments.partition_experiment import partition
 from papers.singhal2022.experiments.places_experiment import places
 from papers.singhal2022.experiments.topology_experiment import topology
@@ -24,7 +22,7 @@ class FromSweep:
 
     sweep: str
     """Name in `scenarios/catalogue/sweeps/`."""
-    make: Callable[[SweepData], Result]
+    make: Callable[[SweepData], ExperimentResult]
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class FromScenario:
 
     scenario: str
     """Name in `scenarios/catalogue/`."""
-    make: Callable[[CaseData], Result]
+    make: Callable[[CaseData], ExperimentResult]
 
 
 EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from gridpeers.theory import Case, Times, predicted_times
-from papers.singhal2022.experiments.data.case_data import CaseData, without
 from papers.singhal2022.experiments.delay_experiment import of_times
-from papers.singhal2022.experiments.output.experiment_page import Curve, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Cell, Table
+from papers.singhal2022.experiments.experiment_data import CaseData, without
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    Panel,
+    TableCell,
+)
 
 
-def flapping(told: CaseData) -> Result:
-    """F and MPSI over time, and times after each event."""
+def flapping(told: CaseData) -> ExperimentResult:
+    """Return F and MPSI over time, and times after each event."""
     cases = told.scenario.cases
     panels = [
         Panel(
@@ -34,7 +39,7 @@ def flapping(told: CaseData) -> Result:
         names={i: case.title for i, case in enumerate(cases.values())},
         height=2.4,
     )
-    return Result(page=page, table=_table(told))
+    return ExperimentResult(page=page, table=_table(told))
 
 
 def extra_age(rule: Case) -> float:
@@ -43,11 +48,11 @@ def extra_age(rule: Case) -> float:
     return sum(flap.down_s**2 / (2.0 * (flap.up_s + flap.down_s)) for flap in flaps)
 
 
-def _table(told: CaseData) -> Table:
+def _table(told: CaseData) -> ExperimentTable:
     ends = [event.t_s for event in told.scenario.events[1:]] + [told.scenario.time.end_s]
-    rows: list[list[Cell]] = []
+    rows: list[list[TableCell]] = []
     for case, rule in told.scenario.cases.items():
-        row: list[Cell] = [rule.title, extra_age(rule)]
+        row: list[TableCell] = [rule.title, extra_age(rule)]
         for event, end in zip(told.scenario.events, ends, strict=True):
             said = of_times(_predicted(told, case, event.label))
             found = told.settling(case, event.t_s, end)
@@ -57,11 +62,11 @@ def _table(told: CaseData) -> Table:
     for event in told.scenario.events:
         for what in ("f", "sharing"):
             columns += [f"{event.label}, {what}, predicted (s)", "measured (s)"]
-    return Table(columns=columns, rows=rows)
+    return ExperimentTable(columns=columns, rows=rows)
 
 
 def _predicted(told: CaseData, case: str, label: str) -> Times:
-    """Times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
+    """Return the times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
     rule, fleet = told.scenario.cases[case], told.fleet(case)
     ends = ("inv4", "inv5")
     late = {(a, b): fleet.T_c + extra_age(rule) for a in ends for b in ends if a != b}

@@ -9,11 +9,16 @@ from typing import Any
 import numpy as np
 
 from gridpeers.theory import predicted_times
-from papers.singhal2022.experiments.data.sweep_data import Row, SweepData
 from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.output.experiment_page import Curve, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Cell, Table
+from papers.singhal2022.experiments.experiment_data import Row, SweepData
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    Panel,
+    TableCell,
+)
 
 CASES = ("full", "reduced", "path")
 
@@ -36,11 +41,11 @@ Condition = tuple[float, float]
 """Delay (s) and loss of all agent-agent links."""
 
 
-def handling(swept: SweepData) -> Result:
-    """Times of every option under every condition."""
+def handling(swept: SweepData) -> ExperimentResult:
+    """Return the times of every option under every condition."""
     conditions = list(dict.fromkeys(_condition(row) for row in swept.rows))
     panels: list[Panel] = []
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[TableCell, ...]] = []
     for number, (index, title) in enumerate(INDEXES):
         for condition in conditions:
             curves = []
@@ -76,11 +81,13 @@ def handling(swept: SweepData) -> Result:
         share_y=True,
         height=2.6,
     )
-    return Result(page=page, table=Table(columns=("graph", "links", "handling", "f (s)", "sharing (s)"), rows=rows))
+    return ExperimentResult(
+        page=page, table=ExperimentTable(columns=("graph", "links", "handling", "f (s)", "sharing (s)"), rows=rows)
+    )
 
 
 def words(condition: Condition) -> str:
-    """A condition in words.
+    """Return a condition in words.
 
     Examples
     --------

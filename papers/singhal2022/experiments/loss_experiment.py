@@ -11,17 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from gridpeers.theory import predicted_times
-from papers.singhal2022.experiments.data.sweep_data import SweepData
 from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.output.experiment_page import Curve, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Table
+from papers.singhal2022.experiments.experiment_data import SweepData
+from papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, ExperimentTable, Page, Panel
 
 DELAY, LOSS = "link[0].delay", "link[0].loss"
 
 
-def loss(swept: SweepData) -> Result:
-    """Times against loss, and against mean age, measured and predicted."""
+def loss(swept: SweepData) -> ExperimentResult:
+    """Return the times against loss, and against mean age, measured and predicted."""
     cases, T_c = list(swept.base.cases)[:4], swept.base.time.T_c_s
     lost, late = swept.values(LOSS, {DELAY: 0.0}), swept.values(DELAY, {LOSS: 0.0})[1:]
     age_of_loss, ages = [T_c / (1.0 - p) for p in lost], [T_c, *late]
@@ -72,10 +70,10 @@ def loss(swept: SweepData) -> Result:
         names={style: swept.base.cases[case].title for style, case in enumerate(cases)},
         looks={"measured": "loss: median and range of 3 seeds", "hollow": "delay", "predicted": "predicted"},
     )
-    return Result(page=page, table=_table(swept, cases, lost, T_c))
+    return ExperimentResult(page=page, table=_table(swept, cases, lost, T_c))
 
 
-def _table(swept: SweepData, cases: Sequence[str], lost: Sequence[float], T_c: float) -> Table:
+def _table(swept: SweepData, cases: Sequence[str], lost: Sequence[float], T_c: float) -> ExperimentTable:
     """Each loss beside the delay of its mean age, where that was run."""
     rows = []
     for case in cases:
@@ -90,13 +88,13 @@ def _table(swept: SweepData, cases: Sequence[str], lost: Sequence[float], T_c: f
             rows.append((case, p, age, *cells))
     columns = ["graph", "loss", "mean age (s)"]
     columns += [f"{w}, {how} (s)" for w in ("f", "sharing") for how in ("predicted", "measured", "delay of that age")]
-    return Table(columns=columns, rows=rows)
+    return ExperimentTable(columns=columns, rows=rows)
 
 
 def _said(
     swept: SweepData, case: str, *, delays: Sequence[float] = (), losses: Sequence[float] = ()
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Predicted times, a row per delay and loss."""
+    """Return the predicted times, a row per delay and loss."""
     fleet = swept.fleet(case)
     late = [predicted_times(fleet, link_delay_s=d, load=swept.load) for d in delays]
     lossy = [predicted_times(fleet, loss=p, load=swept.load) for p in losses]

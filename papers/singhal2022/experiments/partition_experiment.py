@@ -6,10 +6,16 @@ import numpy as np
 
 from gridpeers.measures import Floats, Settling
 from gridpeers.theory import Loop, Ticks, sharing_index
-from papers.singhal2022.experiments.data.case_data import CaseData, cut_between, without
-from papers.singhal2022.experiments.output.experiment_page import Curve, Look, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Cell, Table
+from papers.singhal2022.experiments.experiment_data import CaseData, cut_between, without
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Look,
+    Page,
+    Panel,
+    TableCell,
+)
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),
@@ -25,8 +31,8 @@ LOST = 1.0 - 1e-12
 """Probability that a message is lost in a partition, for the model, which asks for less than 1."""
 
 
-def partition(told: CaseData) -> Result:
-    """F and MPSI over time, and what is left and comes back, in numbers."""
+def partition(told: CaseData) -> ExperimentResult:
+    """Return F and MPSI over time, and what is left and comes back, in numbers."""
     split = told.scenario.cases["halves"].netem.partitions[0]
     event = told.scenario.events[-1]
     start, end = split.from_s, split.to_s or told.scenario.time.end_s
@@ -63,11 +69,11 @@ def partition(told: CaseData) -> Result:
         looks=looks,
         height=2.5,
     )
-    return Result(page=page, table=_table(told, start, event.t_s, end))
+    return ExperimentResult(page=page, table=_table(told, start, event.t_s, end))
 
 
 def predicted(told: CaseData, case: str, length: float) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Time after the loss of load (s), and f (Hz) and MPSI, as long as the groups last.
+    """Return the time after the loss of load (s), and f (Hz) and MPSI, as long as the groups last.
 
     What is held stays, as if all that follows were lost; what has expired is a link that is not there.
     """
@@ -82,14 +88,14 @@ def predicted(told: CaseData, case: str, length: float) -> tuple[Floats, tuple[F
 
 
 def groups_of(told: CaseData, case: str) -> dict[str, str]:
-    """Group of each inverter in the case's partition."""
+    """Return the group of each inverter in the case's partition."""
     (split,) = told.scenario.cases[case].netem.partitions
     microgrids = {row.name: row.microgrid for row in told.feeder.inverters}
     return {name: split.group(name, microgrids) or "" for name in microgrids}
 
 
-def _table(told: CaseData, start: float, event: float, end: float) -> Table:
-    rows: list[list[Cell]] = []
+def _table(told: CaseData, start: float, event: float, end: float) -> ExperimentTable:
+    rows: list[list[TableCell]] = []
     for case, rule in told.scenario.cases.items():
         t, after = told.t(case), told.settling(case, end, told.scenario.time.end_s)
         apart = round(1e3 * (told.mean(told.f(case), case, end) - told.feeder.f_nom), 1) + 0.0  # no -0
@@ -110,8 +116,8 @@ def _table(told: CaseData, start: float, event: float, end: float) -> Table:
         "sharing back after (s)",
         "largest abs(f - 60) after (mHz)",
     )
-    return Table(columns=columns, rows=rows)
+    return ExperimentTable(columns=columns, rows=rows)
 
 
-def _back(after: Settling) -> tuple[Cell, Cell]:
+def _back(after: Settling) -> tuple[TableCell, TableCell]:
     return after.t_f_s, after.t_share_s

@@ -10,11 +10,16 @@ import numpy as np
 
 from gridpeers.measures import Flags, Floats
 from gridpeers.theory import delay_limit, var_delay_limit, var_growth
-from papers.singhal2022.experiments.data.sweep_data import SweepData
 from papers.singhal2022.experiments.delay_experiment import ALONE, DELAY, K_Q, WHOLE
-from papers.singhal2022.experiments.output.experiment_page import Curve, Line, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Table
+from papers.singhal2022.experiments.experiment_data import SweepData
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    LimitLine,
+    Page,
+    Panel,
+)
 
 ON = "link[0].on"
 
@@ -29,7 +34,7 @@ LEAST = 1e-5
 """Swings below this (Hz, pu) are drawn as this: what is left of a transient, or rounding."""
 
 
-def places(swept: SweepData) -> Result:
+def places(swept: SweepData) -> ExperimentResult:
     """Swing at the end of the run against delay, for each place, with predicted limits."""
     limits = _limits(swept)
     panels, rows = [], []
@@ -41,7 +46,7 @@ def places(swept: SweepData) -> Result:
                 curves.append(Curve(x=x, y=np.maximum(y, LEAST), style=style))
                 limit = limits[index, on != LINKS, case]
                 if np.isfinite(limit) and limit <= x[-1]:
-                    lines.append(Line(x=limit, style=style))
+                    lines.append(LimitLine(x=limit, style=style))
                 calm, wild = _between(x, y < (F_SWINGS if index == "f_swing_Hz" else V_SWINGS))
                 rows.append((title, place, case, limit, calm, wild))
             panels.append(
@@ -66,7 +71,7 @@ def places(swept: SweepData) -> Result:
         height=2.9,
     )
     columns = ("what swings", "late", "graph", "predicted limit (s)", "calm up to (s)", "swings from (s)")
-    return Result(page=page, table=Table(columns=columns, rows=rows))
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 
 _PLACES = ((LINKS, "links"), (MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
@@ -79,7 +84,7 @@ _ROWS = (
 
 
 def _limits(swept: SweepData) -> dict[tuple[str, bool, str], float]:
-    """Predicted limits (s) by what swings, whether links of the plant are late, and graph."""
+    """Return the predicted limits (s) by what swings, whether links of the plant are late, and graph."""
     found = {}
     for case in CASES:
         fleet = swept.fleet(case)
@@ -100,6 +105,6 @@ def _var_link_limit(swept: SweepData, case: str) -> float:
 
 
 def _between(x: Floats, calm: Flags) -> tuple[float, float]:
-    """The last delay up to which all is calm, and the next one; infinite where nothing ever swings."""
+    """Return the last delay up to which all is calm, and the next one; infinite where nothing ever swings."""
     first = int(np.argmin(calm)) if not calm.all() else len(x)
     return float(x[first - 1]) if first else 0.0, float(x[first]) if first < len(x) else np.inf

@@ -9,18 +9,16 @@ import numpy as np
 
 from gridpeers.measures import Floats
 from gridpeers.random_graphs import Control, adjacency
-from gridpeers.theory import Fleet, predicted_times
-from papers.singhal2022.experiments.data.sweep_data import Row, SweepData
+from gridpeers.theory import InverterGroup, predicted_times
 from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.output.experiment_page import Curve, Look, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Table
+from papers.singhal2022.experiments.experiment_data import Row, SweepData
+from papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, ExperimentTable, Look, Page, Panel
 
 DELAY, LINKS = "link[0].delay", "graph.links"
 
 
-def topology(swept: SweepData) -> Result:
-    """Times against the number of links, with and without delay, measured and predicted."""
+def topology(swept: SweepData) -> ExperimentResult:
+    """Return the times against the number of links, with and without delay, measured and predicted."""
     said = {(row["sample"]): _said(swept, row) for row in swept.rows}
     delays = swept.values(DELAY)
     panels = []
@@ -54,10 +52,10 @@ def topology(swept: SweepData) -> Result:
         looks=looks,
         share_y=True,
     )
-    return Result(page=page, table=_table(swept, said))
+    return ExperimentResult(page=page, table=_table(swept, said))
 
 
-def _table(swept: SweepData, said: Mapping[int, tuple[float, float]]) -> Table:
+def _table(swept: SweepData, said: Mapping[int, tuple[float, float]]) -> ExperimentTable:
     rows = []
     for d in swept.values(DELAY):
         for links in swept.values(LINKS):
@@ -70,7 +68,7 @@ def _table(swept: SweepData, said: Mapping[int, tuple[float, float]]) -> Table:
             rows.append((d, links, len(found), *cells))
     columns = ["delay (s)", "links", "graphs"]
     columns += [f"{w}, {h} (s)" for w in ("f", "sharing") for h in ("predicted", "median", "lowest", "highest")]
-    return Table(columns=columns, rows=rows)
+    return ExperimentTable(columns=columns, rows=rows)
 
 
 def _of(swept: SweepData, rows: Sequence[Row], index: str) -> Floats:
@@ -82,12 +80,12 @@ def _medians(said: Mapping[int, tuple[float, float]], rows: Sequence[Row], at: F
 
 
 def _said(swept: SweepData, row: Row) -> tuple[float, float]:
-    """Predicted times of one random graph."""
+    """Return the predicted times of one random graph."""
     return of_times(predicted_times(fleet_on(swept, row["graph.edges"]), link_delay_s=row[DELAY], load=swept.load))
 
 
-def fleet_on(swept: SweepData, edges: str) -> Fleet:
-    """The inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
+def fleet_on(swept: SweepData, edges: str) -> InverterGroup:
+    """Return the inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
     case = next(iter(swept.base.cases))
     first, rest = zip(*(edge.split("-") for edge in edges.split()), strict=True)
     control = Control(secondary="all", graph="links", links=tuple(zip(first, rest, strict=True)))

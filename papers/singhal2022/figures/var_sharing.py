@@ -14,12 +14,14 @@ from papers.singhal2022.tolerances import MQSI_FACTOR
 _COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
 _MARKERS = "os^D"
 
-Values = Mapping[tuple[str, str], float]
+EventValues = Mapping[tuple[str, str], float]
 """MQSI by case and event."""
 
 
-def var_sharing(paper: Values, ours: Mapping[str, Values], cases: Sequence[str], events: Sequence[str]) -> Figure:
-    """A mark for each variant of ours beside the paper's line, one panel for each event.
+def var_sharing(
+    paper: EventValues, ours: Mapping[str, EventValues], cases: Sequence[str], events: Sequence[str]
+) -> Figure:
+    """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
 
     The axis is one of logarithms, as MQSI is 100 times smaller in case IV than in case II; marks stand on it instead of
     bars, which would have no foot there.

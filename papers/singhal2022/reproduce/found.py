@@ -12,14 +12,14 @@ from typing import Any
 
 from gridpeers.benchmarks import Findings, Verdict
 from gridpeers.output_folders import versions
-from papers.singhal2022.graph_runs import graph_runs
-from papers.singhal2022.headline import Number, numbers
+from papers.singhal2022.claims.topology_claims import graph_runs
+from papers.singhal2022.headline import ComparedNumber, numbers
 from papers.singhal2022.reproduce.parts import Part, Picture
 from papers.singhal2022.tables import Cell, PaperTable
 
 
 @dataclass(frozen=True, kw_only=True)
-class Result:
+class PartResult:
     """What one part came to."""
 
     part: Part
@@ -42,7 +42,7 @@ class Result:
 class Reproduction:
     """Everything that the report tells."""
 
-    results: tuple[Result, ...]
+    results: tuple[PartResult, ...]
     driver: str
     seed: int
     started: str
@@ -71,12 +71,12 @@ class Reproduction:
         return any(verdict.status == "FAIL" for verdict in self.verdicts)
 
     def counts(self) -> dict[str, int]:
-        """How many claims have which status."""
+        """Return how many claims have which status."""
         statuses = [verdict.status for verdict in self.verdicts]
         return {status: statuses.count(status) for status in dict.fromkeys(("PASS", "FAIL", "MISS", *statuses))}
 
     @property
-    def numbers(self) -> list[Number]:
+    def numbers(self) -> list[ComparedNumber]:
         """All numbers of the tables, ours beside the paper's."""
         return [number for result in self.results for number in numbers(result.found, result.tables)]
 
@@ -89,7 +89,7 @@ class Reproduction:
 
 
 def machine() -> str:
-    """Processor, its cores that may be used, memory and system."""
+    """Return processor, its cores that may be used, memory and system."""
     cpu = platform.processor() or platform.machine()
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -101,7 +101,7 @@ def machine() -> str:
 
 
 def metrics_json(whole: Reproduction) -> str:
-    """Text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
+    """Return the text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
     tables = [
         {
             "table": cell.table,
@@ -158,13 +158,13 @@ def metrics_json(whole: Reproduction) -> str:
     return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
 
 
-def _ours(result: Result, cell: Cell) -> float | None:
-    """Our number at the place of the paper's; None where it is not steady."""
+def _ours(result: PartResult, cell: Cell) -> float | None:
+    """Return our number at the place of the paper's; None where it is not steady."""
     return None if result.found.reason(cell) else result.found.value(cell)
 
 
 def _plain(value: Any) -> Any:
-    """The same with null for what is not a number."""
+    """Return the same with null for what is not a number."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gridpeers.benchmarks import HEADINGS, Quantity
-from papers.singhal2022.reproduce.found import Result
+from papers.singhal2022.reproduce.found import PartResult
 from papers.singhal2022.tables import Cell, PaperTable
 from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
 
@@ -22,15 +22,15 @@ class Entry(NamedTuple):
     """Every judgement: by what, "" for the tolerance of its table, and whether it passes."""
 
 
-class Line(NamedTuple):
+class GridRow(NamedTuple):
     """One row: a case (or an island) after one event."""
 
     label: str
     entries: tuple[Entry, ...]
 
 
-def lines(table: PaperTable, result: Result) -> tuple[Line, ...]:
-    """Rows of a table, in the paper's order."""
+def lines(table: PaperTable, result: PartResult) -> tuple[GridRow, ...]:
+    """Return the rows of a table, in the paper's order."""
     rows: dict[str, dict[Quantity, Cell]] = {}
     titles = titles_of(result)
     several = len({cell.event for cell in table.cells}) > 1
@@ -38,19 +38,19 @@ def lines(table: PaperTable, result: Result) -> tuple[Line, ...]:
         what = f"island of {cell.island}" if cell.island else titles.get(cell.case, cell.case)
         rows.setdefault(f"{what}, {cell.event}" if several else what, {})[cell.quantity] = cell
     return tuple(
-        Line(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
+        GridRow(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
         for label, cells in rows.items()
     )
 
 
-def titles_of(result: Result) -> dict[str, str]:
-    """Case names for people."""
+def titles_of(result: PartResult) -> dict[str, str]:
+    """Return the case names for people."""
     words = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
     return {case: f"{case} {words[case]}" if case in words else case for case in result.found.results}
 
 
 def tolerances(table: PaperTable) -> list[str]:
-    """What each column is judged by, and why."""
+    """Return what each column is judged by, and why."""
     found = []
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)
@@ -62,7 +62,7 @@ def tolerances(table: PaperTable) -> list[str]:
     return found
 
 
-def _entry(cell: Cell, result: Result) -> Entry:
+def _entry(cell: Cell, result: PartResult) -> Entry:
     ours, reason = result.found.value(cell), result.found.reason(cell)
     digits, paper = cell.digits + 1, f"{cell.paper:.{cell.digits}f}"
     if reason:

@@ -211,7 +211,7 @@ CHOICES = ("tables", "figures", *(part.name for part in PARTS))
 
 
 def chosen(only: str | None) -> tuple[Part, ...]:
-    """Parts that are to be run.
+    """Return the parts that are to be run.
 
     Examples
     --------

@@ -10,7 +10,7 @@ from pathlib import Path
 from gridpeers.benchmarks import HEADINGS, Verdict
 from gridpeers.output_folders import versions
 from papers.singhal2022.headline import headline
-from papers.singhal2022.reproduce.found import Reproduction, Result, machine
+from papers.singhal2022.reproduce.found import PartResult, Reproduction, machine
 from papers.singhal2022.reproduce.grid import Entry, lines, tolerances
 from papers.singhal2022.tables import PaperTable
 
@@ -23,7 +23,7 @@ PAPER = (
 
 
 def html(whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
-    """Text of report.html."""
+    """Return the text of report.html."""
     body = [*_head(whole), *(line for result in whole.results for line in _part(result)), *_end(whole, settings)]
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -60,7 +60,7 @@ def _head(whole: Reproduction) -> Iterator[str]:
     )
 
 
-def _part(result: Result) -> Iterator[str]:
+def _part(result: PartResult) -> Iterator[str]:
     part = result.part
     yield f'<section id="{part.name}"><h2>{escape(part.title)}</h2><p>{escape(part.what)}</p>'
     for table in result.tables:
@@ -76,7 +76,7 @@ def _part(result: Result) -> Iterator[str]:
     yield "</section>"
 
 
-def _table(table: PaperTable, result: Result) -> Iterator[str]:
+def _table(table: PaperTable, result: PartResult) -> Iterator[str]:
     yield f'<h3>Table {table.number}. {escape(table.title)}</h3><table class="numbers"><thead><tr><th rowspan="2"></th>'
     yield "".join(f'<th colspan="3">{escape(HEADINGS[quantity])}</th>' for quantity in table.quantities)
     yield "</tr><tr>" + "<th>paper</th><th>ours</th><th>difference</th>" * len(table.quantities)
@@ -135,7 +135,7 @@ def _mark(status: str) -> str:
 
 
 def _within(entry: Entry) -> str:
-    """A mark for every judgement of a number."""
+    """Return a mark for every judgement of a number."""
     marks = {True: '<span class="ok" title="within">✓</span>', False: '<span class="off" title="off">✗</span>'}
     return "; ".join(
         marks[holds] + (f' <span class="small">{escape(name)}</span>' if name else "") for name, holds in entry.judged

@@ -107,7 +107,7 @@ def _reproduce(
 
 
 def _told(whole: object) -> list[str]:
-    """The end in lines: every claim that does not hold, and the counts."""
+    """Return the end in lines: every claim that does not hold, and the counts."""
     from papers.singhal2022.headline import headline
     from papers.singhal2022.reproduce.found import Reproduction
 

@@ -6,7 +6,7 @@ from gridpeers.theory import Spec
 
 
 def settings(scenarios: dict[str, Spec]) -> list[tuple[str, str, str]]:
-    """What, its value with the unit, and why, for the scenarios of a report.
+    """Return what, its value with the unit, and why, for the scenarios of a report.
 
     Parameters
     ----------

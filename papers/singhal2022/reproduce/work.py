@@ -15,7 +15,7 @@ from gridpeers.cli.remaining import Tell
 from gridpeers.theory import Spec
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
-from papers.singhal2022.reproduce.found import Result
+from papers.singhal2022.reproduce.found import PartResult
 from papers.singhal2022.reproduce.parts import Part
 from papers.singhal2022.reproduce.studies import banks
 from papers.singhal2022.reproduce.studies import topology_study as topology
@@ -24,7 +24,7 @@ from papers.singhal2022.tables import tables_of
 if TYPE_CHECKING:
     from gridpeers.figures import Format
 
-Driver = Literal["processes", "inprocess"]
+ReproduceDriver = Literal["processes", "inprocess"]
 """How cases are run."""
 
 FORMATS: tuple[Format, ...] = ("png", "pdf", "svg")
@@ -38,7 +38,7 @@ class Work:
     ----------
     parts : tuple[Part, ...]
         What to run.
-    driver : Driver
+    driver : ReproduceDriver
         How; the topologies are always run without processes.
     folder : Path
         Takes the runs' folders.
@@ -49,7 +49,7 @@ class Work:
     """
 
     def __init__(
-        self, parts: tuple[Part, ...], driver: Driver, folder: Path, seed: int | None, jobs: int | None
+        self, parts: tuple[Part, ...], driver: ReproduceDriver, folder: Path, seed: int | None, jobs: int | None
     ) -> None:
         self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
         changes = {} if seed is None else {"seed": seed}
@@ -64,7 +64,7 @@ class Work:
         return next(iter(self._loaded.values())).spec.seed
 
     def spec(self, part: str) -> Spec:
-        """Keys of the scenario of a part."""
+        """Return the keys of the scenario of a part."""
         return self._loaded[part].spec
 
     @property
@@ -72,7 +72,7 @@ class Work:
         """Seconds that are simulated in all runs together."""
         return sum(self._length(part) for part in self.parts)
 
-    def do(self, tell: Tell, *, figures: bool) -> Iterator[Result]:
+    def do(self, tell: Tell, *, figures: bool) -> Iterator[PartResult]:
         """Run part after part, telling how many seconds of all runs have been simulated.
 
         Raises
@@ -85,7 +85,7 @@ class Work:
                 do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
                 found, sha256, metrics, plots = do(part, tell, figures)
             self._before += self._length(part)
-            yield Result(
+            yield PartResult(
                 part=part,
                 found=found,
                 verdicts=judge(found, CLAIMS[part.experiment]) if part.experiment else (),

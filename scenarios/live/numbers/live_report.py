@@ -14,12 +14,11 @@ from scenarios.results.findings import find_in
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
 from scenarios.results.joins_and_leaves import late_moves
-from scenarios.results.message_counts import messages_saved
-from scenarios.results.metrics import Window
+from scenarios.results.metrics import Window, messages_saved
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.own.measuring import own_measures
+from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded
-from scenarios.results.report import Report, plain
+from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import shown, write_whole
 from scenarios.spec.agentless import with_agent
 from wire.messages import Pacing
@@ -54,7 +53,7 @@ class LiveReport:
         """Whether there is a whole record to give account of."""
         return self._recorded is not None
 
-    def write(self) -> Report:
+    def write(self) -> RunReport:
         """Measure what windows there are, write it with its figures, and return what there is to tell.
 
         No claim of the paper is judged: a run by hand is one case, and people had their hands in it.
@@ -74,7 +73,7 @@ class LiveReport:
             compared.happened, ran.feeder, plates, {case: history}, {case: compared.opened.measured}, {case: saved}
         )
         found = replace(found, own=own)
-        report = Report(
+        report = RunReport(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},
             found=found,

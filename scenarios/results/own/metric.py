@@ -24,7 +24,7 @@ from wire.printable import printable
 from wire.registry import PluginError, Registry
 
 if TYPE_CHECKING:
-    from scenarios.results.own.window_data import WindowData
+    from scenarios.results.own.window_metrics import WindowData
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
 
@@ -38,7 +38,7 @@ METRICS: Registry[Any] = Registry(
     "metric",
     "metrics",
     lambda it: callable_objection(it, "window", (*KEYS, "name")),
-    own={name: f"scenarios.results.own.builtin:{name}" for name in _OURS},
+    own={name: f"scenarios.results.own.window_metrics:{name}" for name in _OURS},
 )
 """Metrics by name; those of gridpeers come first."""
 
@@ -65,7 +65,7 @@ def name_of(plugin: Plugin, label: str = "") -> str:
 
 
 def good_name(name: str) -> bool:
-    """Whether a metric can stand in tables under a name."""
+    """Return whether a metric can stand in tables under a name."""
     return bool(_NAME.fullmatch(name))
 
 
@@ -136,7 +136,7 @@ def _shown(error: BaseException) -> str:
 
 
 def _columns(error: BaseException, data: WindowData) -> str:
-    """What a table has, for a metric that asked for something else."""
+    """Return what a table has, for a metric that asked for something else."""
     if not isinstance(error, (KeyError, AttributeError, IndexError)):
         return ""
     few = ", ".join(data.inverters[:12]) + (", ..." if len(data.inverters) > 12 else "")

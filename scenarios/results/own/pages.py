@@ -14,9 +14,9 @@ from agents.graphs import GRAPHS
 from netem.models import own_fault as faults
 from netem.models.own_fault import FAULTS
 from scenarios.field_docs import field_docs
+from scenarios.results import claims
+from scenarios.results.benchmark_registry import CLAIMS
 from scenarios.results.own import metric
-from scenarios.results.own import own_claim as claim
-from scenarios.results.own.claim_registry import CLAIMS
 from scenarios.results.own.metric import METRICS
 from wire.parameters import parameters_of
 from wire.registry import PluginError, Registry
@@ -33,7 +33,7 @@ _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
 PAGES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
     "metrics": (METRICS, metric.__doc__ or "", 'metrics = ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05 }]'),
-    "claims": (CLAIMS, claim.__doc__ or "", 'claims = ["mine:restored"]'),
+    "claims": (CLAIMS, claims.__doc__ or "", 'claims = ["mine:restored"]'),
     "faults": (FAULTS, faults.__doc__ or "", '"mine:Jammer" = { share = 0.2 } in an entry [[link]]'),
     "graphs": (GRAPHS, graphs.__doc__ or "", 'graph = "mine:star", or graph = { use = "mine:Nearest", k = 3 }'),
 }
@@ -62,7 +62,7 @@ def page(topic: str) -> Iterator[str]:
 
 
 def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
-    """Sentence and parameters of one."""
+    """Return the sentence and parameters of one."""
     try:
         it = registry.resolve(name)
     except PluginError as error:  # an entry point of somebody's that is broken

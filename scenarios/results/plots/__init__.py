@@ -10,12 +10,9 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
-from scenarios.results.plots.available import available_power
-from scenarios.results.plots.cases import MPSI, MQSI, V_error, frequency, overview, single, voltage
-from scenarios.results.plots.inverters_plot import plug_and_play, powers
-from scenarios.results.plots.islands_plot import microgrids
-from scenarios.results.plots.saving import save
-from scenarios.results.plots.style import CASE_STYLES, OTHER_STYLES, PAGE, case_style
+from scenarios.results.plots.cases import MEASURES, overview, single
+from scenarios.results.plots.inverters_plot import available_power, microgrids, plug_and_play, powers
+from scenarios.results.plots.style import CASE_STYLES, OTHER_STYLES, PAGE, case_style, save
 
 __all__ = [
     "CASE_STYLES",
@@ -36,12 +33,8 @@ __all__ = [
 
 def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
     """Return how each figure of a run is drawn, by its name."""
-    figures: dict[str, Callable[[], Figure]] = {
-        "frequency": lambda: single(drawing, frequency),
-        "MPSI": lambda: single(drawing, MPSI),
-        "V_error": lambda: single(drawing, V_error),
-        "voltage": lambda: single(drawing, voltage),
-        "MQSI": lambda: single(drawing, MQSI),
+    figures: dict[str, Callable[[], Figure]] = {name: partial(single, drawing, name) for name in MEASURES}
+    figures |= {
         "power_GFM": lambda: powers(drawing, GFM=True),
         "power_GFL": lambda: powers(drawing, GFM=False),
         "overview": lambda: overview(drawing),

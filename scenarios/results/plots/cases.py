@@ -2,111 +2,122 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
-from scenarios.results.history import Floats
-from scenarios.results.island_membership import Quantity, worst
-from scenarios.results.plots import sharing
+from scenarios.results.history import Floats, History, Plates
+from scenarios.results.island_membership import RowMeasure, worst
 from scenarios.results.plots.marks import mark_events
-from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, case_styles, columns, from_zero, time_axis, words
+from scenarios.results.plots.style import (
+    PAGE,
+    SHARING,
+    VOLTAGE,
+    Bounds,
+    case_styles,
+    from_zero,
+    legend_below,
+    time_axis,
+    words,
+)
+
+
+def _where_shared(index: Floats, x: Floats, history: History, plates: Plates) -> Floats:
+    """Return an index where the total of x (W or var) is at least `NO_LOAD` of the ratings: below, it divides dust."""
+    sharing = history.present & plates.shares
+    total = np.abs(np.where(sharing, x, 0.0).sum(axis=1))
+    rated = np.where(sharing, plates.s, 0.0).sum(axis=1)
+    return np.where(total < metrics.NO_LOAD * rated, np.nan, index)
+
+
+def _MPSI(history: History, plates: Plates) -> Floats:
+    """Return the mean power sharing index of each row, (16); not a number without a load."""
+    return _where_shared(metrics.MPSI(history, plates), history.P, history, plates)
+
+
+def _MQSI(history: History, plates: Plates) -> Floats:
+    """Return the mean var sharing index of each row, (17); not a number without vars."""
+    return _where_shared(metrics.MQSI(history, plates), history.Q, history, plates)
+
+
+class PlotMeasure(NamedTuple):
+    """A measure over time as figures show it."""
+
+    title: str
+    label: str
+    """Label of the axis, with the unit."""
+    island_label: str
+    """The same where the figure shows the worst of several islands."""
+    of_row: RowMeasure
+    nominal: float | None
+    """Value from which islands depart; None: the nominal frequency."""
+    bounds: Bounds | None = None
+    """End of an axis that starts at 0; None: the axis has a line at the nominal value instead."""
+
+
+MEASURES = {
+    "frequency": PlotMeasure("Frequency", "mean of the GFM, f (Hz)", "f (Hz)", metrics.mean_frequency, None),
+    "MPSI": PlotMeasure("Mean power sharing index, MPSI", "MPSI", "MPSI", _MPSI, 0.0, SHARING),
+    "V_error": PlotMeasure(
+        "Voltage error, V_error", "mean of abs(V - 1) (pu)", "V_error (pu)", metrics.V_error, 0.0, VOLTAGE
+    ),
+    "voltage": PlotMeasure("Mean voltage", "mean of all inverters, V (pu)", "mean V (pu)", metrics.mean_voltage, 1.0),
+    "MQSI": PlotMeasure("Mean var sharing index, MQSI", "MQSI", "MQSI", _MQSI, 0.0, SHARING),
+}
+"""By the name of their figure. V_error judges the voltages: in the mean voltage, which the paper's figure shows,
+terminals that are too high and too low cancel."""
 
 
 def overview(drawing: Drawing) -> Figure:
-    """All four measures of all cases on one page."""
+    """Draw the four measures that judge runs, of all cases, on one page."""
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
-        for panel, draw in zip(axes.flat, (frequency, MPSI, V_error, MQSI), strict=True):
-            draw(panel, drawing)
-            mark_events(panel, drawing, labelled=draw in (frequency, MPSI))
+        for panel, name in zip(axes.flat, ("frequency", "MPSI", "V_error", "MQSI"), strict=True):
+            draw_measure(panel, drawing, name)
+            mark_events(panel, drawing, labelled=name in ("frequency", "MPSI"))
         for panel in axes[0]:
             panel.set_xlabel("")
-        handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 7.4))
+        legend_below(figure, axes[0, 0])
     return figure
 
 
-def single(drawing: Drawing, draw: Callable[[Axes, Drawing], None]) -> Figure:
-    """One quantity of all cases on a page of its own."""
+def single(drawing: Drawing, name: str) -> Figure:
+    """Draw one measure of all cases on a page of its own."""
     figure = Figure(figsize=(6.4, 3.2), layout="constrained")
     axes = figure.subplots()
-    draw(axes, drawing)
+    draw_measure(axes, drawing, name)
     mark_events(axes, drawing, labelled=True)
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, 6.4))
+    legend_below(figure, axes)
     return figure
 
 
-def frequency(axes: Axes, drawing: Drawing) -> None:
-    """Frequency over time."""
-    curves(axes, drawing, worst(metrics.mean_frequency, drawing.f_nom, drawing.spells))
-    axes.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
-    axes.set_title("Frequency", loc="left")
-    axes.set_ylabel(_of(drawing, "mean of the GFM, f (Hz)", "f (Hz)"))
-    axes.ticklabel_format(axis="y", useOffset=False)
+def draw_measure(axes: Axes, drawing: Drawing, name: str) -> None:
+    """Draw one of `MEASURES` over time, a curve for each case."""
+    measure = MEASURES[name]
+    nominal = drawing.f_nom if measure.nominal is None else measure.nominal
+    drawn = curves(axes, drawing, worst(measure.of_row, nominal, drawing.island_intervals))
+    axes.set_title(measure.title, loc="left")
+    axes.set_ylabel(f"{measure.island_label}, worst island" if drawing.island_intervals else measure.label)
+    if measure.bounds is not None:
+        from_zero(axes, drawn, measure.bounds)
+    else:
+        axes.axhline(nominal, color="#000000", linewidth=0.6, zorder=1)
+        axes.ticklabel_format(axis="y", useOffset=False)
 
 
-def MPSI(axes: Axes, drawing: Drawing) -> None:
-    """Mean power sharing index over time, (16)."""
-    quantity = worst(sharing.MPSI, 0.0, drawing.spells)
-    drawn = curves(axes, drawing, quantity)
-    axes.set_title("Mean power sharing index, MPSI", loc="left")
-    axes.set_ylabel(_of(drawing, "MPSI", "MPSI"))
-    from_zero(axes, drawn, SHARING)
-
-
-def V_error(axes: Axes, drawing: Drawing) -> None:
-    """Mean of abs(V - 1) over time: what the voltages are judged by."""
-    quantity = worst(metrics.V_error, 0.0, drawing.spells)
-    drawn = curves(axes, drawing, quantity)
-    axes.set_title("Voltage error, V_error", loc="left")
-    axes.set_ylabel(_of(drawing, "mean of abs(V - 1) (pu)", "V_error (pu)"))
-    from_zero(axes, drawn, VOLTAGE)
-
-
-def voltage(axes: Axes, drawing: Drawing) -> None:
-    """Mean voltage over time, as in the paper's figure; terminals that are too high and too low cancel in it."""
-    curves(axes, drawing, worst(metrics.mean_voltage, 1.0, drawing.spells))
-    axes.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
-    axes.set_title("Mean voltage", loc="left")
-    axes.set_ylabel(_of(drawing, "mean of all inverters, V (pu)", "mean V (pu)"))
-    axes.ticklabel_format(axis="y", useOffset=False)
-
-
-def MQSI(axes: Axes, drawing: Drawing) -> None:
-    """Mean var sharing index over time, (17)."""
-    quantity = worst(sharing.MQSI, 0.0, drawing.spells)
-    drawn = curves(axes, drawing, quantity)
-    axes.set_title("Mean var sharing index, MQSI", loc="left")
-    axes.set_ylabel(_of(drawing, "MQSI", "MQSI"))
-    from_zero(axes, drawn, SHARING)
-
-
-def _of(drawing: Drawing, whole: str, each: str) -> str:
-    """Label of an axis: of the whole, or of the worst island where there come to be several."""
-    return f"{each}, worst island" if drawing.spells else whole
-
-
-def curves(axes: Axes, drawing: Drawing, quantity: Quantity) -> list[Floats]:
-    """One curve per case; the later ones lie on top."""
-    styles, drawn = case_styles(drawing.histories), []
-    for case, history in drawing.histories.items():
-        colour, dashes, width = styles[case]
+def curves(axes: Axes, drawing: Drawing, measure: RowMeasure) -> list[Floats]:
+    """Draw one curve per case; the later ones lie on top."""
+    drawn = []
+    for (case, history), style in zip(drawing.histories.items(), case_styles(drawing.histories).values(), strict=True):
+        colour, dashes, width = style
+        drawn.append(measure(history, drawing.plates_in(case)))
         label = words(drawing, case)
-        drawn.append(quantity(history, drawing.plates_in(case)))
-        axes.plot(
-            history.t,
-            drawn[-1],
-            color=colour,
-            linestyle=dashes,
-            linewidth=width,
-            label=label,
-        )
+        axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=label)
     time_axis(axes, drawing)
     return drawn

@@ -9,12 +9,11 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
-from scenarios.results.island_membership import Quantity, worst
-from scenarios.results.plots import sharing
+from scenarios.results.island_membership import worst
+from scenarios.results.plots.cases import MEASURES, PlotMeasure
 from scenarios.results.plots.marks import BLACK, mark_events
-from scenarios.results.plots.style import PAGE, SHARING, VOLTAGE, Bounds, Style, columns, from_zero, time_axis
+from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, time_axis
 
 WIDTH, HEIGHT = 7.4, 2.3
 """Size of a figure, and of each row of panels in it (inches)."""
@@ -22,13 +21,8 @@ WIDTH, HEIGHT = 7.4, 2.3
 COLUMNS = 2
 """Panels beside each other."""
 
-_PANELS: tuple[tuple[str, str, Quantity, Bounds | None], ...] = (
-    ("Frequency", "f (Hz)", metrics.mean_frequency, None),
-    ("Mean power sharing index, MPSI", "MPSI", sharing.MPSI, SHARING),
-    ("Voltage error, V_error", "mean of abs(V - 1) (pu)", metrics.V_error, VOLTAGE),
-    ("Mean var sharing index, MQSI", "MQSI", sharing.MQSI, SHARING),
-)
-"""Title, axis, quantity, and where an axis ends that starts at 0; the frequency's does not."""
+_PANELS = (("frequency", "f (Hz)"), ("MPSI", "MPSI"), ("V_error", "mean of abs(V - 1) (pu)"), ("MQSI", "MQSI"))
+"""Measures, and the labels of their axes."""
 
 _STYLES: tuple[Style, Style] = (("#0072b2", "-", 2.2), ("#d55e00", (0, (4, 2)), 1.6))
 """Of the two: the second lies on top, dashed and thinner, so that equal ones are both seen."""
@@ -47,29 +41,27 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
         grid = figure.subplots(2 * len(pairs), COLUMNS, squeeze=False)
         for number, (words, drawings) in enumerate(pairs):
             panels = grid[2 * number : 2 * number + 2].flat
-            for place, (panel, (title, label, quantity, bounds)) in enumerate(zip(panels, _PANELS, strict=True)):
+            for place, (panel, (name, label)) in enumerate(zip(panels, _PANELS, strict=True)):
+                title = MEASURES[name].title
                 panel.set_title(f"{words}: {title}" if words else title, loc="left")
                 panel.set_ylabel(label)
                 panel.ticklabel_format(axis="y", useOffset=False)
-                _draw(panel, drawings, quantity, bounds, labelled=place < COLUMNS)
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns(labels, WIDTH))
+                _draw(panel, drawings, MEASURES[name], labelled=place < COLUMNS)
+        legend_below(figure, grid[0, 0])
     return figure
 
 
-def _draw(
-    axes: Axes, drawings: Mapping[str, Drawing], quantity: Quantity, bounds: Bounds | None, *, labelled: bool
-) -> None:
-    """Draw a quantity of both runs, and the events of both: those that one alone has in its colour."""
+def _draw(axes: Axes, drawings: Mapping[str, Drawing], measure: PlotMeasure, *, labelled: bool) -> None:
+    """Draw a measure of both runs, and the events of both: those that one alone has in its colour."""
     drawn, colours = [], dict.fromkeys((mark for drawing in drawings.values() for mark in drawing.events), "")
     for (name, drawing), (colour, dashes, width) in zip(drawings.items(), _STYLES, strict=True):
         ((case, history),) = drawing.histories.items()
-        measured = worst(quantity, drawing.f_nom if bounds is None else 0.0, drawing.spells)
+        measured = worst(measure.of_row, drawing.f_nom if measure.bounds is None else 0.0, drawing.island_intervals)
         drawn.append(measured(history, drawing.plates_in(case)))
         axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=name)
         colours |= {mark: BLACK if colours[mark] else colour for mark in dict.fromkeys(drawing.events)}
-    if bounds is not None:
-        from_zero(axes, drawn, bounds)
+    if measure.bounds is not None:
+        from_zero(axes, drawn, measure.bounds)
     longer = max(drawings.values(), key=lambda drawing: max(history.t[-1] for history in drawing.histories.values()))
     time_axis(axes, longer)
     mark_events(axes, replace(longer, events=list(colours)), labelled=labelled, colours=colours)

@@ -1,4 +1,4 @@
-"""P of every inverter: by kind and case, and while one leaves and returns."""
+"""Figures of single inverters and of islands: powers by kind, plug-n-play, available power, microgrid switching."""
 
 from __future__ import annotations
 
@@ -6,17 +6,29 @@ from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
-from scenarios.results.plots.cases import curves
-from scenarios.results.plots.marks import mark_events
-from scenarios.results.plots.style import MOVER, OTHER_STYLES, PAGE, STAYERS, case_title, time_axis
+from scenarios.results.island_membership import part_of
+from scenarios.results.plots.cases import curves, draw_measure
+from scenarios.results.plots.marks import mark_events, note_above
+from scenarios.results.plots.style import (
+    MOVER,
+    OTHER_STYLES,
+    PAGE,
+    STAYERS,
+    case_styles,
+    case_title,
+    legend_below,
+    time_axis,
+    widths,
+)
 
 
 def plug_and_play(drawing: Drawing) -> Figure:
-    """P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
+    """Draw P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
     with mpl.rc_context(PAGE):
         count = len(drawing.histories)
         figure = Figure(figsize=(max(3.7 * count, 5.2), 5.4), layout="constrained")
@@ -52,7 +64,7 @@ def plug_and_play(drawing: Drawing) -> Figure:
 
 
 def powers(drawing: Drawing, *, GFM: bool) -> Figure:
-    """P of each inverter of one kind (pu of its rating), one panel per case."""
+    """Draw P of each inverter of one kind (pu of its rating), one panel per case."""
     count = len(drawing.histories)
     columns = 2 if count > 1 else 1
     rows = -(-count // columns)
@@ -83,7 +95,95 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
             above.set_xlabel("")
         else:
             above.tick_params(labelbottom=True)
-    handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.suptitle(f"Real power of the {'grid-forming' if GFM else 'grid-following'} inverters", fontsize=10)
-    figure.legend(handles, labels, loc="outside lower center", ncols=max(len(labels), 1))
+    legend_below(figure, grid[0, 0], one_row=True)
+    return figure
+
+
+LOST = 0.3
+"""Distance from nominal (Hz) at which a frequency that does not come back leaves the frame."""
+
+
+def available_power(drawing: Drawing) -> Figure:
+    """Draw P of the first limited inverter and the mean of the others, f, and P_set - P of the limited one, by case."""
+    first = drawing.limited[0]
+    at = drawing.plates.names.index(first)
+    others = np.array([name not in drawing.limited for name in drawing.plates.names])
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(7.4, 4.8), layout="constrained")
+        grid = figure.subplots(2, 2, sharex=True)
+        top, beside, below, last = grid.flat
+        styles = case_styles(drawing.histories)
+        for case, history in drawing.histories.items():
+            colour, dashes, width = styles[case]
+            share = history.P / drawing.plates.s
+            ahead = history.P_set[:, at] / drawing.plates.s[at] - share[:, at]
+            for panel, y in ((top, share[:, at]), (beside, share[:, others].mean(axis=1)), (last, ahead)):
+                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width)
+        beside.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
+        draw_measure(below, drawing, "frequency")
+        _keep_in_view(below, drawing)
+        texts = (
+            (top, f"Power of {first}", "P (pu of rating)"),
+            (beside, "Power of the inverters that are not limited", "their mean, P (pu of rating)"),
+            (last, f"Set-point of {first} ahead of its power", "P_set - P (pu of rating)"),
+        )
+        for panel, title, label in texts:
+            panel.set_title(title, loc="left")
+            panel.set_ylabel(label)
+            time_axis(panel, drawing)
+        for panel in grid.flat:
+            mark_events(panel, drawing, labelled=panel in (top, beside))
+        for panel in grid[0]:
+            panel.set_xlabel("")
+        legend_below(figure, below)
+    return figure
+
+
+def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
+    """Let a frequency that falls for good leave the frame instead of flattening all others."""
+    ends = {case: float(history.f[-1, drawing.plates.GFM].mean()) for case, history in drawing.histories.items()}
+    lost = [case for case, f in ends.items() if abs(f - drawing.f_nom) > LOST]
+    if lost and len(lost) < len(ends):
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, drawing.f_nom - LOST), min(high, drawing.f_nom + LOST))
+        for case in lost:
+            note_above(axes, f"{case}: {ends[case]:.2f} Hz at the end", 1.0, "axes fraction", "right")
+
+
+def microgrids(drawing: Drawing, case: str) -> Figure:
+    """Draw P and Q in total, f and mean V of each part that becomes an island, over time."""
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+        grid = figure.subplots(2, 2, sharex=True)
+        width = widths(len(drawing.islands))
+        for number, (name, members) in enumerate(drawing.islands.items()):
+            history, plates = part_of(drawing.histories[case], drawing.plates, members)
+            colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
+            values = (
+                history.P.sum(axis=1) / 1e3,
+                history.Q.sum(axis=1) / 1e3,
+                metrics.mean_frequency(history, plates),
+                metrics.mean_voltage(history, plates),
+            )
+            label = drawing.island_titles.get(name, f"island of {name}")
+            for panel, y in zip(grid.flat, values, strict=True):
+                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
+        words = (
+            ("Real power", "P in total (kW)"),
+            ("Reactive power", "Q in total (kvar)"),
+            ("Frequency", "mean of its GFM, f (Hz)"),
+            ("Voltage", "mean of its inverters, V (pu)"),
+        )
+        for panel, (title, label) in zip(grid.flat, words, strict=True):
+            panel.set_title(title, loc="left")
+            panel.set_ylabel(label)
+            panel.ticklabel_format(axis="y", useOffset=False)
+            time_axis(panel, drawing)
+            mark_events(panel, drawing, labelled=title in ("Real power", "Reactive power"))
+        for panel, nominal in ((grid[1, 0], drawing.f_nom), (grid[1, 1], 1.0)):
+            panel.axhline(nominal, color="#000000", linewidth=0.6, zorder=1)
+        for panel in grid[0]:
+            panel.set_xlabel("")
+        legend_below(figure, grid[0, 0], one_row=True)
     return figure

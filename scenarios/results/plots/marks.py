@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from scenarios.results.drawing import Drawing, Mark
 
-Side = Literal["left", "center", "right"]
+TextSide = Literal["left", "center", "right"]
 """Which part of a text stands at the line."""
 
 BLACK, GREY = "#000000", "#444444"
@@ -32,7 +32,7 @@ class Placed(NamedTuple):
 
     text: str
     mark: Mark
-    side: Side
+    side: TextSide
 
 
 def mark_events(
@@ -88,16 +88,16 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
     return min(best.values(), key=lambda one: one[0])[1]
 
 
-def _choices(mark: Mark) -> list[tuple[float, str, Side]]:
-    """What can be written at a mark, and how much it costs."""
+def _choices(mark: Mark) -> list[tuple[float, str, TextSide]]:
+    """Return what can be written at a mark, and how much it costs."""
     both = "\n".join(text for text in (mark.label, mark.what) if text)
     narrow = "\n".join(text for text in (mark.label, mark.what.replace(" ", "\n", 1)) if text)
     texts = {both: 0.0, narrow: 5.0, mark.label: 10.0, "": 30.0}
-    sides: tuple[tuple[Side, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
+    sides: tuple[tuple[TextSide, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
     return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
 
 
-def note_above(axes: Axes, text: str, x: float, of: str, side: Side, *, colour: str = GREY) -> None:
+def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colour: str = GREY) -> None:
     """Write small words above the frame, at x of the data or of the frame."""
     axes.annotate(
         text,
@@ -112,7 +112,7 @@ def note_above(axes: Axes, text: str, x: float, of: str, side: Side, *, colour: 
 
 
 def _inches_per_s(axes: Axes, drawing: Drawing) -> float:
-    """Roughly how wide a second of a panel will be: the layout is made when the figure is drawn."""
+    """Return roughly how wide a second of a panel will be: the layout is made when the figure is drawn."""
     place, figure = axes.get_subplotspec(), axes.get_figure(root=True)
     assert figure is not None
     columns = 1 if place is None else place.get_gridspec().ncols

@@ -1,4 +1,4 @@
-"""What all figures have in common: one style per case, the page, axes of time.
+"""What all figures have in common: one style per case, the page, axes of time, reproducible files.
 
 One colour and one dash pattern per case, the same in every figure, after Okabe and Ito's palette, which stays apart
 for colour-blind readers; with the patterns the curves can be told in a black-and-white print too.
@@ -6,24 +6,27 @@ for colour-blind readers; with the patterns the curves can be told in a black-an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
+from pathlib import Path
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats
 
-Snapshot = tuple[str, Any]
+LineStyle = tuple[str, Any]
 """Colour and dash pattern."""
 
 Style = tuple[str, Any, float]
 """Colour, dash pattern and line width (pt)."""
 
-CASE_STYLES: dict[str, Snapshot] = {
+CASE_STYLES: dict[str, LineStyle] = {
     "I": ("#7a7a7a", "-"),
     "II": ("#d55e00", "-"),
     "III": ("#009e73", "--"),
@@ -49,7 +52,7 @@ goes from dark to light, after the palette viridis."""
 TITLE_LENGTH = 48
 """Characters of a panel's title that fit above half a page."""
 
-OTHER_STYLES: tuple[Snapshot, ...] = (
+OTHER_STYLES: tuple[LineStyle, ...] = (
     ("#0072b2", "-"),
     ("#d55e00", "-"),
     ("#009e73", "--"),
@@ -84,8 +87,8 @@ PAGE: Any = {
 """Layout of every figure."""
 
 
-def case_style(case: str, number: int) -> Snapshot:
-    """Style of a case: fixed for the paper's four, else in turn.
+def case_style(case: str, number: int) -> LineStyle:
+    """Return the style of a case: fixed for the paper's four, else in turn.
 
     Examples
     --------
@@ -96,7 +99,7 @@ def case_style(case: str, number: int) -> Snapshot:
 
 
 def case_styles(cases: Iterable[str]) -> dict[str, Style]:
-    """Styles of cases that are drawn one on top of the other: where curves coincide, all of them are seen.
+    """Return the styles of cases that are drawn one on top of the other: where curves coincide, all of them are seen.
 
     Examples
     --------
@@ -111,7 +114,7 @@ def case_styles(cases: Iterable[str]) -> dict[str, Style]:
 
 
 def widths(count: int) -> list[float]:
-    """Widths (pt) of curves that are drawn one on top of the other, the lowest first."""
+    """Return the widths (pt) of curves that are drawn one on top of the other, the lowest first."""
     if count < 2:
         return [2.0] * count
     step = min(0.5, 1.8 / (count - 1))
@@ -165,19 +168,75 @@ def time_axis(axes: Axes, drawing: Drawing) -> None:
 
 
 def words(drawing: Drawing, case: str) -> str:
-    """Name of a case and what it is, for legends and titles."""
+    """Return the name of a case and what it is, for legends and titles."""
     title = drawing.titles.get(case, "")
     return f"{case}: {title}" if title else case
 
 
 def case_title(drawing: Drawing, case: str) -> str:
-    """Title of a case's panel, in lines that fit above half a page."""
+    """Return the title of a case's panel, in lines that fit above half a page."""
     return "\n".join(wrap(f"Case {words(drawing, case)}", TITLE_LENGTH))
 
 
 def columns(labels: Sequence[str], width: float) -> int:
-    """How many columns of a legend fit below a figure of this width (inches), without a lonely last entry."""
+    """Return how many columns of a legend fit below a figure of this width (inches), without a lonely last entry."""
     longest = max((len(label) for label in labels), default=1)
     fit = max(1, int(width / (0.058 * longest + 0.42)))
     rows = -(-len(labels) // fit)
     return -(-len(labels) // rows) if labels else 1
+
+
+def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
+    """Put the legend of a panel's curves below all panels, in columns that fit."""
+    handles, labels = axes.get_legend_handles_labels()
+    ncols = max(len(labels), 1) if one_row else columns(labels, figure.get_figwidth())
+    figure.legend(handles, labels, loc="outside lower center", ncols=ncols)
+
+
+Format = Literal["png", "pdf", "svg"]
+"""Kind of file, as its name ends."""
+
+_REPRODUCIBLE: Any = {"svg.hashsalt": "gridpeers", "svg.fonttype": "path", "pdf.fonttype": 42}
+"""The salt stands in place of a random number from which an SVG's inner names are made. An SVG has letters as curves,
+which look the same on every machine; a PDF has the font inside."""
+
+_UNDATED: Mapping[Format, Mapping[str, Any]] = {
+    "png": {},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
+"""What leaves the time of writing out of a file."""
+
+
+def save(
+    figure: Figure, folder: Path, name: str, formats: Sequence[Format] = ("png",), dpi: float | None = None
+) -> tuple[Path, ...]:
+    """Write a figure into a folder, which is made where there is none.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to write.
+    folder : Path
+        Where to.
+    name : str
+        Name of the file, without its ending.
+    formats : Sequence of {"png", "pdf", "svg"}
+        One file each.
+    dpi : float, optional
+        Resolution of a PNG (1/inch); that of all figures if left out.
+
+    Returns
+    -------
+    tuple of Path
+        The files.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for kind in formats:
+        unfinished, file = folder / f".{name}.{kind}", folder / f"{name}.{kind}"
+        with mpl.rc_context(PAGE | _REPRODUCIBLE), unfinished.open("wb") as stream:  # closed whatever goes wrong
+            figure.savefig(stream, format=kind, metadata=dict(_UNDATED[kind]), dpi=dpi or PAGE["savefig.dpi"])
+        unfinished.replace(file)
+        files.append(file)
+    return tuple(files)

@@ -9,8 +9,7 @@ import msgspec
 
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from papers.singhal2022.experiments.data.case_data import CaseData
-from papers.singhal2022.experiments.data.sweep_data import SweepData
+from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History

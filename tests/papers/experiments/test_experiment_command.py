@@ -7,10 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    LimitLine,
+    Page,
+    Panel,
+)
 from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS
-from papers.singhal2022.experiments.output.experiment_page import Curve, Line, Page, Panel
-from papers.singhal2022.experiments.output.experiment_result import Result
-from papers.singhal2022.experiments.output.experiment_table import Table
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -48,11 +53,17 @@ def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
     x = np.array([0.0, 0.1, 1.0])
     curves = [Curve(x=x, y=np.array([1.0, 2.0, np.inf]), style=0), Curve(x=x, y=x + 1.0, style=1, look="predicted")]
     panel = Panel(
-        title="a", x_label="x (s)", y_label="y (s)", curves=curves, lines=[Line(x=0.5, style=0)], log="xy", zero=0.02
+        title="a",
+        x_label="x (s)",
+        y_label="y (s)",
+        curves=curves,
+        lines=[LimitLine(x=0.5, style=0)],
+        log="xy",
+        zero=0.02,
     )
-    table = Table(columns=("x (s)", "y (s)"), rows=((0.0, 1.0), (1.0, np.inf)))
+    table = ExperimentTable(columns=("x (s)", "y (s)"), rows=((0.0, 1.0), (1.0, np.inf)))
 
-    Result(page=Page(title="t", panels=[panel], columns=1, names={0: "one"}), table=table).write(tmp_path)
+    ExperimentResult(page=Page(title="t", panels=[panel], columns=1, names={0: "one"}), table=table).write(tmp_path)
 
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "table.csv").read_text() == "x (s),y (s)\n0.0,1.0\n1.0,never\n"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.graph_runs import GraphFindings, GraphRun
+from papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
 from papers.singhal2022.tables import tables_of
 from papers.singhal2022.tolerances import TABLE
 from scenarios.results.claims import Verdict, judge

@@ -70,7 +70,7 @@ def study(base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], job
 
 
 def _feeder(standard: Path, folder: Path, banks: Mapping[str, int]) -> Path:
-    """A copy of a feeder's tables in which the banks of buses 83 and 151 are these."""
+    """Return a copy of a feeder's tables in which the banks of buses 83 and 151 are these."""
     shutil.copytree(standard, folder)
     path = folder / "capacitors.csv"
     with path.open(encoding="utf-8", newline="") as file:

@@ -10,7 +10,7 @@ from typing import Any
 import gridpeers as gp
 from gridpeers.benchmarks import Settling, Steady
 from gridpeers.random_graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
-from papers.singhal2022.graph_runs import GraphFindings, GraphRun
+from papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
 """Links of the connected graphs; most where the paper's curve bends."""
@@ -30,12 +30,12 @@ NOT_CONNECTED = 1e-9
 END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
-CaseData = Callable[[int, int], None]
+TellProgress = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
 
 
 def graphs(inverters: int, seed: int) -> Iterator[Edges]:
-    """All graphs of the study, those that are not connected first.
+    """Return all graphs of the study, those that are not connected first.
 
     Examples
     --------
@@ -54,14 +54,14 @@ def graphs(inverters: int, seed: int) -> Iterator[Edges]:
         yield from connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def study(seed: int, tell: CaseData, *, jobs: int | None) -> GraphFindings:
+def study(seed: int, tell: TellProgress, *, jobs: int | None) -> GraphFindings:
     """Run the islanding of case IV on every graph, always in one process each.
 
     Parameters
     ----------
     seed : int
         Of the graphs.
-    tell : CaseData
+    tell : TellProgress
         Told of progress.
     jobs : int or None
         How many runs at a time; None is one per core, or one where joblib is not installed.

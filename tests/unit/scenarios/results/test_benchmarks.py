@@ -11,7 +11,7 @@ from scenarios.results.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Bench
 from scenarios.results.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
-from scenarios.results.report import Report, plain
+from scenarios.results.report import RunReport, plain
 from scenarios.spec import ScenarioError, load_scenario
 from scenarios.spec.loading import check_tables
 from scenarios.spec.scenario_errors import Mistakes
@@ -20,7 +20,7 @@ from scenarios.spec.scenario_writing import to_toml
 MODULE = """
 from scenarios.results.benchmark_registry import Benchmark
 from scenarios.results.claims import Claim
-from scenarios.results.published import Published
+from scenarios.results.benchmark_registry import Published
 
 PLACE = {"case": "IV", "event": "event1", "quantity": "MPSI"}
 MINE = Benchmark(
@@ -57,7 +57,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     found = Findings(results={"IV": {"event1": steady}})
     verdicts = judge(found, benchmark.claims)
     text = plain(
-        Report(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=benchmark, notes=[], folder="x/")
+        RunReport(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=benchmark, notes=[], folder="x/")
     )
 
     assert "ours | paper's Table 7" in text
@@ -90,7 +90,7 @@ def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:
     broken = Benchmark(claims=(claim,), summary=lambda found: [found.no_such_thing])  # type: ignore[attr-defined]
     found = Findings(results={"IV": {}})
     verdicts = judge(found, broken.claims)
-    report = Report(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/")
+    report = RunReport(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/")
 
     (verdict,) = verdicts
     assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: KeyError: 'V'; the cases are IV")

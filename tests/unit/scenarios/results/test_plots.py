@@ -11,11 +11,11 @@ from matplotlib.image import imread
 from plant.tables import read_feeder
 from scenarios.results.drawing import Mark
 from scenarios.results.history import History, Plates
-from scenarios.results.island_membership import Spell
+from scenarios.results.island_membership import IslandInterval
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
 from scenarios.results.plots.inverters_plot import powers
 from scenarios.results.plots.marks import GAP, LETTER, placed
-from scenarios.results.plots.saving import Format, save
+from scenarios.results.plots.style import Format, save
 from scenarios.spec import catalogue, load_scenario
 
 
@@ -179,7 +179,7 @@ def test_where_there_are_islands_the_worst_is_drawn() -> None:
     }
     history = it.histories["IV"]
     history.f[history.t > 4.0] = 60.0 + np.repeat([-0.015, 0.03, -0.015], 3)
-    page = overview(replace(it, spells=[Spell(4.0, 7.0, islands)]))
+    page = overview(replace(it, island_intervals=[IslandInterval(4.0, 7.0, islands)]))
 
     line = next(line for line in page.axes[0].get_lines() if line.get_label() == "IV: made up")
     drawn = np.asarray(line.get_ydata())

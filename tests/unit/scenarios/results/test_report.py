@@ -15,11 +15,11 @@ from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.report import Report, plain, show
+from scenarios.results.report import RunReport, plain, show
 from scenarios.spec import load_scenario
 
 
-def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
+def report(*, judged: bool = True, f_error: float = 0.137) -> RunReport:
     """A report whose numbers are the paper's, but for one frequency error."""
     numbers: dict[str, dict[str, dict[str, float]]] = {}
     for table in tables_of("islanding"):
@@ -37,7 +37,7 @@ def report(*, judged: bool = True, f_error: float = 0.137) -> Report:
         f_error_Hz=f_error, MPSI=first.MPSI, V_error=first.V_error, MQSI=first.MQSI, t_restore_s=None, p=first.p
     )
     found = Findings(results=results, P_set0=0.65, GFL=("inv2",))
-    return Report(
+    return RunReport(
         scenario="islanding",
         titles={"I": "no control"},
         found=found,
@@ -93,7 +93,7 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=None, p={})
     part = Steady(f_error_Hz=0.041, MPSI=0.019, V_error=0.09, MQSI=0.135, t_restore_s=0.37, p={})
     found = Findings(results={"IV": {"e": whole}}, islands={"IV": {"e": {"inv1": part}}})
-    text = plain(Report(scenario="own", titles={}, found=found, verdicts=(), notes=(), folder="here/"))
+    text = plain(RunReport(scenario="own", titles={}, found=found, verdicts=(), notes=(), folder="here/"))
 
     rows = [line.split() for line in text.splitlines()]
     assert [row[1:] for row in rows if row[:1] == ["IV"]] == [["0.027", "-", "-"], ["0.0100", "-"]]
@@ -107,7 +107,9 @@ def test_an_island_without_load_has_no_time_to_share_it() -> None:
     idle = {"MPSI": "nothing shared: the total is below 0.1% of the ratings"}
     part = Steady(f_error_Hz=0.0, MPSI=12719.3, V_error=0.0, MQSI=0.1, t_restore_s=None, p={}, reasons=idle)
     text = plain(
-        Report(scenario="own", titles={}, found=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder="")
+        RunReport(
+            scenario="own", titles={}, found=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder=""
+        )
     )
 
     assert "nothing shared            -\n" in text

@@ -14,7 +14,7 @@ from scenarios.results.findings import Findings
 from scenarios.results.history import History, Plates
 from scenarios.results.metrics import Steady, Window, measure
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.report import Report, plain
+from scenarios.results.report import RunReport, plain
 from scenarios.spec import load_scenario
 
 PLATES = Plates(
@@ -174,7 +174,7 @@ def test_a_claim_on_a_value_that_is_not_steady_does_not_pass() -> None:
 def test_the_report_prints_the_reason_and_not_the_number() -> None:
     """No cell shows a number that is not steady; the reason stands below the table, with the last mean."""
     found, _ = ramping()
-    report = Report(
+    report = RunReport(
         scenario="islanding", titles={}, found=found, verdicts=(), benchmark=ISLANDING, notes=[], folder="x/"
     )
 

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from gridpeers.figures import PAGE, save
-from papers.singhal2022.experiments.output.experiment_page import Curve, Page, Panel
+from papers.singhal2022.experiments.experiment_output import Curve, Page, Panel
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")
 MARKERS = "osD^vPX*"
@@ -111,7 +111,7 @@ def _plot(axes: Axes, curve: Curve) -> None:
 
 
 def _nested(curve: Curve, largest: float) -> float:
-    """Size of a marker, or width of a line: largest in style 0, 0.55 of it from style 3 on."""
+    """Return the size of a marker, or width of a line: largest in style 0, 0.55 of it from style 3 on."""
     return largest * (1.0 - 0.15 * min(curve.style, 3))
 
 
@@ -147,7 +147,7 @@ def _names(page: Page) -> list[Line2D]:
 
 
 def _looks(page: Page) -> list[Line2D]:
-    """What filled, hollow and dashed mean, as far as the page has them."""
+    """Return what filled, hollow and dashed mean, as far as the page has them."""
     used = {curve.look for panel in page.panels for curve in panel.curves}
     black = "#333333"
     shapes: dict[str, dict[str, Any]] = {

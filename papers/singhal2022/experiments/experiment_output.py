@@ -1,14 +1,19 @@
-"""What an experiment draws, as plain data: panels of curves. `plots` turns it into a picture."""
+"""The output of an experiment as plain data: a page of panels with curves, and a table; and both as files."""
 
 from __future__ import annotations
 
+import csv
+import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from gridpeers.measures import Floats
+from gridpeers.output_folders import write_whole
 
 Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid", "reference"]
 """Measured: line and filled markers. Hollow: hollow markers, another way to measure. Predicted: a dashed line. Points:
@@ -32,7 +37,7 @@ class Curve:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class LimitLine:
     """A vertical line at a predicted limit, in the style of the curve that it belongs to."""
 
     x: float
@@ -47,7 +52,7 @@ class Panel:
     x_label: str
     y_label: str
     curves: Sequence[Curve]
-    lines: Sequence[Line] = ()
+    lines: Sequence[LimitLine] = ()
     spans: Sequence[tuple[float, float]] = ()
     """Times (s) in which something was down, shaded."""
     level: float | None = None
@@ -78,3 +83,71 @@ class Page:
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""
+
+
+FIGURE = "figure.png"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentResult:
+    """A figure and a table."""
+
+    page: Page
+    table: ExperimentTable
+
+    def write(self, folder: Path) -> tuple[Path, ...]:
+        """Write figure.png, table.csv and table.md into a folder; the files."""
+        from papers.singhal2022.experiments import (
+            experiment_plots as plots,  # matplotlib takes long to import; nothing else waits for it
+        )
+
+        self.table.write(folder)
+        return plots.draw(self.page, folder / FIGURE), folder / "table.csv", folder / "table.md"
+
+
+TableCell = str | float | None
+"""A text, a number, or None for a time that never came."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentTable:
+    """Rows under column names that end in their unit."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[TableCell]]
+    digits: int = 3
+    """Significant digits in Markdown; CSV has all."""
+
+    def write(self, folder: Path) -> None:
+        """Write table.csv and table.md into a folder."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.columns)
+        writer.writerows([["never" if _is_never(cell) else cell for cell in row] for row in self.rows])
+        write_whole(folder / "table.csv", text.getvalue())
+        write_whole(folder / "table.md", self.markdown())
+
+    def markdown(self) -> str:
+        """Return the table as Markdown.
+
+        Examples
+        --------
+        >>> rows = (("full", 0.64123), ("path", None))
+        >>> print(ExperimentTable(columns=("graph", "f (s)"), rows=rows).markdown(), end="")
+        | graph | f (s) |
+        |---|---|
+        | full | 0.641 |
+        | path | never |
+        """
+        lines = ["| " + " | ".join(self.columns) + " |", "|" + "---|" * len(self.columns)]
+        lines += ["| " + " | ".join(self._text(cell) for cell in row) + " |" for row in self.rows]
+        return "\n".join(lines) + "\n"
+
+    def _text(self, cell: TableCell) -> str:
+        if _is_never(cell):
+            return "never"
+        return cell if isinstance(cell, str) else f"{cell:.{self.digits}g}"
+
+
+def _is_never(cell: TableCell) -> bool:
+    return cell is None or (isinstance(cell, float) and math.isinf(cell))
