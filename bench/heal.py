@@ -77,7 +77,7 @@ def healed(fleet: Watched) -> bool:
 
 
 def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int, int]:
-    """Return the times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
+    """Return times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
     here = [name for name in fleet.names if name not in AWAY]
     took, disturbed, deaf = [], 0, 0
     for i in range(repeat):

@@ -181,7 +181,7 @@ def delay_limit_closed(fleet: InverterGroup, kind: DelayKind) -> float:
 
 
 def equivalent_delay(T: float, loss: float) -> float:
-    """Return the mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
+    """Return mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
 
     Examples
     --------

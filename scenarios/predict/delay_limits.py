@@ -68,7 +68,7 @@ def delay_limit(
 
 
 def first_crossing(case: InverterGroup, *, plant: PlantModel = "lagged") -> float:
-    """Return the shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
+    """Return shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
 
     With own values apart from the neighbours' the loop is F(z) y = z^{-n} S y. A mode can stand on the unit circle, z =
     exp(j theta), only where an eigenvalue of F^{-1} S has magnitude 1; its angle then is n theta. Infinite if there is

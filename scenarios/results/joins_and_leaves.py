@@ -9,7 +9,7 @@ from wire.messages import PlantEvent
 
 
 def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
-    """Return the label and time (s) of each event of a scenario: the scenario's, or that at which the last inverter moved.
+    """Return label and time (s) of each event of a scenario: the scenario's, or that at which the last inverter moved.
 
     What a window measures begins with what happened, so that neither "within 1 s of returning" counts the start of a
     process, nor the time of its start is lost: the events tell both. In simulated time the two are the same.
@@ -32,7 +32,7 @@ def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tup
 
 
 def late_moves(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[str]:
-    """Return the sentences on events that came later than the scenario says, as processes, or people, took their time."""
+    """Return sentences on events that came later than the scenario says, as processes, or people, took their time."""
     came = as_they_came(scenario, recorded)
     return [
         f"{event.label}, meant for t = {event.t_s:g} s, came at {t:g} s, when the last of its agents had moved; "

@@ -139,7 +139,7 @@ def mean_voltage(history: History, plates: Plates) -> Floats:
 
 
 def mean_frequency(history: History, plates: Plates) -> Floats:
-    """Return the frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
+    """Return frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
     return mean_over(history.f[:, plates.GFM], history.present[:, plates.GFM])
 
 

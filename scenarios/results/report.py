@@ -20,7 +20,7 @@ _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "d
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class RunReport:
     """Everything that the end of a run tells."""
 
     scenario: str
@@ -57,7 +57,7 @@ _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
 """Titles and columns of the two tables."""
 
 
-def grids(report: Report) -> tuple[Grid, ...]:
+def grids(report: RunReport) -> tuple[Grid, ...]:
     """Tables for our results, laid out as the paper's Tables I and II, with its numbers beside where there are any."""
     if not any(report.found.results.values()):
         return ()  # without events there is no window to measure in
@@ -65,7 +65,7 @@ def grids(report: Report) -> tuple[Grid, ...]:
     return (*found, _own_grid(report)) if report.found.own else tuple(found)
 
 
-def plain(report: Report) -> str:
+def plain(report: RunReport) -> str:
     """Return the text of a report for files, pipes and logs."""
     blocks = [_plain_grid(grid) for grid in grids(report)]
     if report.verdicts:
@@ -80,7 +80,7 @@ def plain(report: Report) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def show(report: Report, console: Console) -> None:
+def show(report: RunReport, console: Console) -> None:
     """Print a report, with colours and rules on a terminal."""
     if not console.is_terminal:
         console.print(plain(report), end="", markup=False, highlight=False, soft_wrap=True)
@@ -110,7 +110,7 @@ def show(report: Report, console: Console) -> None:
         console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
 
 
-def _all_notes(report: Report) -> list[str]:
+def _all_notes(report: RunReport) -> list[str]:
     """Return the notes of a report, after what its sharing indices leave out."""
     agentless = [
         f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
@@ -120,7 +120,7 @@ def _all_notes(report: Report) -> list[str]:
     return [*agentless, *report.notes]
 
 
-def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
+def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Grid:
     results = report.found.results
     events = list(dict.fromkeys(event for steady in results.values() for event in steady))
     timed = quantities[0] == "f_error_Hz"
@@ -152,7 +152,7 @@ def _grid(report: Report, title: str, quantities: tuple[Quantity, ...]) -> Grid:
     )
 
 
-def _own_grid(report: Report) -> Grid:
+def _own_grid(report: RunReport) -> Grid:
     """Return the scenario's own metrics; "-" where there is no value, with the reason below."""
     own = report.found.own
     places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
@@ -169,7 +169,7 @@ def _own_grid(report: Report) -> Grid:
 
 
 def _row(
-    report: Report,
+    report: RunReport,
     title: str,
     case: str,
     steady: Mapping[str, Steady],
@@ -197,7 +197,7 @@ def _nothing_shared(values: Steady, name: str) -> bool:
     return values.reasons.get(name, "").startswith("nothing shared")
 
 
-def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
+def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
     """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough.
 
     What is not steady is no number: its reason's first words stand there, and all of it below the table.
@@ -211,7 +211,7 @@ def _cell(report: Report, case: str, event: str, quantity: Quantity, values: Ste
     return f"{text} | {paper.paper:.{paper.digits}f}{' !' if off else ''}"
 
 
-def _reasons(report: Report, quantities: tuple[Quantity, ...]) -> list[str]:
+def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
     """Return a line for every number that is not shown, with what the last 0.2 s came to."""
     lines = []
     for case, steady in report.found.results.items():
@@ -245,7 +245,7 @@ def _plain_grid(grid: Grid) -> str:
     return "\n".join([*lines, *([grid.legend] if grid.legend else [])])
 
 
-def _summary(report: Report) -> list[str]:
+def _summary(report: RunReport) -> list[str]:
     """Return how many claims hold, and how near the paper's tables are."""
     return [_count(report.verdicts), *report.benchmark.lines(report.found)]
 

@@ -66,7 +66,7 @@ def _table(told: CaseData) -> ExperimentTable:
 
 
 def _predicted(told: CaseData, case: str, label: str) -> Times:
-    """Return the times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
+    """Return times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
     rule, fleet = told.scenario.cases[case], told.fleet(case)
     ends = ("inv4", "inv5")
     late = {(a, b): fleet.T_c + extra_age(rule) for a in ends for b in ends if a != b}

@@ -9,7 +9,7 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.headline import within
-from papers.singhal2022.reproduce.found import Reproduction, Result, metrics_json
+from papers.singhal2022.reproduce.found import PartResult, Reproduction, metrics_json
 from papers.singhal2022.reproduce.grid import lines
 from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
 from papers.singhal2022.reproduce.report_page import html
@@ -31,7 +31,7 @@ PIXEL = bytes.fromhex(
 """The smallest picture."""
 
 
-def result(folder: Path, f_error: float = 0.136) -> Result:
+def result(folder: Path, f_error: float = 0.136) -> PartResult:
     """Islanding as the paper has it, but for one frequency error."""
     numbers: dict[str, dict[str, dict[str, float]]] = {}
     for table in tables_of("islanding"):
@@ -48,7 +48,7 @@ def result(folder: Path, f_error: float = 0.136) -> Result:
     found = Findings(results=results, P_set0=0.647, GFL=("inv2",))
     image = folder / "image.png"
     image.write_bytes(PIXEL)
-    return Result(
+    return PartResult(
         part=ISLANDING,
         found=found,
         verdicts=judge(found, CLAIMS["islanding"]),
@@ -61,7 +61,7 @@ def result(folder: Path, f_error: float = 0.136) -> Result:
     )
 
 
-def whole(*results: Result) -> Reproduction:
+def whole(*results: PartResult) -> Reproduction:
     """A report of some parts."""
     return Reproduction(results=results, driver="inprocess", seed=1, started="2026-01-01 12:00", only="")
 

@@ -6,7 +6,7 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from scenarios.results.claims import judge
-from scenarios.results.findings import Findings, Results, find
+from scenarios.results.findings import Findings, SteadyValues, find
 from scenarios.results.history import History, Plates
 from scenarios.spec import load_scenario
 from tests.golden.catalogue.pins import ran
@@ -21,7 +21,7 @@ class Experiment:
     found: Findings
 
     @property
-    def steady(self) -> Results:
+    def steady(self) -> SteadyValues:
         """Steady values by case and event."""
         return self.found.results
 
