@@ -26,7 +26,7 @@ from netem.spec.netem import Netem
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import Setup
-from scenarios.results.record import Tape
+from scenarios.results.record import Recorder
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 
@@ -61,9 +61,9 @@ def main() -> None:
         plant, agents = configs(scenario, feeder, arguments.case)
         plant = msgspec.structs.replace(plant, links=links)
         agents = tuple(msgspec.structs.replace(agent, links=links) for agent in agents)
-        built, tape = build_plant(plant), Tape()
+        built, recorder = build_plant(plant), Recorder()
         began = process_time()
-        outcome = run_inprocess(plant, agents, tape, plant=built)
+        outcome = run_inprocess(plant, agents, recorder, plant=built)
         assert not outcome.broke, outcome.broke
         return process_time() - began
 

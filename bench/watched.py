@@ -16,7 +16,7 @@ from ping import STAMP, StampedInbox, stamp_of
 
 from plant.equipment import F_NOM
 from scenarios.drivers.children import Child, Children
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.spec import load_scenario
 from wire.codec import decode, encode
@@ -68,7 +68,9 @@ class Watched:
     def __init__(self, folder: Path, endpoint: str, listen: str, elsewhere: dict[str, tuple[str, list[str]]]) -> None:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
-        self.plant_config, agents = set_up(scenario, feeder, LiveOptions(run=RUN, case="IV", wait=PATIENCE), endpoint)
+        self.plant_config, agents = configure(
+            scenario, feeder, LiveOptions(run=RUN, case="IV", wait=PATIENCE), endpoint
+        )
         self.names = self.plant_config.agents
         self._places = {name: elsewhere.get(name, (listen, [])) for name in self.names}
         self.agents = {

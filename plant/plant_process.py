@@ -31,8 +31,17 @@ def build(config: PlantConfig) -> LivePlant:
     return build_plant(config)
 
 
+def print_word(word: str) -> None:
+    """Print a word at once, for the process that started this one."""
+    sys.stdout.write(word + "\n")
+    sys.stdout.flush()
+
+
 def run_plant(
-    config: PlantConfig, builder: Callable[[PlantConfig], LivePlant] = build, make_links: MakeLinks = no_links
+    config: PlantConfig,
+    builder: Callable[[PlantConfig], LivePlant] = build,
+    make_links: MakeLinks = no_links,
+    on_word: Callable[[str], None] = print_word,
 ) -> str:
     """Run the plant until the end of the scenario.
 
@@ -46,6 +55,8 @@ def run_plant(
         Makes the plant; tests have smaller ones.
     make_links : MakeLinks, optional
         Makes the emulated links to it, if there are any.
+    on_word : Callable[[str], None], optional
+        Called with `LISTENING`, `COMPILING` and `READY` as the plant comes up.
 
     Returns
     -------
@@ -63,9 +74,9 @@ def run_plant(
         config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
     session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
     try:
-        tell(LISTENING)
+        on_word(LISTENING)
         try:
-            tell(COMPILING)
+            on_word(COMPILING)
             plant = builder(config)
             links = make_links(PLANT, config.links)
             node = RealtimePlant(config, plant, links) if wall else LockstepPlant(config, plant, links)
@@ -78,7 +89,7 @@ def run_plant(
         for name, text in config.handout.items():
             session.answer(node.keys.config(name), text.encode())
         gc.freeze()  # what was built stays: later collections need not look at it
-        tell(READY)
+        on_word(READY)
         try:
             drive(node, session, log)
         except (StoppedError, KeyboardInterrupt) as stop:
@@ -96,9 +107,3 @@ def run_plant(
     if node.rejects.counts:
         log.warning("plant: dropped messages by kind: %s", dict(node.rejects.counts))
     return node.outcome
-
-
-def tell(word: str) -> None:
-    """Tell whoever started the process how far it is."""
-    sys.stdout.write(word + "\n")
-    sys.stdout.flush()

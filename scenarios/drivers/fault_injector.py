@@ -1,4 +1,4 @@
-"""What a scenario lets befall processes in wall-clock time: killed and paused for real, at their run time."""
+"""Process faults of a scenario in wall-clock time: agents are killed and paused for real, at their run time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scenarios.drivers.children import Children
 from scenarios.emulation.emulation_config import Setup
 
 
-class _Blow(NamedTuple):
+class ProcessFault(NamedTuple):
     """One signal to one process."""
 
     t: float
@@ -22,75 +22,75 @@ class _Blow(NamedTuple):
     number: signal.Signals
 
 
-def blows(nodes: Iterable[NodeFault]) -> list[_Blow]:
-    """Signals that do to processes what entries `[[node]]` say, in the order of time; the rest is emulated.
+def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
+    """Return the signals of entries `[[node]]` in the order of time; their other faults are emulated.
 
     Examples
     --------
-    >>> [(b.t, b.number.name) for b in blows([NodeFault(name="inv3", pause=True, from_s=1.0, to_s=2.5)])]
+    >>> faults = process_faults([NodeFault(name="inv3", pause=True, from_s=1.0, to_s=2.5)])
+    >>> [(fault.t, fault.number.name) for fault in faults]
     [(1.0, 'SIGSTOP'), (2.5, 'SIGCONT')]
     """
-    found = []
+    faults = []
     for node in nodes:
         if node.kill:
-            found.append(_Blow(node.from_s, node.name, signal.SIGKILL))
+            faults.append(ProcessFault(node.from_s, node.name, signal.SIGKILL))
         if node.pause:
-            found.append(_Blow(node.from_s, node.name, signal.SIGSTOP))
-            found.append(_Blow(math.inf if node.to_s is None else node.to_s, node.name, signal.SIGCONT))
-    return sorted(found)
+            faults.append(ProcessFault(node.from_s, node.name, signal.SIGSTOP))
+            faults.append(ProcessFault(math.inf if node.to_s is None else node.to_s, node.name, signal.SIGCONT))
+    return sorted(faults)
 
 
 class FaultInjector:
-    """Does to the children of a run what its scenario says; the run's time is known from telemetry.
+    """Inject the process faults of a scenario into the children of a run; telemetry gives the run's time.
 
     Parameters
     ----------
     links : str
-        What the configurations say of links and nodes.
+        The configurations' text on links and nodes.
     speed : float
         Run time per wall time (s/s).
     """
 
     def __init__(self, links: str, speed: float) -> None:
         setup = Setup.of_text(links) if links else None
-        real = setup is not None and setup.real_nodes
-        self._due = blows(setup.netem.nodes) if setup is not None and real else []
+        self._due = process_faults(setup.netem.nodes) if setup is not None and setup.real_nodes else []
         self._speed = speed
         self._offset: float | None = None
-        """Run time minus that of the wall times the speed (s), as far as is known."""
+        """Run time minus wall time times the speed (s); None before the run begins."""
         self.killed: set[str] = set()
-        """Who has died by this."""
+        """Agents that a fault has killed."""
         self._paused: set[str] = set()
 
-    def heard(self, t: float, at: float) -> None:
-        """Note that the run had come to t (s) at a time of `monotonic` (s).
+    def note_time(self, t: float, at: float) -> None:
+        """Note that the run had reached t (s) at a time of `monotonic` (s).
 
-        The last word counts: a plant that falls behind puts its time off.
+        The latest value counts: a plant that falls behind postpones its schedule.
         """
         self._offset = t - at * self._speed
 
     @property
     def wait(self) -> float:
-        """Time (s) until the next one; infinite if there is none, or the run has not begun."""
+        """Time (s) until the next fault; infinite if there is none, or the run has not begun."""
         if not self._due or self._offset is None:
             return math.inf
         return max(0.0, (self._due[0].t - self._offset) / self._speed - monotonic())
 
-    def strike(self, children: Children) -> None:
-        """Do what is due."""
+    def inject(self, children: Children) -> None:
+        """Inject the faults that are due."""
         while self._due and self.wait == 0.0:
-            blow = self._due.pop(0)
+            fault = self._due.pop(0)
             try:
-                child = children[blow.name]
-            except KeyError:  # it has not joined yet, so there is nobody to be hurt
+                child = children[fault.name]
+            except KeyError:  # its agent has not joined yet
                 continue
-            child.signal(blow.number)
-            if blow.number is signal.SIGKILL:
-                self.killed.add(blow.name)
-            (self._paused.add if blow.number is signal.SIGSTOP else self._paused.discard)(blow.name)
+            child.signal(fault.number)
+            if fault.number is signal.SIGKILL:
+                self.killed.add(fault.name)
+            (self._paused.add if fault.number is signal.SIGSTOP else self._paused.discard)(fault.name)
 
     def end(self, children: Children) -> None:
-        """Let go on who is paused, so that it can leave; nothing happens any more."""
+        """Drop the faults that are left, and continue paused processes, so that they can leave."""
         self._due.clear()
         for name in self._paused:
             children[name].signal(signal.SIGCONT)

@@ -1,4 +1,4 @@
-"""A recorder's end of a run: what the plant publishes for it, in order, over a session that comes back."""
+"""Receive what the plant publishes for recorders, in order, over a session that is renewed when it breaks."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
 from wire.driver.session import Clock, Session
 
+RECORDER = "history"
+"""Name of a driver's recorder in its run."""
+
 LOOK = 0.5
-"""Longest wait (s) before it is looked whether something is missing."""
+"""Longest wait (s) between two checks for missing messages."""
 
 
 class Word(NamedTuple):

@@ -1,4 +1,4 @@
-"""What the plant of a run by hand is started with, and what it hands to the agents that come."""
+"""Options of a live run, and the configurations of its plant and agents."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from scenarios.spec.netem_tables import netem_of, setup_of
 from wire.suggestion import suggestion
 
 SPEEDS = (0.1, 50.0)
-"""Least and greatest speed (s of run time per s of wall time) that is of any use, in a run by hand or of a scenario."""
+"""Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""
 
 
 class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """What the options of `gridpeers plant` and `gridpeers up` say."""
+    """Options of `gridpeers plant` and `gridpeers up`."""
 
     run: str
     """Name of the run."""
@@ -37,7 +37,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def chosen_case(scenario: Scenario, case: str) -> str:
-    """Name of the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
+    """Return the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
 
     Raises
     ------
@@ -49,10 +49,10 @@ def chosen_case(scenario: Scenario, case: str) -> str:
     return case or list(scenario.cases)[-1]
 
 
-def set_up(
-    scenario: Scenario, feeder: Feeder, wishes: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
+def configure(
+    scenario: Scenario, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of the plant and of all agents, spare ones last.
+    """Return the configurations of the plant and of all agents, spare ones last.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def set_up(
         A checked scenario.
     feeder : Feeder
         Its feeder.
-    wishes : LiveOptions
+    options : LiveOptions
         Options of the command.
     listen : str
         Where the plant listens.
@@ -75,37 +75,37 @@ def set_up(
     Examples
     --------
     >>> from scenarios.spec import load_scenario
-    >>> plant, agents = set_up(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    >>> plant, agents = configure(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
     >>> plant.end, plant.settings.spares, agents[-1].name
     (None, ('inv10',), 'inv10')
     """
-    _check(wishes)
-    case = chosen_case(scenario, wishes.case)
+    _check(options)
+    case = chosen_case(scenario, options.case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
-    # links are emulated even if none has a fault yet: somebody may give them some while the run goes on
+    # links are emulated even without a fault: gridpeers link may set one during the run
     links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_text()
-    live = {"run": wishes.run, "clock": "wall", "speed": wishes.speed, "links": links}
+    live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links}
     first = [agent for agent in agents if agent.name in plant.agents]
     everyone = tuple(
         msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
     )
-    end = None if wishes.duration is None else max(1, round(wishes.duration / plant.T_c)) * plant.T_c
+    end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
     plant = msgspec.structs.replace(
         plant,
         **live,
         settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
-        moves=(),  # by hand, people let agents leave and join
+        moves=(),  # in a live run, people let agents leave and join
         end=end,
         connect=beyond,
-        wait_for_agents=min(wishes.wait, LONGEST),  # JSON has no infinity
-        strict=wishes.strict,
+        wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
+        strict=options.strict,
         handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
     )
     return plant, everyone
 
 
-def real_nodes(scenario: Scenario) -> str:
-    """What people have to do to agents whose processes are theirs, as the scenario would have it; empty if nothing.
+def node_faults_by_hand(scenario: Scenario) -> str:
+    """Return a note on the process faults that people have to inject into agents of their own; "" if there are none.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def real_nodes(scenario: Scenario) -> str:
 
 
 def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
-    """Configurations of the spare inverters' agents: as the others', but for the nameplate."""
+    """Yield the configurations of the spare inverters' agents: as the others', but for the nameplate."""
     for row in feeder.spares:
         yield msgspec.structs.replace(
             like,
@@ -135,9 +135,9 @@ def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
         )
 
 
-def _check(wishes: LiveOptions) -> None:
+def _check(options: LiveOptions) -> None:
     least, greatest = SPEEDS
-    if not least <= wishes.speed <= greatest:
-        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {wishes.speed:g}")
-    check_wait(wishes.wait)
-    check_duration(wishes.duration)
+    if not least <= options.speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {options.speed:g}")
+    check_wait(options.wait)
+    check_duration(options.duration)

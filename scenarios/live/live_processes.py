@@ -1,8 +1,7 @@
-"""A plant, an agent, or both together, in the terminal where they were started."""
+"""Run a plant, an agent, or both together, from the terminal in which they were started."""
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import signal
 import sys
@@ -11,22 +10,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn, TextIO
+from typing import NoReturn
 
-import msgspec
+from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from agents.agent_process import run_agent
 from plant.plant_config import PlantConfig
 from plant.plant_process import COMPILING, READY, run_plant
 from plant.realtime.pacer import sentence
-from scenarios.drivers.children import Child, Children
-from scenarios.drivers.fault_injector import FaultInjector
+from scenarios.drivers.children import Child
+from scenarios.drivers.supervisor import Supervisor
+from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.link_log import LinkLog
 from scenarios.live.live_recorder import LiveRecorder
 from scenarios.live.own_code import own_code
-from scenarios.live.run_address import RunAddress, UsageError, is_near, near, return_path
+from scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
 from scenarios.live.run_client import RunClient
 from scenarios.live.run_requests import check_free, configuration
 from scenarios.results.record import Recorded
@@ -35,53 +35,39 @@ from wire.driver.drive import StoppedError
 from wire.messages import PLANT, Pacing
 
 LOGGED = ("roster", "warning")
-"""Kinds of events that the plant writes to its log too."""
+"""Kinds of events that a plant in this process also writes to its log."""
 
 RECORDER_WAIT = 1.0
 """Least wait (s) of a plant that is recorded: without its recorder the first row would be missing."""
 
 CHECK = 0.25
-"""Time (s) between two looks at how far the run has come, for what befalls agents at certain times."""
+"""Time (s) between two checks for process faults that are due."""
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
 
 
-def say(line: str, file: TextIO | None = None) -> None:
-    """Print a line at once, on standard output unless said otherwise."""
-    print(line, file=file, flush=True)
+def say(line: str) -> None:
+    """Print a line on standard output at once."""
+    print(line, flush=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessOutcome:
-    """How something that was started by hand ended."""
+    """How a live run ended in the terminal where it was started."""
 
     broke: str = ""
     """Why it could not go on; empty after a good end."""
     interrupted: str = ""
     """Name of the signal that ended it: SIGINT, as Ctrl-C gives, or SIGTERM."""
-
-
-class _Words:
-    """Stands for standard output while the plant tells its words there, and says what they mean."""
-
-    def __init__(self, tell: Callable[[str], None], config: PlantConfig) -> None:
-        self._tell, self._config = tell, config
-        self._text = ""
-
-    def write(self, text: str) -> int:
-        *words, self._text = (self._text + text).split("\n")
-        for word in words:
-            if word == COMPILING:  # what comes then, the plant's log tells in sentences
-                self._tell(meaning(word, self._config))
-        return len(text)
-
-    def flush(self) -> None:
-        pass
+    recorded: Recorded | None = None
+    """The record, if it is whole."""
+    pacing: Pacing | None = None
+    """How well the plant kept pace, if it ran."""
 
 
 def meaning(word: str, config: PlantConfig) -> str:
-    """What a word of the starting plant means to a person."""
+    """Return a sentence for a word of the starting plant; "" for a word that needs none."""
     if word == COMPILING:
         return "the plant is being built; the very first time its inner loop is compiled, which takes some seconds"
     if word == READY:
@@ -91,13 +77,7 @@ def meaning(word: str, config: PlantConfig) -> str:
     return ""
 
 
-OnWhole = Callable[[Recorded, Pacing | None], None]
-"""Takes the record of a run at its end, and how well the plant kept pace."""
-
-
-def plant_here(
-    config: PlantConfig, folder: Path | None, book: LinkLog, on_whole: OnWhole | None = None
-) -> ProcessOutcome:
+def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog) -> ProcessOutcome:
     """Run the plant in this process until it is told to end.
 
     Parameters
@@ -106,34 +86,86 @@ def plant_here(
         The plant.
     folder : Path or None
         Where to record the run.
-    book : LinkLog
-        Takes what is told of emulated links.
-    on_whole : OnWhole, optional
-        Takes the record, if it is whole.
+    link_log : LinkLog
+        Takes the messages on emulated links.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
-    config, terminal = _recorded(config, folder), sys.stdout
+    config = _recorded(config, folder)
 
-    def tell(line: str) -> None:
-        say(line, terminal)
+    def on_word(word: str) -> None:
+        if word == COMPILING:  # the plant's log reports the rest
+            say(meaning(word, config))
 
-    with LiveRecorder(
-        config.run, near(config.listen[0]), tell, folder, untold=LOGGED, book=book, on_whole=on_whole
-    ) as live_recorder:
+    def run(recorder: LiveRecorder) -> str:
         try:
-            with contextlib.redirect_stdout(_Words(tell, config)):
-                broke = run_plant(config, make_links=links_of)
-        except (StoppedError, KeyboardInterrupt) as stop:
-            farewell(live_recorder, config)
-            return ProcessOutcome(interrupted=str(stop) or "SIGINT")
-    return ProcessOutcome(broke=broke or live_recorder.lost)
+            return run_plant(config, make_links=links_of, on_word=on_word)
+        except (StoppedError, KeyboardInterrupt):
+            _say_end(recorder, config)
+            raise
+
+    recorder = LiveRecorder(config.run, loopback_of(config.listen[0]), say, folder, silent=LOGGED, link_log=link_log)
+    return _follow(recorder, run)
+
+
+def all_here(
+    config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None, link_log: LinkLog
+) -> ProcessOutcome:
+    """Run the plant and all its agents as processes of their own, until the run ends.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant.
+    agents : tuple[AgentConfig, ...]
+        All agents it knows; spare ones are not started.
+    logs : Path
+        Folder for the logs of the processes.
+    folder : Path or None
+        Where to record the run.
+    link_log : LinkLog
+        Takes the messages on emulated links.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    config = _recorded(config, folder)
+    endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
+    plant_ended = threading.Event()
+
+    def on_exit(child: Child) -> None:
+        if child.name == PLANT:
+            plant_ended.set()
+        elif supervisor.failed(child) and not plant_ended.is_set():
+            say(child.report(f"after t = {recorder.t:.2f} s"))
+
+    def on_word(word: str) -> None:
+        if text := meaning(word, config):
+            say(text)
+
+    def run(recorder: LiveRecorder) -> str:
+        with supervisor:
+            supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
+            try:
+                while not plant_ended.wait(min(supervisor.wait, CHECK)):
+                    if recorder.heard_at is not None:
+                        supervisor.note_time(recorder.t, recorder.heard_at)
+                    supervisor.work()
+                supervisor.children.wait(LEAVING)
+            finally:
+                supervisor.end_faults()
+                _say_end(recorder, config)
+        plant = supervisor.children[PLANT]
+        return "" if plant.status == 0 else plant.report(f"after t = {recorder.t:.2f} s")
+
+    configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
+    supervisor = Supervisor(config, configs, logs, on_exit, on_word)
+    recorder = LiveRecorder(config.run, endpoint, say, folder, link_log=link_log)
+    return _follow(recorder, run)
 
 
 def agent_here(
     where: RunAddress, name: str, listen: tuple[str, ...] | None, wait: float, *, trusts: bool = False
 ) -> ProcessOutcome:
-    """Run an agent in this process, as the plant tells it to, until it leaves.
+    """Run an agent in this process, with the configuration that the plant hands out, until it leaves.
 
     Parameters
     ----------
@@ -146,14 +178,14 @@ def agent_here(
     wait : float
         Longest wait (s) for a plant.
     trusts : bool, optional
-        Whether code that only the plant names is run, though the plant may be on another host.
+        Whether to run code that only the plant names, though the plant may be on another host.
 
     Raises
     ------
     NobodyError
         If there is no plant, no such inverter, or another agent of its name.
     UsageError
-        If the plant names code of somebody's own, and is not trusted.
+        If the plant names code that does not come with gridpeers, and is not trusted.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -163,112 +195,50 @@ def agent_here(
             client.find_plant(wait, lambda line: say(f"{name}: {line}"))
             config = configuration(client, name)
             check_free(client, name)
-        if not (trusts or is_near(where.connect)) and (named := own_code(config)):
+        if not (trusts or is_loopback(where.connect)) and (named := own_code(config)):
             raise UsageError(
                 f"{name}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
                 "the plant; if you trust it, say --own-code"
             )
         listen = listen or return_path((*where.connect, *config.connect))
-        config = msgspec.structs.replace(config, connect=where.connect, listen=listen)
-        return ProcessOutcome(broke=run_agent(config, links_of))
+        return ProcessOutcome(broke=run_agent(replace(config, connect=where.connect, listen=listen), links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
-        return ProcessOutcome(interrupted=str(stop) or "SIGINT")
+        return ProcessOutcome(interrupted=_signal_of(stop))
 
 
-def all_here(
-    config: PlantConfig,
-    agents: tuple[AgentConfig, ...],
-    logs: Path,
-    folder: Path | None,
-    book: LinkLog,
-    on_whole: OnWhole | None = None,
-) -> ProcessOutcome:
-    """Run the plant and all its agents as processes of their own, until the run is ended.
-
-    Parameters
-    ----------
-    config : PlantConfig
-        The plant.
-    agents : tuple[AgentConfig, ...]
-        All agents it knows; spare ones are not started.
-    logs : Path
-        Folder for what the processes print.
-    folder : Path or None
-        Where to record the run.
-    book : LinkLog
-        Takes what is told of emulated links.
-    on_whole : OnWhole, optional
-        Takes the record, if it is whole.
-    """
-    signal.signal(signal.SIGTERM, _stop)
-    config = _recorded(config, folder)
-    endpoint = near(config.listen[0])
-    over = threading.Event()
-    misfortunes = FaultInjector(config.links, config.speed)
-
-    def on_exit(child: Child) -> None:
-        if child.name == PLANT:
-            over.set()
-        elif child.status != 0 and not over.is_set() and child.name not in misfortunes.killed:
-            say(child.report(f"after t = {live_recorder.t:.2f} s"))
-
-    def on_word(word: str) -> None:
-        if said := meaning(word, config):
-            say(said)
-
+def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str]) -> ProcessOutcome:
+    """Run something with its recorder until it returns why it broke, or a signal ends it."""
+    broke = interrupted = ""
     try:
-        with (
-            LiveRecorder(config.run, endpoint, say, folder, book=book, on_whole=on_whole) as live_recorder,
-            Children() as children,
-        ):
-            children.add(
-                Child(PLANT, ["-m", "scenarios.emulation.emulated_plant"], config, logs / "plant.log", on_exit, on_word)
-            )
-            for agent in agents:
-                if agent.name in config.agents:
-                    agent = msgspec.structs.replace(agent, connect=(endpoint,), listen=return_path(config.listen))
-                    children.add(
-                        Child(
-                            agent.name,
-                            ["-m", "scenarios.emulation.emulated_agent"],
-                            agent,
-                            logs / f"{agent.name}.log",
-                            on_exit,
-                        )
-                    )
-            try:
-                while not over.wait(min(misfortunes.wait, CHECK)):
-                    if live_recorder.told_at is not None:
-                        misfortunes.heard(live_recorder.t - config.T_c, live_recorder.told_at)
-                    misfortunes.strike(children)
-                children.wait(LEAVING)
-            finally:
-                misfortunes.end(children)
-                farewell(live_recorder, config)
-        plant = children[PLANT]
-        broke = "" if plant.status == 0 else plant.report(f"after t = {live_recorder.t:.2f} s")
-        return ProcessOutcome(broke=broke or live_recorder.lost)
+        with recorder:
+            broke = run(recorder)
+        broke = broke or recorder.failure
     except (StoppedError, KeyboardInterrupt) as stop:
-        return ProcessOutcome(interrupted=str(stop) or "SIGINT")
+        interrupted = _signal_of(stop)
+    return ProcessOutcome(broke=broke, interrupted=interrupted, recorded=recorder.recorded, pacing=recorder.pacing)
 
 
-def farewell(live_recorder: LiveRecorder, config: PlantConfig) -> None:
+def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
     """Say how far the run came and how well it kept pace."""
-    pacing = live_recorder.pacing
+    pacing = recorder.pacing
     if pacing is None or pacing.steps == 0:
         say("the run ended before it began")
     else:
-        say(f"ended at t = {live_recorder.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
+        say(f"ended at t = {recorder.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
 
 
 def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:
-    """The plant with its recorder, for which it waits a moment even if it waits for nobody else."""
+    """Return the plant with its recorder, for which it waits a moment even if it waits for no agent."""
     wait = config.wait_for_agents if folder is None else max(RECORDER_WAIT, config.wait_for_agents)
-    return msgspec.structs.replace(config, recorders=(LiveRecorder.NAME,), wait_for_agents=wait)
+    return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
 
 def _stop(number: int, frame: FrameType | None) -> NoReturn:
     raise StoppedError(signal.Signals(number).name)
+
+
+def _signal_of(stop: BaseException) -> str:
+    return str(stop) or "SIGINT"
 
 
 def _log() -> None:

@@ -57,7 +57,7 @@ class RunAddress:
         return f"run {self.run} at {', '.join(self.connect)}"
 
 
-def place(run: str, connect: list[str] | None) -> RunAddress:
+def address_of(run: str, connect: list[str] | None) -> RunAddress:
     """Check what the options `--run` and `--connect` say.
 
     Parameters
@@ -152,7 +152,7 @@ def check_endpoint(option: str, text: str) -> str:
     return text
 
 
-def claim(option: str, text: str) -> str:
+def listenable(option: str, text: str) -> str:
     """Return an endpoint that this process will be able to listen on; a free port is chosen for port 0.
 
     Raises
@@ -222,12 +222,12 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
     return ("tcp/[::]:0",) if far[0].startswith("[") else ("tcp/0.0.0.0:0",)
 
 
-def is_near(connect: tuple[str, ...]) -> bool:
+def is_loopback(connect: tuple[str, ...]) -> bool:
     """Whether all endpoints are on this machine's loopback.
 
     Examples
     --------
-    >>> is_near(("tcp/127.0.0.1:7447",)), is_near(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
+    >>> is_loopback(("tcp/127.0.0.1:7447",)), is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
     (True, False)
     """
     return all(host.startswith(_LOOPBACKS) for host in _hosts(connect))
@@ -238,12 +238,12 @@ def _hosts(connect: tuple[str, ...]) -> list[str]:
     return [match["host"] for match in matches if match is not None]
 
 
-def near(listen: str) -> str:
+def loopback_of(listen: str) -> str:
     """Where a process of the same machine connects to who listens there.
 
     Examples
     --------
-    >>> near("tcp/0.0.0.0:7447"), near("tcp/[::]:7447"), near("tcp/10.0.0.1:7447")
+    >>> loopback_of("tcp/0.0.0.0:7447"), loopback_of("tcp/[::]:7447"), loopback_of("tcp/10.0.0.1:7447")
     ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/10.0.0.1:7447')
     """
     return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")

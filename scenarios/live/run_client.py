@@ -13,8 +13,8 @@ from scenarios.live.run_address import (
     RunAddress,
     UsageError,
     accepting,
-    claim,
-    near,
+    listenable,
+    loopback_of,
     next_port,
 )
 from wire.codec import RejectedError, decode
@@ -86,6 +86,11 @@ class RunClient:
     def plant(self) -> bool:
         """Whether the plant's token is there."""
         return bool(self.epochs)
+
+    @property
+    def present(self) -> list[str]:
+        """Inverters whose agents have a token."""
+        return [name for name, instances in self.agents.items() if instances]
 
     @property
     def runs(self) -> set[str]:
@@ -228,7 +233,7 @@ class RunClient:
         )
 
 
-def claim_for_run(listen: str) -> str:
+def endpoint_for_run(listen: str) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
 
     Raises
@@ -237,18 +242,19 @@ def claim_for_run(listen: str) -> str:
         If it cannot be listened on. If another run is there, the message names it.
     """
     try:
-        return claim("--listen", listen)
+        return listenable("--listen", listen)
     except InUseError:
-        where = near(listen)
+        where = loopback_of(listen)
         there = runs_at(where) if accepting((where,)) else []
         if not there:
             raise
         first = "" if (there[0], where) == (RUN, ENDPOINT) else f" --run {there[0]} --connect {where}"
         beside = next_port(listen)
+        other = loopback_of(beside)
         raise UsageError(
             f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
             f"gridpeers status{first} shows it, gridpeers down{first} ends it; to have both, give this one a name and "
-            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {near(beside)})"
+            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {other})"
         ) from None
 
 

@@ -1,7 +1,9 @@
-"""Commands to a running plant and their answers: status, stop, event, down."""
+"""Requests to a running plant: status, configurations, commands to switches, agents and emulated links."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from time import monotonic
 from typing import Literal
 
@@ -9,69 +11,105 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from agents.own_nameplate import check_nameplate
+from netem.netem_errors import Mistake
+from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.link_command import LinkCommand
+from scenarios.emulation.link_reports import LinkStand, decode_stands
+from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
-from scenarios.live.show.run_monitor import PlantStatus, RunMonitor
-from scenarios.live.show.snapshot import Snapshot
+from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
-from wire.messages import PLANT, AgentStatus, Answer, Command, Telemetry
-from wire.session_patience import SessionPatience
+from wire.messages import PLANT, Answer, Command, LinkAnswer
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
 ANSWER = 5.0
 """Longest wait (s) for the answer of a plant that is there."""
 
-PLATES = 2.0
+ACKNOWLEDGED = 4.0
+"""Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
+
+HANDOUT = 2.0
 """Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds."""
 
 AGAIN = 0.1
-"""Time (s) between two questions about the same thing."""
-
-LOOK = 1.2
-"""Longest wait (s) for one look: two periods of an agent's status, and a bit."""
-
-SILENT = 1.0
-"""Time (s) without a word after which somebody counts as silent: two periods of an agent's status."""
+"""Time (s) between two requests for the same thing."""
 
 LEAVING = 10.0
-"""Longest wait (s) for those who were told to leave."""
+"""Longest wait (s) for processes that were asked to leave."""
 
 
 class RefusedError(ValueError):
-    """The plant has said no; the message is its."""
+    """The plant has refused a command; the message is the plant's."""
 
 
 def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
-    """Give the plant a command; what it answers.
+    """Give the plant a command and return its answer.
 
     Raises
     ------
     RefusedError
-        If it says no.
+        If the plant refuses.
     NobodyError
         If it does not answer.
     """
+    answer, _ = _request(client, verb, argument, lambda text: set())
+    return answer
+
+
+def _request(
+    client: RunClient, verb: Verb, argument: str, receivers: Callable[[str], set[str]]
+) -> tuple[str, dict[str, LinkAnswer]]:
+    """Return the plant's answer, and the answers that come in time of the receivers that follow from it."""
     command = Command(sender="visitor", incarnation=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=client.id)
     client.publish(client.keys.command, encode(command))
+    text: str | None = None
+    answers: dict[str, LinkAnswer] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
         for key, payload in client.take(left):
-            answer = client.read(key, payload)
-            if isinstance(answer, Answer):
-                if not answer.ok:
-                    raise RefusedError(answer.text)
-                return answer.text
-    raise NobodyError(f"the plant of {client.where} is there but has not answered within {ANSWER:g} s; is it frozen?")
+            message = client.read(key, payload)
+            if isinstance(message, LinkAnswer):
+                answers[message.sender] = message
+            elif isinstance(message, Answer):
+                if not message.ok:
+                    raise RefusedError(message.text)
+                text, end = message.text, monotonic() + ACKNOWLEDGED
+        if text is not None and answers.keys() >= receivers(text):
+            break
+    if text is None:
+        raise NobodyError(
+            f"the plant of {client.where} is there but has not answered within {ANSWER:g} s; is it frozen?"
+        )
+    return text, answers
 
 
-def standing(client: RunClient) -> PlantStatus:
-    """How the plant says the run stands."""
+def plant_status(client: RunClient) -> PlantStatus:
+    """Return the state of the run as the plant reports it."""
     return msgspec.json.decode(ask(client, "status"), type=PlantStatus)
 
 
+def has_left(client: RunClient, name: str) -> bool:
+    """Wait until an agent that was asked to leave has left; return whether it has."""
+    end = monotonic() + LEAVING
+    while name in plant_status(client).agents:
+        if monotonic() > end:
+            return False
+        client.until(lambda: False, AGAIN)
+    return True
+
+
+def has_ended(client: RunClient) -> bool:
+    """Wait until a run that was asked to end has ended; return whether it has. Its plant leaves last."""
+    return client.until(lambda: not client.plant, LEAVING)
+
+
+# ---- configurations of agents
+
+
 def configuration(client: RunClient, name: str) -> AgentConfig:
-    """What the plant hands to the agent of an inverter.
+    """Return the configuration that the plant hands out to the agent of an inverter.
 
     Raises
     ------
@@ -86,118 +124,20 @@ def configuration(client: RunClient, name: str) -> AgentConfig:
 
 
 def configurations(client: RunClient, name: str = "") -> dict[str, AgentConfig]:
-    """What the plant hands to agents, by name: of all those that came until that of `name`, or any, was there."""
+    """Return configurations of agents by name: all that came until that of `name`, or any, was there."""
     known: dict[str, AgentConfig] = {}
     client.fetch(client.keys.config("*"))
-    end = monotonic() + PLATES
+    end = monotonic() + HANDOUT
     while not (name in known if name else known) and (left := end - monotonic()) > 0.0:
         for _, payload in client.take(left):
-            config = _plate(payload)
+            config = read_config(payload)
             if config is not None:
                 known[config.name] = config
     return known
 
 
-def check_free(client: RunClient, name: str) -> None:
-    """Raise NobodyError if an agent of this name takes part already, before a second one says anything in the run.
-
-    Of two that come at the same moment the plant refuses one.
-    """
-    if name in standing(client).agents:
-        raise NobodyError(
-            f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
-            f"(gridpeers stop {name}), or start the agent of another inverter"
-        )
-
-
-def look(client: RunClient) -> Snapshot:
-    """Listen until the plant and every agent have told how they are, or for `LOOK` seconds."""
-    monitor, heard = RunMonitor(client.where.run), set[str]()
-    monitor.standing(standing(client))
-    watch = Watching(client, monitor)
-    told = False
-    end = monotonic() + LOOK
-    while (left := end - monotonic()) > 0.0:
-        for message in watch.take(left):
-            told = told or isinstance(message, Telemetry)
-            if isinstance(message, AgentStatus):
-                heard.add(message.sender)
-        if told and heard >= set(present(client)) and monitor.has_plates:
-            break
-    return monitor.look(present(client), monotonic())
-
-
-def present(client: RunClient) -> list[str]:
-    """Inverters whose agents have a token."""
-    return [name for name, instances in client.agents.items() if instances]
-
-
-class Watching:
-    """Brings what a run tells into a monitor.
-
-    Parameters
-    ----------
-    client : RunClient
-        At the run.
-    monitor : RunMonitor
-        Takes it.
-    """
-
-    def __init__(self, client: RunClient, monitor: RunMonitor) -> None:
-        self._visit, self._picture = client, monitor
-        self._subscribed: set[str] = set()
-        self._plant = client.plant
-        self._told: dict[str, float] = {}
-        """When who last told anything."""
-        self._used: dict[str, tuple[str, ...]] = {}
-        """Whom each agent has in its sums."""
-        self._patience = SessionPatience()
-        client.listen(client.keys.telemetry)
-        client.fetch(client.keys.config("*"))
-
-    def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
-        """Wait (s) for something to happen and note it; what was told."""
-        told: list[Telemetry | AgentStatus] = []
-        for key, payload in self._visit.take(seconds):
-            config = _plate(payload)
-            if config is not None:
-                self._picture.plate(config)
-                continue
-            message = self._visit.read(key, payload)
-            if isinstance(message, Telemetry):
-                self._picture.telemetry(message, monotonic())
-                told.append(message)
-                self._told[PLANT] = monotonic()
-            elif isinstance(message, AgentStatus):
-                self._picture.status(message, monotonic())
-                told.append(message)
-                self._told[message.sender] = monotonic()
-                self._used[message.sender] = message.used
-        if self._visit.plant and not self._plant:  # it was restarted, perhaps with other inverters
-            self._visit.fetch(self._visit.keys.config("*"))
-        self._plant = self._visit.plant
-        for name in {*self._picture.inverters, *self._visit.agents} - self._subscribed:
-            self._subscribed.add(name)
-            self._visit.listen(self._visit.keys.status(name))
-        self._renew(monotonic())
-        return told
-
-    def _renew(self, now: float) -> None:
-        """Come again if somebody who is there has told nothing for too long: the session has gone astray.
-
-        There is whose token is there, and whom somebody who tells has in its sums.
-        """
-        telling = {name for name, at in self._told.items() if now - at <= SILENT}
-        there = {*([PLANT] if self._visit.plant else []), *present(self._visit)}
-        there.update(*(self._used.get(name, ()) for name in telling))
-        silent = sorted(there - telling)
-        self._patience.whole |= PLANT in telling and not silent
-        if self._patience.lost(silent, now):
-            self._patience = self._patience.next()
-            self._visit.renew()
-
-
-def _plate(payload: bytes) -> AgentConfig | None:
+def read_config(payload: bytes) -> AgentConfig | None:
+    """Return a plausible configuration of an agent; None if the bytes are something else."""
     if not payload.startswith(b"{"):
         return None
     try:
@@ -208,16 +148,122 @@ def _plate(payload: bytes) -> AgentConfig | None:
     return config
 
 
-def has_left(client: RunClient, name: str) -> bool:
-    """Wait until an agent that was told to leave has left; whether it has."""
-    end = monotonic() + LEAVING
-    while name in standing(client).agents:
-        if monotonic() > end:
-            return False
-        client.until(lambda: False, AGAIN)
-    return True
+def check_free(client: RunClient, name: str) -> None:
+    """Raise NobodyError if an agent of this name takes part already, before a second one says anything in the run.
+
+    Of two that come at the same moment the plant refuses one.
+    """
+    if name in plant_status(client).agents:
+        raise NobodyError(
+            f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
+            f"(gridpeers stop {name}), or start the agent of another inverter"
+        )
 
 
-def has_ended(client: RunClient) -> bool:
-    """Wait until a run that was told to end has ended; whether it has. The plant goes when all others have."""
-    return client.until(lambda: not client.plant, LEAVING)
+# ---- emulated links
+
+
+class _LinkReply(msgspec.Struct, frozen=True):
+    """The plant's answer to "link" and "links"; see `plant.realtime.run_commands`."""
+
+    number: int
+    t: float
+    asked: tuple[str, ...]
+    said: str = ""
+    receivers: tuple[str, ...] = ()
+
+    @property
+    def reached(self) -> tuple[str, ...]:
+        """Receivers of a command that take part: the plant, and the agents that it has sent the command."""
+        return tuple(name for name in self.receivers if name == PLANT or name in self.asked)
+
+    @property
+    def answers_needed(self) -> set[str]:
+        """Receivers that answer: agents to a command, for which the plant has answered; the plant too to "links"."""
+        return {*self.reached} - {PLANT} if self.number > 0 else {*self.asked, PLANT}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkCommandResult:
+    """The receivers' answers to a link command."""
+
+    t: float
+    """Run time (s) from which on it holds."""
+    text: str
+    """Its effect in words: a heal names only links that had a fault."""
+    acknowledged: tuple[str, ...]
+    """Receivers that have taken it."""
+    silent: tuple[str, ...]
+    """Receivers that take part and have not answered in time."""
+    absent: tuple[str, ...]
+    """Receivers without an agent: the plant tells the agent when it comes."""
+    refused: Mapping[str, str]
+    """Receivers that have refused, and why."""
+
+    @property
+    def changes_links(self) -> bool:
+        """Whether it changes any link."""
+        return bool(self.acknowledged or self.silent or self.absent or self.refused)
+
+
+def links_of_run(client: RunClient) -> tuple[Setup, AgentConfig]:
+    """Return the emulated links of a run, and the configuration of one of its agents.
+
+    Raises
+    ------
+    NobodyError
+        If the run has no links that can be changed.
+    """
+    for config in configurations(client).values():
+        if config.links:
+            return Setup.of_text(config.links), config
+    raise NobodyError(
+        f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
+    )
+
+
+def check_link_command(command: LinkCommand, setup: Setup | None) -> None:
+    """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
+    problems: Iterable[Mistake] = command.wrong_values() if setup is None else command.mistakes(setup.microgrids)
+    options = [(path.partition(".")[0], text) for path, text in problems]
+    wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
+    if wrong:
+        raise UsageError("; ".join(wrong))
+
+
+def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
+    """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
+    reply, answers = _request_links(client, "link", command.to_text())
+    refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
+    silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
+    return LinkCommandResult(
+        t=reply.t,
+        text=reply.said,
+        acknowledged=tuple(name for name in reply.reached if name not in refused and name not in silent),
+        silent=silent,
+        absent=tuple(name for name in reply.receivers if name not in reply.reached),
+        refused=refused,
+    )
+
+
+def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStand], tuple[str, ...]]:
+    """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
+    reply, answers = _request_links(client, "links", "")
+    found: dict[tuple[str, str], LinkStand] = {}
+    for name, answer in answers.items():
+        if answer.ok:
+            try:
+                of_sender: dict[str, LinkStand] = decode_stands(answer.data)
+            except msgspec.DecodeError:  # counts as no answer
+                continue
+            found |= {(src, name): state for src, state in of_sender.items()}
+    return reply.t, found, tuple(name for name in reply.asked if name not in answers)
+
+
+def _request_links(client: RunClient, verb: Verb, argument: str) -> tuple[_LinkReply, dict[str, LinkAnswer]]:
+    text, answers = _request(client, verb, argument, lambda text: _link_reply(text).answers_needed)
+    return _link_reply(text), answers
+
+
+def _link_reply(text: str) -> _LinkReply:
+    return msgspec.json.decode(text, type=_LinkReply)

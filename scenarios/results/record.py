@@ -1,8 +1,8 @@
-"""Writes what the plant tells: history.csv and events.csv of one case.
+"""Record one case of a run, by any driver: history.csv and events.csv, or rows in memory.
 
 Nothing is ever half-written under its own name: rows go to `history.partial.csv` while the case runs, and the file
-gets its name when the last row is there. What a broken case leaves keeps the partial name. A recorder keeps no rows:
-a run that lasts for hours takes no more memory than a short one.
+gets its name when the last row is there. What a broken case leaves keeps the partial name. A recorder with a
+folder keeps no rows in memory: a run that lasts for hours takes no more than a short one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 import msgspec
 
@@ -97,28 +97,36 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
     return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
 
 
-class Tape:
-    """Takes the telemetry of one case as it comes, and keeps the hash of the bytes of its history.csv.
+class Recorder:
+    """Record the telemetry of one case: call it with every `Telemetry`, then `finish()`.
 
-    Call it with every `Telemetry`, then `finish()`. Floats are written as the shortest text that reads back to the
-    same number, and lines end in a line feed on every system, so equal runs give equal bytes.
+    With a folder it writes history.csv and events.csv and keeps no rows; without one it keeps the rows in memory and
+    writes nothing. The hash of the bytes of history.csv is the same either way. Floats are written as the shortest text
+    that reads back to the same number, and lines end in a line feed on every system, so equal runs give equal bytes.
 
     Parameters
     ----------
+    folder : Path, optional
+        Folder of the case; the recorder makes it.
     gaps : bool, optional
-        Whether rows may be missing, as of a run whose recorder was out of reach for too long; else that is an error.
+        Whether rows may be missing, as in a run whose recorder was out of reach for too long; else that is an error.
     """
 
-    def __init__(self, *, gaps: bool = False) -> None:
+    def __init__(self, folder: Path | None = None, *, gaps: bool = False) -> None:
+        self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
-        self._gaps = gaps
+        self._file: BinaryIO | None = None
+        if folder is not None:
+            folder.mkdir(parents=True)
+            self._file = (folder / PARTIAL).open("wb")
+        self._finished = False
         self._inverters: tuple[str, ...] = ()
         self._first: list[float] = []
         """Times of the first two rows (s)."""
         self.rows: list[Row] = []
-        """What is kept in memory."""
+        """Rows in memory; empty with a folder."""
         self.count = 0
-        """Rows so far."""
+        """Number of rows so far."""
         self.ended = 0.0
         """Time of the last row (s)."""
         self.missing: list[tuple[float, float]] = []
@@ -127,10 +135,18 @@ class Tape:
         self.quiet: list[tuple[float, int]] = []
         """See `Recorded.quiet`."""
         self.reproducible = True
-        """False once something unscripted, as a dead agent, has entered the run."""
+        """False once something unscripted, such as the death of an agent, has entered the run."""
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
     def __call__(self, telemetry: Telemetry) -> None:
-        """Take the rows of one telemetry message."""
+        """Take the rows of one telemetry message; with a folder they are in the file when this returns."""
         if not self._inverters:
             self._inverters = telemetry.inverters
             self._write(",".join(header(telemetry.inverters)) + "\n")
@@ -138,14 +154,17 @@ class Tape:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
             self._note_time(row[0])
-            self._keep(row)
+            if self._file is None:
+                self.rows.append(row)
             self._write(",".join(map(repr, row)) + "\n")
         self.events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible
+        if self._file is not None:
+            self._file.flush()
 
     def finish(self, end: float, record_step: float) -> Recorded:
-        """Check that the whole run is there.
+        """Check that the whole run is there, and give the files their names; if rows are missing, they keep PARTIAL.
 
         Parameters
         ----------
@@ -159,6 +178,8 @@ class Tape:
         RecordError
             If rows are missing.
         """
+        if self._file is not None:
+            self._file.close()
         expected = round(end / record_step) + 1
         absent = sum(round((after - before) / record_step) - 1 for before, after in self.missing)
         if self.count + (absent if self._gaps else 0) != expected:
@@ -168,9 +189,15 @@ class Tape:
                 f"history has {self.count} rows, but {end:g} s in steps of {record_step:g} s are {expected}; "
                 f"{last}{holes}"
             )
+        rows: Rows = self.rows
+        if self._folder is not None:
+            self._write_events(self._folder)
+            (self._folder / PARTIAL).rename(self._folder / "history.csv")
+            rows = RowFile(self._folder / "history.csv", self.count)
+        self._finished = True
         return Recorded(
             inverters=self._inverters,
-            rows=self._all_rows(),
+            rows=rows,
             ended=self.ended,
             missing=tuple(self.missing),
             events=tuple(self.events),
@@ -178,6 +205,13 @@ class Tape:
             sha256=self._hash.hexdigest(),
             reproducible=self.reproducible,
         )
+
+    def close(self) -> None:
+        """End the record. What came of a case that was not finished stays, under the partial name."""
+        if self._folder is not None and self._file is not None and not self._finished:
+            with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and the writer reported it
+                self._file.close()
+            self._write_events(self._folder)
 
     @property
     def record_step(self) -> float:
@@ -192,80 +226,16 @@ class Tape:
         self.ended = t
         self.count += 1
 
-    def _keep(self, row: Row) -> None:
-        self.rows.append(row)
-
-    def _all_rows(self) -> Rows:
-        return self.rows
-
-    def _write(self, text: str) -> bytes:
+    def _write(self, text: str) -> None:
         bytes_ = text.encode("ascii")
         self._hash.update(bytes_)
-        return bytes_
+        if self._file is not None:
+            self._file.write(bytes_)
 
-
-class Recorder(Tape):
-    """A tape that writes down what it takes, history.csv and events.csv, and keeps no rows.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the case; it is made.
-    gaps : bool, optional
-        As of a `Tape`.
-    """
-
-    def __init__(self, folder: Path, *, gaps: bool = False) -> None:
-        super().__init__(gaps=gaps)
-        folder.mkdir(parents=True)
-        self._folder = folder
-        self._file = (folder / PARTIAL).open("wb")
-        self._finished = False
-
-    def __enter__(self) -> Recorder:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def __call__(self, telemetry: Telemetry) -> None:
-        """Take the rows of one telemetry message; they are in the file when this returns."""
-        super().__call__(telemetry)
-        self._file.flush()
-
-    def finish(self, end: float, record_step: float) -> Recorded:
-        """Check that the whole run is there, and give the files their names; if not, they keep the partial one."""
-        self._file.close()
-        recorded = super().finish(end, record_step)
-        self._write_events()
-        (self._folder / PARTIAL).rename(self._folder / "history.csv")
-        self._finished = True
-        return recorded
-
-    def close(self) -> None:
-        """End the record. What came of a case that was not finished stays, under the partial name."""
-        if not self._finished:
-            with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and who wrote last knows
-                self._file.close()
-            self._write_events()
-
-    def _keep(self, row: Row) -> None:
-        pass
-
-    def _all_rows(self) -> Rows:
-        return RowFile(self._folder / "history.csv", self.count)
-
-    def _write(self, text: str) -> bytes:
-        bytes_ = super()._write(text)
-        self._file.write(bytes_)
-        return bytes_
-
-    def _write_events(self) -> None:
-        partial = self._folder / "events.partial.csv"
+    def _write_events(self, folder: Path) -> None:
+        partial = folder / "events.partial.csv"
         with partial.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(("t_s", "kind", "subject", "text"))
             writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self.events)
-        partial.rename(self._folder / "events.csv")
+        partial.rename(folder / "events.csv")

@@ -30,7 +30,7 @@ from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.link_records import LinkRecord
 from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
-from scenarios.results.record import Tape
+from scenarios.results.record import Recorder
 from scenarios.results.settling import settling
 from scenarios.spec import Scenario
 from scenarios.spec.agent_schedule import inverters_of
@@ -90,12 +90,12 @@ def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[SweepR
 def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History | None]:
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
-    tape = Tape()
+    recorder = Recorder()
     links = LinkRecord()
-    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant), on_links=links)
+    outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant), on_links=links)
     if outcome.broke:
         return SweepRow(number=number, status="broke", why=outcome.broke), None
-    recorded = tape.finish(scenario.time.end_s, scenario.time.record_s)
+    recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     history = History.of(recorded.inverters, recorded.rows)
     plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from plant.realtime.pacer import TOLERATED
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.metrics import sharing_index
 from scenarios.spec import load_scenario
 from tests.toy.mixed import Mixed
@@ -23,7 +23,7 @@ def test_a_foreign_agent_takes_its_share_in_real_time(tmp_path: Path) -> None:
     """The feeder islands: 60 Hz, MPSI below 0.01 with the foreign one; it leaves, returns, is killed, as ours would."""
     scenario, feeder = load_scenario("islanding")
     scenario = replace(scenario, events=scenario.events[:1])
-    plant, agents = set_up(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=7.0), "tcp/127.0.0.1:0")
+    plant, agents = configure(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=7.0), "tcp/127.0.0.1:0")
     standing = [agent for agent in agents if agent.name in plant.agents]
     run = Mixed(plant, standing, tmp_path, foreign=("inv2",))
     run.at(2.4, lambda: run.foreigners[0].send_signal(signal.SIGTERM))

@@ -16,7 +16,7 @@ from plant.realtime.pacer import TOLERATED
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.spec import load_scenario
 from tests.toy.runs import FleetRun
 
@@ -30,7 +30,7 @@ class Feeder:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
         self.endpoint = rendezvous()
-        plant, agents = set_up(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end), self.endpoint)
+        plant, agents = configure(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end), self.endpoint)
         self.agents = {agent.name: replace(agent, connect=(self.endpoint,)) for agent in agents}
         self.rated = [agent.P_rated for agent in agents]
         standing = [self.agents[name] for name in plant.agents]

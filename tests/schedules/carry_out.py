@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from plant.build import build_plant
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.record import QUANTITIES
 from scenarios.spec import load_scenario
 from tests.schedules.schedule import HEAL, Action, draw
@@ -83,7 +83,7 @@ def carry_out(seed: int, folder: Path, *, switchings: bool = True) -> Verdict:
     """
     scenario, feeder = load_scenario("microgrid-switching")
     scenario = replace(scenario, events=scenario.events[:1])
-    configs = set_up(scenario, feeder, LiveOptions(run=f"schedule{seed}", case="IV"), "tcp/127.0.0.1:0")
+    configs = configure(scenario, feeder, LiveOptions(run=f"schedule{seed}", case="IV"), "tcp/127.0.0.1:0")
     actions = draw(seed, {row.name: row.microgrid for row in feeder.inverters}, switchings=switchings)
     rated = {agent.name: agent.P_rated for agent in configs[1]}
     leaders = {agent.name for agent in configs[1] if agent.kind == "GFM"}

@@ -23,7 +23,7 @@ from plant.dynamics import Circuit
 from plant.dynamics.live_network import LiveNetwork
 from plant.dynamics.reduction import Reduction
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.record import Tape
+from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
 from scenarios.spec.configs import configs
 from scenarios.spec.loading import load_scenario
@@ -194,9 +194,9 @@ def test_a_copied_plant_gives_the_bytes_of_a_new_one() -> None:
     plant = msgspec.structs.replace(plant, end=1.5)
     hashes = set()
     for make in (build_plant, plant_at_start, plant_at_start):
-        tape = Tape()
-        run_inprocess(plant, agents, tape, plant=make(plant))
-        hashes.add(tape.finish(1.5, plant.record_step).sha256)
+        recorder = Recorder()
+        run_inprocess(plant, agents, recorder, plant=make(plant))
+        hashes.add(recorder.finish(1.5, plant.record_step).sha256)
 
     assert len(hashes) == 1
 

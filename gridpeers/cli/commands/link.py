@@ -1,4 +1,4 @@
-"""The commands that hurt and heal links while a run goes on."""
+"""Commands that give links faults and heal them during a run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, told, visit_to
+from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, run_client, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
 
@@ -56,7 +56,7 @@ def set_(
 
     Example:  gridpeers link set inv1 inv4 --delay 0.1 --loss 0.2 --for 10
     """
-    with told():
+    with usage_errors():
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
         fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
         if not fault and not profile:
@@ -85,7 +85,7 @@ def cut(
 
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
-    with told():
+    with usage_errors():
         from netem.models.cut import Cut
 
         _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, run, connect, wait)
@@ -109,7 +109,7 @@ def heal(
 
     Example:  gridpeers link heal inv4 inv7
     """
-    with told():
+    with usage_errors():
         _give(links or [], "<->", None, None, run, connect, wait)
 
 
@@ -121,12 +121,12 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
     Example:  gridpeers link show
     """
-    with visit_to(run, connect, wait) as client:
-        from scenarios.live.command_links import stands
+    with run_client(run, connect, wait) as client:
+        from scenarios.live.run_requests import link_states
         from scenarios.live.show.link_table import links_text
 
-        t, found, silent = stands(client)
-        typer.echo(links_text(run, t, found), nl=False)
+        t, states, silent = link_states(client)
+        typer.echo(links_text(run, t, states), nl=False)
         if silent:
             fail([f"has not answered: {', '.join(silent)}; what its links do is not shown"], BROKEN)
 
@@ -175,48 +175,48 @@ def _give(
     connect: list[str] | None,
     wait: float,
 ) -> None:
-    """Check an order, give it, and say what became of it."""
+    """Check a link command, give it, and print the receivers' answers."""
     from netem.spec.change import Heal
     from netem.spec.fault import Fault
     from netem.spec.pattern import parse
     from scenarios.emulation.link_command import LinkCommand
-    from scenarios.live.command_links import check, give, links_of_run
     from scenarios.live.run_address import UsageError
+    from scenarios.live.run_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
     try:
         parse(on)
     except ValueError as error:
         raise UsageError(f"LINKS: {error}") from None
-    order = LinkCommand(
+    command = LinkCommand(
         fault=None if fault is None else Fault(on=on, **fault),
         heal=Heal(on=on, from_s=0.0) if fault is None else None,
         for_s=duration,
     )
-    check(order, None)
-    with visit_to(run, connect, wait) as client:
+    check_link_command(command, None)
+    with run_client(run, connect, wait) as client:
         setup, agent = links_of_run(client)
-        check(order, setup)
-        outcome = give(client, order)
-    typer.echo(f"{outcome.said}; from t = {outcome.t:.2f} s on" if outcome.changes_links else outcome.said)
-    if outcome.acknowledged:
-        typer.echo(f"acknowledged: {', '.join(outcome.acknowledged)}")
-    if outcome.absent:
-        typer.echo(f"no agent yet, told when it comes: {', '.join(outcome.absent)}")
-    if too_old := _too_old(order, agent):
-        typer.echo(too_old)
-    wrong = [f"{name}: {why}" for name, why in outcome.deaf.items()]
-    if outcome.silent:
-        wrong.append(f"not acknowledged by {', '.join(outcome.silent)}; is it frozen? It will be told again")
+        check_link_command(command, setup)
+        result = command_links(client, command)
+    typer.echo(f"{result.text}; from t = {result.t:.2f} s on" if result.changes_links else result.text)
+    if result.acknowledged:
+        typer.echo(f"acknowledged: {', '.join(result.acknowledged)}")
+    if result.absent:
+        typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
+    if note := _age_note(command, agent):
+        typer.echo(note)
+    wrong = [f"{name}: {why}" for name, why in result.refused.items()]
+    if result.silent:
+        wrong.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
     if wrong:
         fail(wrong, BROKEN)
 
 
-def _too_old(order: LinkCommand, agent: AgentConfig) -> str:
-    """What a person should know if states will be ignored for their age."""
+def _age_note(command: LinkCommand, agent: AgentConfig) -> str:
+    """Return a note if agents will ignore states for their age; else ""."""
     from netem.models.delay import Constant, RandomDelay
 
-    delay = order.fault.models().get("delay") if order.fault is not None else None
+    delay = command.fault.models().get("delay") if command.fault is not None else None
     limit = agent.control.handling.max_age or agent.max_age
     usual = (
         delay.delay_s if isinstance(delay, Constant) else delay.quantile(0.5) if isinstance(delay, RandomDelay) else 0.0

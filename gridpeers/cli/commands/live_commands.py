@@ -1,4 +1,4 @@
-"""The commands for runs by hand. What they need is imported when one is used, so that help comes at once."""
+"""Commands for live runs. Each imports its modules when it is used, so that help comes at once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from gridpeers.cli.commands.link import link
-from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, told, visit_to
+from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from wire.driver.output import watch_readers
 
@@ -65,51 +65,46 @@ def _start(
 ) -> None:
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
-    with told():
+    with usage_errors():
         from scenarios.live.run_address import check_endpoint, check_run
-        from scenarios.live.run_client import check_alone, claim_for_run
+        from scenarios.live.run_client import check_alone, endpoint_for_run
 
-        # first of all: to read a scenario takes seconds, and who has forgotten a run hears of it at once
+        # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_run(run)
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
-        endpoint = claim_for_run(listen)
+        endpoint = endpoint_for_run(listen)
         check_alone(run, beyond)
     spec, feeder = load(scenario)
-    with told():
+    with usage_errors():
         from scenarios.live.link_log import LinkLog, check_new
         from scenarios.live.live_folders import BY_HAND, folders
-        from scenarios.live.live_options import LiveOptions, chosen_case, real_nodes, set_up
+        from scenarios.live.live_options import LiveOptions, chosen_case, configure, node_faults_by_hand
         from scenarios.live.live_processes import all_here, plant_here, say
-        from scenarios.live.numbers.ending import conclude
-        from scenarios.live.numbers.live_report import LiveReport
+        from scenarios.live.numbers.live_report import conclude
         from scenarios.results.metrics_file import RunMetrics
 
         check_new("--record", record)
         spec = chosen(spec, chosen_case(spec, case), None)
-        wishes = LiveOptions(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
-        config, everyone = set_up(spec, feeder, wishes, endpoint, beyond)
+        options = LiveOptions(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
+        config, everyone = configure(spec, feeder, options, endpoint, beyond)
         watch_readers(quits=False)
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
-            book = LinkLog(
-                spec, feeder, config.links, kept.record, record, None if out is None else out / "replay.toml"
-            )
-            account = None
+            replay = None if out is None else out / "replay.toml"
+            link_log = LinkLog(spec, feeder, config.links, kept.record, record, replay)
+            if agents:
+                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
+                outcome = all_here(config, everyone, kept.logs, kept.record, link_log)
+            else:
+                if note := node_faults_by_hand(spec):
+                    say(note)
+                outcome = plant_here(config, kept.record, link_log)
             if kept.whole is not None:
                 ran = RunMetrics(
                     scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed
                 )
-                account = LiveReport(ran, book)
-            if left := real_nodes(spec) if not agents else "":
-                say(left)
-            if agents:
-                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
-                ended = all_here(config, everyone, kept.logs, kept.record, book, account)
-            else:
-                ended = plant_here(config, kept.record, book, account)
-            if account is not None:
-                ended = conclude(ended, account, kept)
-        _finish(ended)
+                outcome = conclude(outcome, ran, link_log, kept)
+        _finish(outcome)
 
 
 def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
@@ -168,15 +163,15 @@ def agent(
     Example:  gridpeers agent inv2 --connect tcp/192.168.1.10:7447
     """
     require({"zenoh": "an agent"})
-    with told():
+    with usage_errors():
         from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import check_inverter, check_wait, claim, place
+        from scenarios.live.run_address import address_of, check_inverter, check_wait, listenable
 
-        where = place(run, connect)
+        where = address_of(run, connect)
         check_inverter(inverter)
         check_wait(wait)
         watch_readers(quits=False)
-        listening = tuple(claim("--listen", text) for text in listen) if listen else None
+        listening = tuple(listenable("--listen", text) for text in listen) if listen else None
         _finish(agent_here(where, inverter, listening, wait, trusts=own_code))
 
 
@@ -185,9 +180,9 @@ def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
     Example:  gridpeers status
     """
-    with visit_to(run, connect, wait, meet_agents=True) as client:
-        from scenarios.live.run_requests import look
+    with run_client(run, connect, wait, meet_agents=True) as client:
         from scenarios.live.show.render import plain
+        from scenarios.live.show.watching import look
 
         typer.echo(plain(look(client)), nl=False)
 
@@ -204,11 +199,11 @@ def watch(
 
     Example:  gridpeers watch --connect tcp/192.168.1.10:7447
     """
-    with told():
+    with usage_errors():
         from scenarios.live.run_address import check_duration
 
         check_duration(duration)
-    with visit_to(run, connect, wait, meet_agents=True) as client:
+    with run_client(run, connect, wait, meet_agents=True) as client:
         from rich.console import Console
 
         from scenarios.live.show.watching import watch as watch_run
@@ -230,7 +225,7 @@ def stop(
 
     Example:  gridpeers stop inv2
     """
-    with visit_to(run, connect, wait) as client:
+    with run_client(run, connect, wait) as client:
         from scenarios.live.run_requests import LEAVING, ask, has_left
 
         typer.echo(ask(client, "stop", inverter))
@@ -258,7 +253,7 @@ def event(
         fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
-    with visit_to(run, connect, wait) as client:
+    with run_client(run, connect, wait) as client:
         from scenarios.live.run_requests import ask
 
         closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
@@ -272,7 +267,7 @@ def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
     Example:  gridpeers down --run lab
     """
-    with visit_to(run, connect, wait) as client:
+    with run_client(run, connect, wait) as client:
         from scenarios.live.run_requests import LEAVING, ask, has_ended
 
         typer.echo(ask(client, "down"))
@@ -280,9 +275,9 @@ def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
             fail([f"the plant has not ended within {LEAVING:g} s; is its process frozen?"], BROKEN)
 
 
-def _finish(ended: ProcessOutcome) -> None:
-    if ended.interrupted:
-        code = TERMINATED if ended.interrupted == "SIGTERM" else INTERRUPTED
-        fail([f"{ended.interrupted}: everything that was started here has ended"], code)
-    if ended.broke:
-        fail([ended.broke], BROKEN)
+def _finish(outcome: ProcessOutcome) -> None:
+    if outcome.interrupted:
+        code = TERMINATED if outcome.interrupted == "SIGTERM" else INTERRUPTED
+        fail([f"{outcome.interrupted}: everything that was started here has ended"], code)
+    if outcome.broke:
+        fail([outcome.broke], BROKEN)

@@ -1,4 +1,4 @@
-"""What the commands for runs by hand have in common: options, the client to a run, and what went wrong in one line."""
+"""Shared parts of the commands for live runs: options, the client to a run, and errors in one line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scenarios.live.run_client import RunClient
 
 RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
-"""As in `scenarios.live.run_address`, which a test holds them against."""
+"""The same as in `scenarios.live.run_address`; a test compares them."""
 
 Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
@@ -25,22 +25,22 @@ Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest 
 
 
 @contextmanager
-def visit_to(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[RunClient]:
-    """Visit a run whose plant is there; whatever is wrong ends the command with one line."""
+def run_client(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[RunClient]:
+    """Yield a client to a run whose plant is there; any error ends the command with one line."""
     require({"zenoh": "the connection to a run"})
-    with told():
-        from scenarios.live.run_address import check_wait, place
+    with usage_errors():
+        from scenarios.live.run_address import address_of, check_wait
         from scenarios.live.run_client import RunClient
 
         check_wait(wait)
-        with RunClient(place(run, connect), meet_agents=meet_agents) as client:
+        with RunClient(address_of(run, connect), meet_agents=meet_agents) as client:
             client.find_plant(wait)
             yield client
 
 
 @contextmanager
-def told() -> Iterator[None]:
-    """What a person did wrong, or what is not there, in one line and exit code 2."""
+def usage_errors() -> Iterator[None]:
+    """End the command with one line and exit code 2 on a usage error, or if the run is not there."""
     from scenarios.live.run_address import UsageError
     from scenarios.live.run_client import NobodyError
     from scenarios.live.run_requests import RefusedError

@@ -1,4 +1,4 @@
-"""What a run by hand came to: metrics.json, report.txt and figures, as `gridpeers run` makes them of a case."""
+"""Report of a live run: metrics.json, report.txt and figures, as `gridpeers run` makes them for a case."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from rich.console import Console
+
 from scenarios.live.link_log import LinkLog
+from scenarios.live.live_folders import Folders
+from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
@@ -18,47 +22,40 @@ from scenarios.results.metrics import Window, messages_saved
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded
-from scenarios.results.report import RunReport, plain
+from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
 from scenarios.spec.agentless import with_agent
+from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
 _SHOWN = 3
-"""So many departures are told in a note; all of them are in metrics.json."""
+"""Most departures in a note; metrics.json has all of them."""
 
 
 class LiveReport:
-    """Takes the record of a run by hand once it is whole, and gives account of it.
+    """Measure the record of a live run, and write metrics.json, report.txt and figures into its folder.
 
     Parameters
     ----------
     ran : RunMetrics
-        The run: its scenario has one case, and its folder is there.
-    book : LinkLog
-        What emulated links did.
+        The run: its scenario has one case, and its folder exists.
+    links_sha256 : str
+        Hash of the fates of all messages on emulated links; "" if none was sent.
+    recorded : Recorded
+        The whole record.
+    pacing : Pacing or None
+        How the plant kept pace.
     """
 
-    def __init__(self, ran: RunMetrics, book: LinkLog) -> None:
-        self._ran, self._book = ran, book
+    def __init__(self, ran: RunMetrics, links_sha256: str, recorded: Recorded, pacing: Pacing | None) -> None:
+        self._ran, self._links_sha256, self._recorded, self._pacing = ran, links_sha256, recorded, pacing
         (self._case,) = ran.scenario.cases
-        self._recorded: Recorded | None = None
-        self._pacing: Pacing | None = None
-
-    def __call__(self, recorded: Recorded, pacing: Pacing | None) -> None:
-        """Take the record, and how the plant kept pace."""
-        self._recorded, self._pacing = recorded, pacing
-
-    @property
-    def ready(self) -> bool:
-        """Whether there is a whole record to give account of."""
-        return self._recorded is not None
 
     def write(self) -> RunReport:
-        """Measure what windows there are, write it with its figures, and return what there is to tell.
+        """Measure all windows, write the numbers and figures, and return the report.
 
-        No claim of the paper is judged: a run by hand is one case, and people had their hands in it.
+        It judges no claim of the paper: a live run has one case, and people may have changed it.
         """
-        assert self._recorded is not None
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
         history, plates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
@@ -83,7 +80,7 @@ class LiveReport:
             folder=shown(ran.folder) + "/",
         )
         pacing = {} if self._pacing is None else {case: self._pacing}
-        links = {case: sha256} if (sha256 := self._book.links_sha256) else {}
+        links = {case: self._links_sha256} if self._links_sha256 else {}
         by_hand = {
             "ended_s": compared.ended,
             "windows": _windows(compared),
@@ -109,8 +106,7 @@ class LiveReport:
         return report
 
     def _notes(self, compared: Compared) -> Iterable[str]:
-        """What a reader must know of these numbers."""
-        assert self._recorded is not None
+        """Yield what a reader must know of these numbers."""
         ended, scenario, windows = f"{compared.ended:.2f} s", self._ran.scenario, compared.opened
         if not scenario.events and not compared.by_hand:
             yield "the scenario has no event, and nobody made one, so there is no window to measure in"
@@ -137,12 +133,12 @@ class LiveReport:
 
 
 def _named(windows: Iterable[Window]) -> str:
-    """Windows with their times."""
+    """Return windows with their times."""
     return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
 
 
 def _windows(compared: Compared) -> dict[str, Any]:
-    """Windows that people opened and that are measured, by label: from when to when (s), and what was done."""
+    """Return the measured windows that people opened, by label: start and end (s), and what they did."""
     return {
         window.label: {"t_s": window.start, "end_s": window.end, "what": compared.by_hand[window.label]}
         for window in compared.opened.measured
@@ -151,6 +147,38 @@ def _windows(compared: Compared) -> dict[str, Any]:
 
 
 def _few(lines: Sequence[str]) -> str:
-    """The first of some lines, and how many there are more."""
+    """Return the first lines, and the number of the others."""
     more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
     return f"{'; '.join(lines[:_SHOWN])}{more}"
+
+
+def conclude(outcome: ProcessOutcome, ran: RunMetrics, link_log: LinkLog, folders: Folders) -> ProcessOutcome:
+    """Write and show the report of a run that has ended, and note in its folder how it ended.
+
+    Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers.
+
+    Parameters
+    ----------
+    outcome : ProcessOutcome
+        How the run ended, with its record.
+    ran : RunMetrics
+        The run.
+    link_log : LinkLog
+        With the hash of the emulated links.
+    folders : Folders
+        With the run folder.
+    """
+    if outcome.broke or outcome.recorded is None:
+        folders.broken(outcome.broke or "no whole record")
+        return outcome
+    try:
+        show(LiveReport(ran, link_log.links_sha256, outcome.recorded, outcome.pacing).write(), Console())
+        folders.complete()
+    except (StoppedError, KeyboardInterrupt) as stop:
+        folders.broken("interrupted while its numbers were made")
+        return replace(outcome, interrupted=str(stop) or "SIGINT")
+    except OSError as error:
+        broke = f"its numbers cannot be written: {error.strerror or error}"
+        folders.broken(broke)
+        return replace(outcome, broke=broke)
+    return outcome

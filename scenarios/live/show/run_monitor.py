@@ -1,4 +1,4 @@
-"""What a visitor has heard of a run, put together: telemetry of the plant, status of the agents, tokens, nameplates.
+"""State of a run as a client knows it: from the plant's telemetry, the agents' status, tokens and configurations.
 
 Pure: messages and the time are arguments.
 """
@@ -23,11 +23,11 @@ _PER_INVERTER = 6
 """Values of one inverter in a row of telemetry."""
 
 _KEPT = 100
-"""Events that are remembered."""
+"""Most events that are kept."""
 
 
 class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """What the plant answers to "status", as far as it is shown; see `plant.realtime.run_commands`."""
+    """The plant's answer to "status", as far as it is shown; see `plant.realtime.run_commands`."""
 
     phase: str
     """gathering, running or closing."""
@@ -41,11 +41,11 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     events: tuple[PlantEvent, ...] = ()
     """The latest, oldest first."""
     impaired: tuple[str, ...] = ()
-    """Agents between whom and the plant an emulated fault holds."""
+    """Agents whose link to or from the plant has an emulated fault."""
 
 
 class RunMonitor:
-    """What is known of a run.
+    """Collect the state of a run.
 
     Parameters
     ----------
@@ -55,60 +55,60 @@ class RunMonitor:
 
     def __init__(self, run: str) -> None:
         self._run = run
-        self._plates: dict[str, AgentConfig] = {}
+        self._configs: dict[str, AgentConfig] = {}
         self._inverters: tuple[str, ...] = ()
         self._row: tuple[float, ...] = ()
         self._t: float | None = None
-        self._told: float | None = None
+        self._heard_at: float | None = None
         self._end: str | None = None
         """Once the run has ended, why it broke; empty if it did not."""
-        self._life = 0
-        """Which life of the plant it is of."""
+        self._epoch = 0
+        """Epoch of the plant."""
         self._latest = 0.0
         """Run time of its latest telemetry (s)."""
         self._pacing: Pacing | None = None
         self._impaired: tuple[str, ...] = ()
-        self._standing: PlantStatus | None = None
+        self._plant_status: PlantStatus | None = None
         self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
         self._status: dict[str, tuple[AgentStatus, float]] = {}
 
     @property
     def inverters(self) -> tuple[str, ...]:
-        """Names of all inverters that were spoken of, in order."""
+        """Names of all inverters in the messages so far, in order."""
         others = sorted(
-            (set(self._status) | set(self._plates)) - set(self._inverters), key=lambda name: (len(name), name)
+            (set(self._status) | set(self._configs)) - set(self._inverters), key=lambda name: (len(name), name)
         )
         return self._inverters + tuple(others)
 
     @property
-    def has_plates(self) -> bool:
-        """Whether the nameplates of all inverters in the telemetry are here."""
-        return self._plates.keys() >= set(self._inverters)
+    def has_configs(self) -> bool:
+        """Whether the configurations of all inverters in the telemetry are here."""
+        return self._configs.keys() >= set(self._inverters)
 
-    def plate(self, config: AgentConfig) -> None:
-        """Note who an agent is."""
-        self._plates[config.name] = config
+    def config(self, config: AgentConfig) -> None:
+        """Note the configuration of an agent."""
+        self._configs[config.name] = config
 
-    def standing(self, standing: PlantStatus) -> None:
-        """Note how the plant says the run stands."""
-        self._standing, self._impaired = standing, standing.impaired
-        if standing.phase != "gathering":
-            self._t, self._pacing = standing.t, standing.pacing
-        self._events.extend(standing.events)
+    def plant_status(self, status: PlantStatus) -> None:
+        """Note the plant's status."""
+        self._plant_status, self._impaired = status, status.impaired
+        if status.phase != "gathering":
+            self._t, self._pacing = status.t, status.pacing
+        self._events.extend(status.events)
 
     def telemetry(self, message: Telemetry, now: float) -> None:
-        """Note what the plant tells; `now` is the visitor's clock (s)."""
-        if message.incarnation != self._life:
-            if self._life:
+        """Note the plant's telemetry; `now` is the client's clock (s)."""
+        if message.incarnation != self._epoch:
+            if self._epoch:
                 self._events.clear()
-                self._standing = None
-            self._life, self._latest = message.incarnation, 0.0
+                self._plant_status = None
+            self._epoch, self._latest = message.incarnation, 0.0
         if message.t < self._latest:
             return  # published again for a recorder that has missed it
         self._latest = message.t
         if message.inverters != self._inverters:
             self._row = ()
-        self._inverters, self._t, self._told = message.inverters, message.t, now
+        self._inverters, self._t, self._heard_at = message.inverters, message.t, now
         self._end = message.outcome if message.final else None
         self._pacing = message.pacing or self._pacing
         self._impaired = message.impaired
@@ -117,24 +117,24 @@ class RunMonitor:
         self._events.extend(event for event in message.events if event not in self._events)
 
     def status(self, message: AgentStatus, now: float) -> None:
-        """Note how an agent fares."""
+        """Note the status of an agent."""
         self._status[message.sender] = (message, now)
 
-    def look(self, present: Collection[str], now: float) -> Snapshot:
-        """See it at one moment.
+    def snapshot(self, present: Collection[str], now: float) -> Snapshot:
+        """Return a snapshot.
 
         Parameters
         ----------
         present : Collection[str]
             Inverters whose agents have a token.
         now : float
-            The visitor's clock (s).
+            The client's clock (s).
         """
         pace, current = self._pace(), True
         if self._end is not None:
             pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
-        elif self._told is not None and now - self._told > SILENT:
-            pace, current = f"the plant has been silent for {now - self._told:.0f} s", False
+        elif self._heard_at is not None and now - self._heard_at > SILENT:
+            pace, current = f"the plant has been silent for {now - self._heard_at:.0f} s", False
         names = dict.fromkeys((*self.inverters, *in_order(present)))
         return Snapshot(
             run=self._run,
@@ -146,27 +146,27 @@ class RunMonitor:
         )
 
     def _line(self, name: str, present: bool, current: bool, now: float) -> Line:
-        """One inverter; what the plant told of it only if that is current."""
+        """Return the line of one inverter; with values of the plant only if they are current."""
         f = P = Q = V = P_set = V_set = None
         if current and name in self._inverters and self._row:
             start = 1 + _PER_INVERTER * self._inverters.index(name)
             f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
-        plate = self._plates.get(name)
+        config = self._configs.get(name)
         status, at = self._status.get(name, (None, now))
         if not present or now - at > SILENT:
             status = None
         ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
         return Line(
             name=name,
-            kind=plate.kind if plate else "",
+            kind=config.kind if config else "",
             island=status.island if status else "",
             f=f,
             P=None if P is None else P / 1e3,
             P_set=None if P_set is None else P_set / 1e3,
-            P_share=None if P is None or plate is None else P / plate.P_rated,
+            P_share=None if P is None or config is None else P / config.P_rated,
             Q=None if Q is None else Q / 1e3,
-            V=None if V is None or plate is None else V / plate.V_nom,
-            V_set=None if V_set is None or plate is None else V_set / plate.V_nom,
+            V=None if V is None or config is None else V / config.V_nom,
+            V_set=None if V_set is None or config is None else V_set / config.V_nom,
             ages={neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used},
             received=status.received if status else None,
             sent=status.sent if status else None,
@@ -177,17 +177,17 @@ class RunMonitor:
         )
 
     def _pace(self) -> str:
-        """How well the plant keeps real time, in a few words."""
-        pacing, standing = self._pacing, self._standing
+        """Return in a few words how well the plant keeps real time."""
+        pacing, plant = self._pacing, self._plant_status
         if pacing is None or pacing.steps == 0:
-            return "waits for its agents" if standing is not None and standing.phase == "gathering" else ""
-        speed = f"speed {standing.speed:g}   " if standing is not None else ""
+            return "waits for its agents" if plant is not None and plant.phase == "gathering" else ""
+        speed = f"speed {plant.speed:g}   " if plant is not None else ""
         text = f"{speed}pace: {100.0 * (1.0 - pacing.late / pacing.steps):.2f} % of steps in time"
         text += f" (p50 {1e3 * pacing.p50:.1f} ms, p99 {1e3 * pacing.p99:.1f} ms)"
         return text + (f", fell behind by {pacing.slipped:.1f} s" if pacing.slipped > 0.0 else "")
 
     def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
-        """What a person should know of an agent; age (s) is that of its last status."""
+        """Return what a person should know of an agent, whose last status is `age` (s) old."""
         if not present:
             return "no agent"
         if status is None:

@@ -1,4 +1,4 @@
-"""What there is to see of a run at one moment, whoever shows it."""
+"""A run at one moment, for every view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`gridpeers watch`: a table that renews itself on a terminal, lines elsewhere."""
+"""Look at a run: once for `gridpeers status`, and as a table that renews itself for `gridpeers watch`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,22 @@ from rich.console import Console
 from rich.live import Live
 
 from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import Watching, present, standing
+from scenarios.live.run_requests import plant_status, read_config
 from scenarios.live.show.keyboard import keyboard
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
+from scenarios.live.show.snapshot import Snapshot
+from wire.messages import PLANT, AgentStatus, Telemetry
+from wire.session_patience import SessionPatience
+
+LOOK = 1.2
+"""Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""
+
+SILENT = 1.0
+"""Time (s) without a message after which a sender counts as silent: two periods of an agent's status."""
 
 REFRESH = 0.25
-"""Time (s) between two pictures on a terminal: the plant tells five times a second."""
+"""Time (s) between two tables on a terminal: the plant publishes five times a second."""
 
 PERIOD = 1.0
 """Time (s) between two texts where the output is no terminal."""
@@ -23,8 +32,91 @@ QUIT = ("q", "Q", "\x1b")
 """Keys that end it."""
 
 
+class RunSubscriber:
+    """Feed the messages of a run into a monitor.
+
+    Parameters
+    ----------
+    client : RunClient
+        At the run.
+    monitor : RunMonitor
+        Takes the messages.
+    """
+
+    def __init__(self, client: RunClient, monitor: RunMonitor) -> None:
+        self._client, self._monitor = client, monitor
+        self._subscribed: set[str] = set()
+        self._plant = client.plant
+        self._heard_at: dict[str, float] = {}
+        """When each sender was last heard."""
+        self._used: dict[str, tuple[str, ...]] = {}
+        """Neighbours that each agent uses."""
+        self._patience = SessionPatience()
+        client.listen(client.keys.telemetry)
+        client.fetch(client.keys.config("*"))
+
+    def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
+        """Wait (s) for messages, feed them into the monitor and return them."""
+        heard: list[Telemetry | AgentStatus] = []
+        for key, payload in self._client.take(seconds):
+            config = read_config(payload)
+            if config is not None:
+                self._monitor.config(config)
+                continue
+            message = self._client.read(key, payload)
+            if isinstance(message, Telemetry):
+                self._monitor.telemetry(message, monotonic())
+            elif isinstance(message, AgentStatus):
+                self._monitor.status(message, monotonic())
+                self._used[message.sender] = message.used
+            else:
+                continue
+            self._heard_at[message.sender] = monotonic()
+            heard.append(message)
+        if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
+            self._client.fetch(self._client.keys.config("*"))
+        self._plant = self._client.plant
+        for name in {*self._monitor.inverters, *self._client.agents} - self._subscribed:
+            self._subscribed.add(name)
+            self._client.listen(self._client.keys.status(name))
+        self._renew(monotonic())
+        return heard
+
+    def take_until(self, end: float) -> None:
+        """Feed the messages that come until a time (s, monotonic)."""
+        while (left := end - monotonic()) > 0.0:
+            self.take(left)
+
+    def _renew(self, now: float) -> None:
+        """Open a new session if a process that takes part has been silent for too long: the session is broken.
+
+        A process takes part if its token is there, or if an agent that is heard uses it.
+        """
+        heard = {name for name, at in self._heard_at.items() if now - at <= SILENT}
+        there = {*([PLANT] if self._client.plant else []), *self._client.present}
+        there.update(*(self._used.get(name, ()) for name in heard))
+        silent = sorted(there - heard)
+        self._patience.whole |= PLANT in heard and not silent
+        if self._patience.lost(silent, now):
+            self._patience = self._patience.next()
+            self._client.renew()
+
+
+def look(client: RunClient) -> Snapshot:
+    """Listen until the plant and every agent have published their state, or for `LOOK` seconds."""
+    monitor = RunMonitor(client.where.run)
+    monitor.plant_status(plant_status(client))
+    subscriber, heard = RunSubscriber(client, monitor), set[str]()
+    end = monotonic() + LOOK
+    while (left := end - monotonic()) > 0.0:
+        heard.update(message.sender for message in subscriber.take(left))
+        if heard >= {PLANT, *client.present} and monitor.has_configs:
+            break
+    return monitor.snapshot(client.present, monotonic())
+
+
 def watch(client: RunClient, console: Console, seconds: float | None) -> None:
-    """Show a run until somebody quits, or for a time.
+    """Show a run until the user quits, or for a time.
 
     Parameters
     ----------
@@ -36,33 +128,18 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
         For how long (s); None until q or Ctrl-C.
     """
     monitor = RunMonitor(client.where.run)
-    monitor.standing(standing(client))
-    watching = Watching(client, monitor)
-    end = None if seconds is None else monotonic() + seconds
-    if console.is_terminal:
-        _on_terminal(client, monitor, watching, console, end)
-    else:
-        _as_lines(client, monitor, watching, console, end)
-
-
-def _on_terminal(
-    client: RunClient, monitor: RunMonitor, watching: Watching, console: Console, end: float | None
-) -> None:
+    monitor.plant_status(plant_status(client))
+    subscriber = RunSubscriber(client, monitor)
+    end = float("inf") if seconds is None else monotonic() + seconds
+    if not console.is_terminal:
+        while monotonic() < end:
+            subscriber.take_until(min(end, monotonic() + PERIOD))
+            text = plain(monitor.snapshot(client.present, monotonic()))
+            console.print(text, markup=False, highlight=False, soft_wrap=True)
+        return
     with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
-        while end is None or monotonic() < end:
-            _gather(watching, monotonic() + REFRESH)
-            live.update(table(monitor.look(present(client), monotonic())), refresh=True)
+        while monotonic() < end:
+            subscriber.take_until(monotonic() + REFRESH)
+            live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
             if key(0.0) in QUIT:
                 return
-
-
-def _as_lines(client: RunClient, monitor: RunMonitor, watching: Watching, console: Console, end: float | None) -> None:
-    while end is None or monotonic() < end:
-        _gather(watching, monotonic() + PERIOD if end is None else min(end, monotonic() + PERIOD))
-        text = plain(monitor.look(present(client), monotonic()))
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-def _gather(watching: Watching, until: float) -> None:
-    while (left := until - monotonic()) > 0.0:
-        watching.take(left)

@@ -15,7 +15,7 @@ from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
-from scenarios.results.record import Recorded, Tape
+from scenarios.results.record import Recorded, Recorder
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
 
@@ -45,9 +45,9 @@ def ran(name: str, case: str) -> tuple[Recorded, Outcome]:
     """Run one case in this process, once for all who ask."""
     scenario, feeder = load_scenario(name)
     plant, agents = configs(scenario, feeder, case, endpoint(0))
-    tape = Tape()
-    outcome = run_inprocess(plant, agents, tape)
-    return tape.finish(scenario.time.end_s, plant.record_step), outcome
+    recorder = Recorder()
+    outcome = run_inprocess(plant, agents, recorder)
+    return recorder.finish(scenario.time.end_s, plant.record_step), outcome
 
 
 def run_case(name: str, case: str) -> Pin:

@@ -13,7 +13,7 @@ from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History
-from scenarios.results.record import Tape
+from scenarios.results.record import Recorder
 from scenarios.spec import Scenario, load_scenario
 from scenarios.spec.configs import configs
 from scenarios.sweep.sweep_case import plant_at_start, run_one
@@ -53,8 +53,8 @@ def theory(scenario: str) -> SweepData:
 
 def _history(spec: Scenario, feeder: Feeder, case: str) -> History:
     plant, agents = configs(spec, feeder, case)
-    tape = Tape()
-    outcome = run_inprocess(plant, agents, tape, plant=plant_at_start(plant))
+    recorder = Recorder()
+    outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant))
     assert not outcome.broke, outcome.broke
-    recorded = tape.finish(spec.time.end_s, spec.time.record_s)
+    recorded = recorder.finish(spec.time.end_s, spec.time.record_s)
     return History.of(recorded.inverters, recorded.rows)

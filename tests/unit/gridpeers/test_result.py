@@ -10,7 +10,7 @@ import pytest
 
 import gridpeers as gp
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.record import Tape
+from scenarios.results.record import Recorder
 from scenarios.spec.configs import configs
 
 
@@ -30,10 +30,10 @@ def run(scenario: gp.Scenario) -> gp.Result:
 def test_a_run_has_the_bytes_of_the_drivers_own_history(scenario: gp.Scenario, run: gp.Result) -> None:
     """The face adds nothing to a run: its hash is that of the telemetry."""
     plant, agents = configs(scenario.spec, scenario.feeder, "IV")
-    tape = Tape()
-    run_inprocess(plant, agents, tape)
+    recorder = Recorder()
+    run_inprocess(plant, agents, recorder)
 
-    assert run.sha256 == tape.finish(1.5, 0.01).sha256
+    assert run.sha256 == recorder.finish(1.5, 0.01).sha256
 
 
 def test_a_history_is_a_table_by_inverter_and_quantity_with_units(run: gp.Result) -> None:

@@ -21,7 +21,7 @@ from netem.spec.node_fault import NodeFault
 from netem.spec.pattern import Link, links_among
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers import fault_injector as misfortunes
+from scenarios.drivers import fault_injector
 from scenarios.drivers.fault_injector import FaultInjector
 from scenarios.emulation.emulated_links import EmulatedLinks
 from scenarios.emulation.emulation_config import Setup
@@ -306,10 +306,10 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path
             }
 
 
-def test_misfortunes_strike_in_turn_and_nobody_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_process_faults_come_in_turn_and_no_process_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
     """At the run time that telemetry tells, at any speed; who is not there cannot be hurt; at the end all go on."""
     clock = [100.0]
-    monkeypatch.setattr(misfortunes, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(fault_injector, "monotonic", lambda: clock[0])
     nodes = (
         NodeFault(name="inv1", pause=True, from_s=2.0, to_s=4.0),
         NodeFault(name="inv2", kill=True, from_s=3.0),
@@ -326,19 +326,19 @@ def test_misfortunes_strike_in_turn_and_nobody_stays_paused(monkeypatch: pytest.
             sent.append((clock[0] - 100.0, self.name, number.name))
 
     children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
-    struck = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
-    struck.strike(children)
-    struck.heard(0.0, 100.0)
+    injector = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
+    injector.inject(children)
+    injector.note_time(0.0, 100.0)
     for _ in range(5):
-        clock[0] += struck.wait
-        struck.strike(children)
-    struck.end(children)
+        clock[0] += injector.wait
+        injector.inject(children)
+    injector.end(children)
 
     assert sent == [
         (1.0, "inv1", "SIGSTOP"), (1.5, "inv2", "SIGKILL"), (2.0, "inv1", "SIGCONT"), (2.5, "inv3", "SIGSTOP"),
         (2.5, "inv3", "SIGCONT"),
     ]  # fmt: skip
-    assert struck.killed == {"inv2"}
+    assert injector.killed == {"inv2"}
 
 
 def test_what_links_drop_counts_as_lost() -> None:

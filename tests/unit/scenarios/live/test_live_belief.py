@@ -12,11 +12,12 @@ from msgspec.structs import replace
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.emulation.link_reports import LinkBook, encode_book
 from scenarios.live import run_client as client
-from scenarios.live.run_address import place
+from scenarios.live.run_address import address_of
 from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import Watching, _plate
+from scenarios.live.run_requests import read_config
 from scenarios.live.show.render import plain
 from scenarios.live.show.run_monitor import RunMonitor
+from scenarios.live.show.watching import RunSubscriber
 from scenarios.results.link_records import LinkRecord
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
@@ -75,9 +76,9 @@ def is_status(message: bytes, key: str) -> bool:
 
 def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None:
     """Telemetry of a plant that is not there, statuses under others' keys, nonsense: no line of the table changes."""
-    at = RunClient(place("lab", None))
+    at = RunClient(address_of("lab", None))
     monitor = RunMonitor("lab")
-    watching = Watching(at, monitor)
+    subscriber = RunSubscriber(at, monitor)
     keys: Truth = {
         KEYS.telemetry: ("plant", (Telemetry, LinkReport, LinkOrder)),
         **{KEYS.status(name): (name, (AgentStatus,)) for name in NAMES},
@@ -86,15 +87,15 @@ def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None
         ("appeared", KEYS.alive_plant(7), b"", 0.0),
         ("message", KEYS.telemetry, encode(telemetry(1.0)), 0.0),
     ]
-    watching.take(0.1)
-    before = plain(monitor.look((), 0.0))
+    subscriber.take(0.1)
+    before = plain(monitor.snapshot((), 0.0))
     flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))
     line.events = [("message", key, payload, 0.0) for key, payload in flood if not is_status(payload, key)]
     sent = len(line.events)
-    watching.take(0.1)
+    subscriber.take(0.1)
 
     assert sent > 30_000
-    assert plain(monitor.look((), 0.0)) == before
+    assert plain(monitor.snapshot((), 0.0)) == before
     assert before.replace("\n", "").isprintable()
 
 
@@ -104,7 +105,7 @@ def test_a_picture_of_other_inverters_waits_for_their_values() -> None:
     monitor.telemetry(telemetry(1.0), 0.0)
     monitor.telemetry(replace(telemetry(0.0, 8, ("inv1", "inv2", "inv3")), rows=()), 0.1)
 
-    assert [entry.P for entry in monitor.look((), 0.2).lines] == [None, None, None]
+    assert [entry.P for entry in monitor.snapshot((), 0.2).lines] == [None, None, None]
 
 
 @pytest.mark.parametrize("change", [{"P_rated": 0.0}, {"V_nom": -1.0}, {"name": "\x1b[2J"}, {"m_p": 1e300}])
@@ -112,8 +113,8 @@ def test_a_configuration_that_cannot_be_is_none(change: dict[str, Any]) -> None:
     """Nobody divides by a rating of 0, or prints a name that clears the screen."""
     config = agent_config("inv1")
 
-    assert _plate(msgspec.json.encode(config)) == config
-    assert _plate(msgspec.json.encode(replace(config, **change))) is None
+    assert read_config(msgspec.json.encode(config)) == config
+    assert read_config(msgspec.json.encode(replace(config, **change))) is None
 
 
 COUNTS = LinkCounts(sent=1, duplicated=0, delivered=1, dropped={}, corrupted=0, in_flight=0)
@@ -162,7 +163,7 @@ def test_a_sound_book_is_recorded() -> None:
 
 def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line: Line) -> None:
     """And by nobody who sees another plant's token."""
-    at = RunClient(place("lab", None))
+    at = RunClient(address_of("lab", None))
     line.events = [("appeared", KEYS.alive_plant(7), b"", 0.0)]
     list(at.take(0.0))
     said: Message = telemetry(1.0)

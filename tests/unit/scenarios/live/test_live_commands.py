@@ -11,8 +11,8 @@ import pytest
 from agents.agent_config import AgentConfig
 from gridpeers.cli.commands import options
 from plant.plant_config import PlantConfig
-from scenarios.live import run_address as place
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live import run_address
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.spec import load_scenario
 from tests.command_line import invoke
 
@@ -34,7 +34,7 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
 
 def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
     """The help must not import what the place needs, so it has its own copy."""
-    assert (options.RUN, options.ENDPOINT) == (place.RUN, place.ENDPOINT)
+    assert (options.RUN, options.ENDPOINT) == (run_address.RUN, run_address.ENDPOINT)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_a_port_in_use_is_told(elsewhere: Path) -> None:
 def test_the_plant_hands_every_agent_what_it_needs() -> None:
     """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
     wishes = LiveOptions(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
-    plant, agents = set_up(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
+    plant, agents = configure(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
     handed = {name: msgspec.json.decode(text, type=AgentConfig) for name, text in plant.handout.items()}
 
     assert plant.agents == tuple(f"inv{i}" for i in range(1, 10))
@@ -149,6 +149,6 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
 
 def test_a_plant_can_wait_for_its_agents_for_ever() -> None:
     """An infinite --wait reaches the plant as a time that JSON can say."""
-    plant, _ = set_up(*load_scenario("islanding"), LiveOptions(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
+    plant, _ = configure(*load_scenario("islanding"), LiveOptions(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
 
-    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == place.LONGEST
+    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == run_address.LONGEST

@@ -45,7 +45,7 @@ def monitor() -> RunMonitor:
     """Two inverters, of which the first has an agent that hears nobody."""
     seen = RunMonitor("lab")
     for name in ("inv1", "inv2"):
-        seen.plate(plate(name))
+        seen.config(plate(name))
     seen.telemetry(told(2.0, PlantEvent(t=1.0, kind="switch", subject="13-152", text="13-152 opened")), now=10.0)
     seen.status(status("inv1", {"inv2": 1.4}, ()), now=10.0)
     return seen
@@ -53,7 +53,7 @@ def monitor() -> RunMonitor:
 
 def test_status_is_a_line_per_agent_with_units() -> None:
     """Run, time, pacing; per agent its numbers, whom it hears, its messages; what happened."""
-    text = plain(monitor().look({"inv1"}, now=10.1))
+    text = plain(monitor().snapshot({"inv1"}, now=10.1))
 
     assert text.splitlines() == [
         "run lab   t = 2.00 s   pace: 100.00 % of steps in time (p50 0.1 ms, p99 1.0 ms)   islands: grid",
@@ -71,7 +71,7 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
     seen = RunMonitor("lab")
     seen.status(status("inv3", {}, (), waits_for="the plant"), now=1.0)
 
-    text = plain(seen.look({"inv3", "inv4"}, now=1.0))
+    text = plain(seen.snapshot({"inv3", "inv4"}, now=1.0))
 
     assert text.startswith("run lab   has not begun")
     assert text.splitlines()[2].endswith("waits for the plant")
@@ -80,7 +80,7 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
 
 def test_a_frozen_agent_is_silent() -> None:
     """A token without a status is told with the time since the last one."""
-    (line, _) = monitor().look({"inv1"}, now=14.0).lines
+    (line, _) = monitor().snapshot({"inv1"}, now=14.0).lines
 
     assert line.note == "silent for 4 s"
     assert line.received is None
@@ -88,7 +88,7 @@ def test_a_frozen_agent_is_silent() -> None:
 
 def test_a_silent_plant_is_told() -> None:
     """Old numbers are not shown as if they were new."""
-    assert monitor().look({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
+    assert monitor().snapshot({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
 
 
 def numbers(line: Line) -> set[float | None]:
@@ -101,23 +101,23 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
     ended, broke = monitor(), monitor()
     ended.telemetry(replace(told(2.2), final=True, impaired=("inv1",)), now=10.2)
     broke.telemetry(replace(told(2.2), final=True, outcome="the deadline of inv1 passed"), now=10.2)
-    look = ended.look((), now=10.3)
+    look = ended.snapshot((), now=10.3)
 
     assert [numbers(line) for line in look.lines] == [{None}, {None}]
     assert (look.t, look.pace, look.impaired) == (2.2, "the run has ended", ())
     assert plain(look).splitlines()[2].split() == ["inv1", *"-" * 13, "no", "agent"]
-    assert broke.look((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
+    assert broke.snapshot((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
 
 
 def test_numbers_of_a_silent_plant_are_not_shown() -> None:
     """A plant that was killed has told no end: its numbers go when it has been silent, and come back with the next."""
     seen = monitor()
-    before, silent = seen.look({"inv1"}, now=11.4).lines[0], seen.look({"inv1"}, now=11.6).lines[0]
+    before, silent = seen.snapshot({"inv1"}, now=11.4).lines[0], seen.snapshot({"inv1"}, now=11.6).lines[0]
     seen.telemetry(told(0.2, life=2), now=20.0)
 
     assert before.P == 300.0
     assert numbers(silent) == {None}
-    assert seen.look((), now=20.0).lines[0].P == 300.0
+    assert seen.snapshot((), now=20.0).lines[0].P == 300.0
 
 
 def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
@@ -126,8 +126,8 @@ def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
     seen.telemetry(replace(told(2.2), final=True), now=10.2)
     seen.telemetry(told(0.2, life=2), now=20.0)
 
-    assert seen.look((), now=20.0).pace.startswith("pace: 100.00 %")
-    assert seen.look((), now=20.0).lines[0].P == 300.0
+    assert seen.snapshot((), now=20.0).pace.startswith("pace: 100.00 %")
+    assert seen.snapshot((), now=20.0).lines[0].P == 300.0
 
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
@@ -135,14 +135,14 @@ def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
     seen = monitor()
     seen.telemetry(told(0.2, life=2), now=20.0)
 
-    assert seen.look((), now=20.0).events == ()
+    assert seen.snapshot((), now=20.0).events == ()
 
 
 def test_only_neighbours_in_use_count_as_heard() -> None:
     """Who is too old, or in another island, is named in the note."""
     seen = monitor()
     seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
-    line = seen.look({"inv1"}, now=10.0).lines[0]
+    line = seen.snapshot({"inv1"}, now=10.0).lines[0]
 
     assert line.ages == {"inv2": 0.01, "inv3": 0.02}
     assert line.note == "without inv4"
@@ -166,7 +166,7 @@ def test_names_take_little_room(names: list[str], text: str) -> None:
 def test_watch_shows_the_same_as_a_table() -> None:
     """Every number of the text is in the table, with the keys below."""
     console = Console(width=160, record=True, file=io.StringIO())
-    console.print(table(monitor().look({"inv1"}, now=10.0)))
+    console.print(table(monitor().snapshot({"inv1"}, now=10.0)))
     text = console.export_text()
 
     for word in ("run lab", "60.010", "310.0", "without inv2", "no agent", "13-152 opened", "q: quit"):
@@ -195,6 +195,6 @@ def test_telemetry_that_is_published_again_for_a_recorder_does_not_turn_the_cloc
     seen = monitor()
     seen.telemetry(told(2.2), now=10.2)
     seen.telemetry(told(1.4), now=10.3)
-    assert seen.look((), now=10.3).t == 2.2
+    assert seen.snapshot((), now=10.3).t == 2.2
     seen.telemetry(told(0.2, life=2), now=10.4)
-    assert seen.look((), now=10.4).t == 0.2
+    assert seen.snapshot((), now=10.4).t == 0.2

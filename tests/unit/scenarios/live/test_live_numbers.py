@@ -14,17 +14,15 @@ from netem.spec.netem import Netem
 from netem.spec.node_fault import NodeFault, Skew
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.live.link_log import LinkLog
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_report import LiveReport
 from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.record import Recorded, Tape
+from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
 from scenarios.spec import Scenario, load_scenario
 from scenarios.spec.configs import configs
-from scenarios.spec.netem_tables import netem_of, setup_of
 from scenarios.spec.scenario_model import Event
 from wire.messages import PlantEvent
 
@@ -220,21 +218,19 @@ def recorded() -> Recorded:
     """Case IV for 8 s: longer than the scenario, and with a spare inverter that nobody starts, as by hand."""
     plant, agents = configs(*one_case("islanding"), "IV")
     settings = msgspec.structs.replace(plant.settings, spares=("inv10",))
-    tape = Tape()
-    run_inprocess(msgspec.structs.replace(plant, settings=settings, end=8.0), agents, tape)
-    return tape.finish(8.0, plant.record_step)
+    recorder = Recorder()
+    run_inprocess(msgspec.structs.replace(plant, settings=settings, end=8.0), agents, recorder)
+    return recorder.finish(8.0, plant.record_step)
 
 
 def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
     """What metrics.json and the report say of a run by hand that ended then (s)."""
     scenario, feeder = one_case("islanding")
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="by hand", folder=folder, clock="wall")
-    links = setup_of(netem_of(scenario, "IV"), scenario, feeder, real_nodes=True).to_text()
-    given = LiveReport(ran, LinkLog(scenario, feeder, links, None, None, None))
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
-    given(msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events), None)
-    report = given.write()
+    whole = msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events)
+    report = LiveReport(ran, "", whole, None).write()
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
 
@@ -242,9 +238,9 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     """The same measures as of `gridpeers run`, though it went on for longer and had a spare inverter in its columns."""
     scenario, feeder = one_case("islanding")
     plant, agents = configs(scenario, feeder, "IV")
-    tape = Tape()
-    run_inprocess(plant, agents, tape)
-    history = History.of(tuple(row.name for row in feeder.inverters), tape.rows)
+    recorder = Recorder()
+    run_inprocess(plant, agents, recorder)
+    history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
     found = find(
         scenario, feeder, Plates.of(feeder.inverters), {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]}
     )
@@ -310,9 +306,9 @@ def switched() -> Recorded:
     events = tuple(sorted((*scenario.events, *mine), key=lambda event: event.t_s))
     longer = msgspec.structs.replace(scenario.time, end_s=8.5)
     plant, agents = configs(msgspec.structs.replace(scenario, events=events, time=longer), feeder, "IV")
-    tape = Tape()
-    run_inprocess(plant, agents, tape)
-    return tape.finish(8.5, plant.record_step)
+    recorder = Recorder()
+    run_inprocess(plant, agents, recorder)
+    return recorder.finish(8.5, plant.record_step)
 
 
 def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(

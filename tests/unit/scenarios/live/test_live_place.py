@@ -4,12 +4,12 @@ import socket
 
 import pytest
 
-from scenarios.live.run_address import UsageError, accepting, check_endpoint, claim, place, return_path
+from scenarios.live.run_address import UsageError, accepting, address_of, check_endpoint, listenable, return_path
 
 
 def test_without_options_there_is_one_run_on_this_machine() -> None:
     """No option is needed for one plant on a laptop."""
-    here = place("gridpeers", None)
+    here = address_of("gridpeers", None)
 
     assert (here.run, here.connect) == ("gridpeers", ("tcp/127.0.0.1:7447",))
 
@@ -18,7 +18,7 @@ def test_without_options_there_is_one_run_on_this_machine() -> None:
 def test_a_run_name_that_zenoh_does_not_allow_is_refused(run: str) -> None:
     """The line names the option, the name and what is allowed."""
     with pytest.raises(UsageError, match=r"--run: .* cannot be part of a Zenoh key; use 1 to 64 letters"):
-        place(run, None)
+        address_of(run, None)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_a_run_name_that_zenoh_does_not_allow_is_refused(run: str) -> None:
 def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) -> None:
     """The mistake, the value, and the form that is right."""
     with pytest.raises(UsageError) as told:
-        place("lab", [text])
+        address_of("lab", [text])
 
     assert str(told.value).startswith("--connect: ")
     assert said in str(told.value)
@@ -60,7 +60,7 @@ def test_a_port_in_use_is_told_before_anything_starts() -> None:
         with pytest.raises(
             UsageError, match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT"
         ):
-            claim("--listen", text)
+            listenable("--listen", text)
 
 
 def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
@@ -78,13 +78,13 @@ def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
 
 def test_port_0_becomes_a_free_port() -> None:
     """The endpoint to be told to others has a number."""
-    assert int(claim("--listen", "tcp/127.0.0.1:0").rpartition(":")[2]) > 0
+    assert int(listenable("--listen", "tcp/127.0.0.1:0").rpartition(":")[2]) > 0
 
 
 def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
     """192.0.2.0/24 belongs to nobody: there is nothing to end there, and the line does not say so."""
     with pytest.raises(UsageError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host") as told:
-        claim("--listen", "tcp/192.0.2.1:7447")
+        listenable("--listen", "tcp/192.0.2.1:7447")
 
     assert "end what" not in str(told.value)
 
@@ -92,7 +92,7 @@ def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
 def test_a_name_without_an_address_cannot_be_listened_on() -> None:
     """The names under .invalid never have one."""
     with pytest.raises(UsageError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
-        claim("--listen", "tcp/lab.invalid:7447")
+        listenable("--listen", "tcp/lab.invalid:7447")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from scenarios.live import run_client as client
-from scenarios.live.run_address import place
+from scenarios.live.run_address import address_of
 from scenarios.live.run_client import NobodyError, RunClient
 from wire.keys import Keys
 
@@ -44,7 +44,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
         monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
         monkeypatch.setattr(client, "monotonic", lambda: clock.now)
         try:
-            RunClient(place("lab", None)).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
+            RunClient(address_of("lab", None)).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
         except NobodyError as error:
             told.append(str(error))
         return told

@@ -7,7 +7,7 @@ import pytest
 
 from plant.plant_config import Move
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.live_options import LiveOptions, set_up
+from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
 from scenarios.spec import load_scenario
 from scenarios.spec.agent_schedule import inverters_of
@@ -46,7 +46,7 @@ def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path
 def test_by_hand_people_move_the_agents(tmp_path: Path) -> None:
     """The plant of a run by hand lets nobody leave by itself, and knows each inverter once."""
     text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
-    plant, agents = set_up(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    plant, agents = configure(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
 
     assert plant.moves == ()
     assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]

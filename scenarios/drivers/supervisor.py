@@ -1,0 +1,106 @@
+"""One supervisor for the processes of every run: of `gridpeers run` and of `gridpeers up`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
+from scenarios.drivers.children import Child, Children
+from scenarios.drivers.fault_injector import FaultInjector
+from wire.messages import PLANT
+
+
+class Supervisor:
+    """Start the plant and its agents, inject the process faults of the scenario, and end every process.
+
+    Use it as a context: leaving it ends all processes. One thread owns it; `on_exit` and `on_word` come from others.
+
+    Parameters
+    ----------
+    plant : PlantConfig
+        The plant.
+    agents : Iterable[AgentConfig]
+        All agents, also those that join later, with their endpoints.
+    log_dir : Path
+        Folder for `plant.log`, `inv1.log`, ...; the second life of inv1 writes `inv1-2.log`.
+    on_exit : Callable[[Child], None]
+        Called with every process that has ended.
+    on_word : Callable[[str], None], optional
+        Called with "listening", "compiling", "ready" as the plant comes up.
+    plant_command : Sequence[str], optional
+        Arguments of the interpreter for another plant than the usual one.
+    """
+
+    def __init__(
+        self,
+        plant: PlantConfig,
+        agents: Iterable[AgentConfig],
+        log_dir: Path,
+        on_exit: Callable[[Child], None],
+        on_word: Callable[[str], None] | None = None,
+        plant_command: Sequence[str] = (),
+    ) -> None:
+        self.children = Children()
+        self._plant, self._agents, self._log_dir = plant, {config.name: config for config in agents}, log_dir
+        self._on_exit, self._on_word, self._plant_command = on_exit, on_word, plant_command
+        self._faults = FaultInjector(plant.links if plant.clock == "wall" else "", plant.speed)
+        self._awaited: set[str] = set()
+
+    def __enter__(self) -> Supervisor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            self.end_faults()
+        finally:
+            self.children.end()
+
+    def start(self, *names: str) -> None:
+        """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life."""
+        for name in names:
+            life = len(self.children.lives(name)) + 1
+            log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
+            if name == PLANT:
+                usual = ("-m", "scenarios.emulation.emulated_plant" if self._plant.links else "plant")
+                command = list(self._plant_command or usual)
+                self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
+                continue
+            config = replace(self._agents[name], incarnation=life)
+            command = ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
+            self.children.add(Child(name, command, config, log, self._on_exit))
+
+    def start_when_gone(self, names: Iterable[str]) -> None:
+        """Start agents that the plant awaits, as soon as the former process of their name has ended."""
+        self._awaited.update(names)
+
+    def note_time(self, t: float, at: float) -> None:
+        """Note that telemetry of t (s of run time) came at a time of `monotonic` (s); it is one period ahead."""
+        self._faults.note_time(t - self._plant.T_c, at)
+
+    @property
+    def wait(self) -> float:
+        """Time (s) until the next process fault; infinite if there is none."""
+        return self._faults.wait
+
+    def work(self) -> None:
+        """Start the awaited agents whose former process has ended, and inject the faults that are due."""
+        for name in sorted(self._awaited):
+            if all(child.status is not None for child in self.children.lives(name)):
+                self._awaited.discard(name)
+                self.start(name)
+        self._faults.inject(self.children)
+
+    def end_faults(self) -> None:
+        """Inject no more faults, and continue paused processes."""
+        self._faults.end(self.children)
+
+    def failed(self, child: Child) -> bool:
+        """Whether a process has ended, or still runs, though neither the scenario nor a request explains it."""
+        return child.status != 0 and child.name not in self._faults.killed
