@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from agents.graphs import GRAPHS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
     from gridpeers.runs.result import Result, Results
-    from gridpeers.runs.run_reading import read
+    from gridpeers.runs.running import read
     from gridpeers.scenario import Scenario, load
     from gridpeers.studies.comparison import Comparison, compare
     from gridpeers.studies.prediction import Prediction, predict
@@ -74,7 +74,7 @@ _HOME = {
     "load": "gridpeers.scenario",
     "metric": "scenarios.results.own.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
-    "read": "gridpeers.runs.run_reading",
+    "read": "gridpeers.runs.running",
     "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""

@@ -1,4 +1,4 @@
-"""Run a scenario from Python: the same body as the command's, into a folder that lives as long as its results."""
+"""Run a scenario from Python, or open the folder of a run that somebody made: both give `Results`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from gridpeers.runs.choices import Pace, check_how, with_cases
-from gridpeers.runs.result import Results
-from gridpeers.runs.run_folder import RunFolder, empty_folder
+from gridpeers.runs.result import Result, Results
+from gridpeers.runs.run_folder import RunFolder, as_folder, empty_folder
+from plant.tables import read_feeder
 from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError
+from scenarios.spec.loading import read_toml
 from scenarios.spec.portability import check_portable
+from scenarios.spec.scenario_changes import as_in
+from scenarios.spec.scenario_errors import Mistakes
+from scenarios.spec.scenario_reading import read_tables
 from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -74,3 +79,36 @@ def run(
 
 def _silent(case: str, t: float, end: float) -> None:
     """Show no progress."""
+
+
+def read(folder: str | Path) -> Result | Results:
+    """Open the folder of a run, whoever made it: `Result.save`, `gridpeers run` or `gridpeers up`.
+
+    Returns
+    -------
+    Result or Results
+        A `Result` if the run has one case, else `Results`.
+
+    Raises
+    ------
+    FolderError
+        If it is no folder of a run, or of one that did not come to its end.
+    """
+    path = as_folder(folder)
+    if not (path / "status.txt").is_file():
+        hint = f"; {path / 'latest'} is one" if (path / "latest" / "status.txt").is_file() else ""
+        raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt{hint}")
+    status = (path / "status.txt").read_text(encoding="utf-8", errors="replace").strip()
+    if status != "complete":
+        raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
+    try:
+        text, tables = read_toml(path / "scenario.toml")
+        mistakes = Mistakes(str(path / "scenario.toml"), text)
+        spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
+        mistakes.raise_if_any()
+        feeder = as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
+        results = Results(RunFolder(path.absolute()), spec, feeder)
+    except (OSError, ValueError, KeyError) as error:
+        text = "; ".join(getattr(error, "mistakes", ())) or str(error)
+        raise FolderError(f"{folder}: cannot be read: {text}") from error
+    return next(iter(results.values())) if len(results) == 1 else results

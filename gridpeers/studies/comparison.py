@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from gridpeers.runs.result import Result, Results
-from gridpeers.runs.run_reading import read
+from gridpeers.runs.running import read
 from gridpeers.runs.showing import shown_in_notebooks
 from scenarios.spec.scenario_errors import ScenarioError
 from scenarios.spec.scenario_writing import to_toml

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from papers.singhal2022.experiments.delay_experiment import communication, delay
 from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from papers.singhal2022.experiments.experiment_output import ExperimentResult
-from papers.singhal2022.experiments.flapping_experiment import flapping
 from papers.singhal2022.experiments.handling_experiment import handling
 from papers.singhal2022.experiments.loss_experiment import loss
-from papers.singhal2022.experiments.partition_experiment import partition
+from papers.singhal2022.experiments.outage_experiments import flapping, partition
 from papers.singhal2022.experiments.places_experiment import places
 from papers.singhal2022.experiments.topology_experiment import topology
 

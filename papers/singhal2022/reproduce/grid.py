@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gridpeers.benchmarks import HEADINGS, Quantity
-from papers.singhal2022.reproduce.found import PartResult
+from papers.singhal2022.reproduce.reproduction import PartResult
 from papers.singhal2022.tables import Cell, PaperTable
 from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from gridpeers.benchmarks import HEADINGS, Verdict
 from gridpeers.output_folders import versions
 from papers.singhal2022.headline import headline
-from papers.singhal2022.reproduce.found import PartResult, Reproduction, machine
 from papers.singhal2022.reproduce.grid import Entry, lines, tolerances
+from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, machine
 from papers.singhal2022.tables import PaperTable
 
 _STYLE = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")

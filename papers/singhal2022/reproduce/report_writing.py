@@ -10,9 +10,9 @@ from pathlib import Path
 from gridpeers.benchmarks import HEADINGS, Verdict
 from gridpeers.output_folders import set_status, versions, write_whole
 from papers.singhal2022.headline import headline
-from papers.singhal2022.reproduce.found import PartResult, Reproduction, machine, metrics_json
 from papers.singhal2022.reproduce.grid import Entry, lines, tolerances
 from papers.singhal2022.reproduce.report_page import PAPER, html
+from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, machine, metrics_json
 from papers.singhal2022.reproduce.settings import settings
 from papers.singhal2022.reproduce.work import FORMATS, Work
 

@@ -61,8 +61,8 @@ def _reproduce(
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
-    from papers.singhal2022.reproduce.found import Reproduction
     from papers.singhal2022.reproduce.report_writing import write
+    from papers.singhal2022.reproduce.reproduction import Reproduction
     from papers.singhal2022.reproduce.work import Work
 
     now = datetime.now().astimezone()
@@ -109,7 +109,7 @@ def _reproduce(
 def _told(whole: object) -> list[str]:
     """Return the end in lines: every claim that does not hold, and the counts."""
     from papers.singhal2022.headline import headline
-    from papers.singhal2022.reproduce.found import Reproduction
+    from papers.singhal2022.reproduce.reproduction import Reproduction
 
     assert isinstance(whole, Reproduction)
     lines = []

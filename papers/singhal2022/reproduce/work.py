@@ -15,10 +15,10 @@ from gridpeers.cli.remaining import Tell
 from gridpeers.theory import Spec
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
-from papers.singhal2022.reproduce.found import PartResult
+from papers.singhal2022.reproduce import capacitor_banks as banks
+from papers.singhal2022.reproduce import topology_study as topology
 from papers.singhal2022.reproduce.parts import Part
-from papers.singhal2022.reproduce.studies import banks
-from papers.singhal2022.reproduce.studies import topology_study as topology
+from papers.singhal2022.reproduce.reproduction import PartResult
 from papers.singhal2022.tables import tables_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from netem.spec.fault import Fault
-from papers.singhal2022.experiments.partition_experiment import predicted
+from papers.singhal2022.experiments.outage_experiments import predicted
 from plant.equipment import F_NOM
 from scenarios.predict.times import predicted_times
 from scenarios.predict.var_response import var_growth

@@ -9,13 +9,13 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.headline import within
-from papers.singhal2022.reproduce.found import PartResult, Reproduction, metrics_json
 from papers.singhal2022.reproduce.grid import lines
 from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
 from papers.singhal2022.reproduce.report_page import html
 from papers.singhal2022.reproduce.report_writing import markdown
+from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
 from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.studies.topology_study import graphs
+from papers.singhal2022.reproduce.topology_study import graphs
 from papers.singhal2022.tables import TABLES, Cell, tables_of
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings

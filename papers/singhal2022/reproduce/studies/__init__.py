@@ -1,1 +1,0 @@
-"""Parts of the paper that are many short runs of the islanding."""
