@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from scenarios.run import BrokenRunError
     from scenarios.spec.loading import catalogue
     from scenarios.spec.scenario_errors import ScenarioError
-    from wire.parameters import Range, Unit
+    from wire.plausible import Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     link_fault, metric = FAULTS.register, METRICS.register
@@ -57,13 +57,13 @@ _HOME = {
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
-    "Range": "wire.parameters",
+    "Range": "wire.plausible",
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
     "ScenarioError": "scenarios.spec.scenario_errors",
     "SetPoints": "agents.laws.law",
-    "Unit": "wire.parameters",
+    "Unit": "wire.plausible",
     "WindowData": "scenarios.results.own.window_metrics",
     "catalogue": "scenarios.spec.loading",
     "claim": "scenarios.results.benchmark_registry:CLAIMS.register",

@@ -2,58 +2,74 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+
+from wire.plausible import Plausible, Unit
+from wire.table_schema import Example
+
+TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
+Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]
+Resistance = Annotated[float, Unit("pu"), Plausible("a filter resistance", 0.0, 1.0)]
+Reactance = Annotated[float, Unit("pu"), Plausible("a filter reactance", 0.001, 1.0, above_zero=True)]
+LimitOfP = Annotated[float, Unit("pu"), Plausible("a limit of P", -2.0, 3.0)]
+LimitOfQ = Annotated[float, Unit("pu"), Plausible("a limit of Q", -10.0, 10.0)]
+BoundOfPset = Annotated[float, Unit("pu"), Plausible("the bound of P_set", 0.1, 10.0, above_zero=True)]
+BoundOfVset = Annotated[float, Unit("pu"), Plausible("a bound of V_set", 0.1, 2.0, above_zero=True)]
+InternalVoltage = Annotated[float, Unit("pu"), Plausible("a limit of the internal voltage", 0.0, 2.0)]
+Capacity = Annotated[float, Unit("pu"), Plausible("a limit of apparent power or current", 0.1, 5.0, above_zero=True)]
+VoltageBand = Annotated[float, Unit("pu"), Plausible("a dead band", 0.0, 0.2)]
+FrequencyBand = Annotated[float, Unit("Hz"), Plausible("a dead band", 0.0, 5.0)]
 
 
 class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
 
-    R_f: float = 0.015
+    R_f: Resistance = 0.015
     """Filter resistance (pu)."""
-    X_f: float = 0.15
+    X_f: Reactance = 0.15
     """Filter reactance (pu)."""
-    T_p: float = 0.01
+    T_p: TimeConstant = 0.01
     """Filter of measured P (s)."""
-    T_q: float = 0.01
+    T_q: TimeConstant = 0.01
     """Filter of measured Q (s)."""
-    T_v: float = 0.01
+    T_v: TimeConstant = 0.01
     """Filter of measured V (s)."""
-    P_max: float = 1.0
+    P_max: LimitOfP = 1.0
     """Overload limit (pu)."""
-    P_min: float = 0.0
+    P_min: LimitOfP = 0.0
     """Under-load limit (pu)."""
-    k_pp: float = 3.0
+    k_pp: Gain = 3.0
     """Proportional gain of the P limiters (rad/s per pu)."""
-    k_ip: float = 60.0
+    k_ip: Gain = 60.0
     """Integral gain of the P limiters (rad/s^2 per pu)."""
-    w_lim: float = 200.0
+    w_lim: Annotated[float, Plausible("the limiters' bound w_lim", 0.1, 1e4, above_zero=True)] = 200.0
     """Bound of the P limiters' output (rad/s)."""
-    Q_max: float = 10.0
+    Q_max: LimitOfQ = 10.0
     """Upper reactive limit (pu)."""
-    Q_min: float = -10.0
+    Q_min: LimitOfQ = -10.0
     """Lower reactive limit (pu)."""
-    k_pq: float = 3.0
+    k_pq: Gain = 3.0
     """Proportional gain of the Q limiters (pu V per pu)."""
-    k_iq: float = 20.0
+    k_iq: Gain = 20.0
     """Integral gain of the Q limiters (pu V per pu s)."""
-    V_lim: float = 10.0
+    V_lim: Annotated[float, Unit("pu"), Plausible("the limiters' bound V_lim", 0.01, 10.0, above_zero=True)] = 10.0
     """Bound of the Q limiters' output (pu V)."""
-    k_pv: float = 0.0
+    k_pv: Gain = 0.0
     """Proportional gain of the voltage controller."""
-    k_iv: float = 5.86
+    k_iv: Gain = 5.86
     """Integral gain of the voltage controller (1/s)."""
-    E_min: float = 0.0
+    E_min: InternalVoltage = 0.0
     """Lower bound of the internal voltage (pu)."""
-    E_max: float = 1.25
+    E_max: InternalVoltage = 1.25
     """Upper bound of the internal voltage (pu)."""
-    P_set_lim: float = 3.0
+    P_set_lim: BoundOfPset = 3.0
     """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
     unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
-    V_set_min: float = 0.8
+    V_set_min: BoundOfVset = 0.8
     """Lower bound of V_set (pu)."""
-    V_set_max: float = 1.2
+    V_set_max: BoundOfVset = 1.2
     """Upper bound of V_set (pu)."""
 
 
@@ -62,71 +78,71 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     model: Literal["voltage_source", "current_source"] = "voltage_source"
     """Representation towards the network (sections 4.6, 4.7)."""
-    R_f: float = 0.01
+    R_f: Resistance = 0.01
     """Filter resistance (pu)."""
-    X_f: float = 0.15
+    X_f: Reactance = 0.15
     """Filter reactance (pu)."""
-    k_pPLL: float = 50.0
+    k_pPLL: Gain = 50.0
     """PLL proportional gain (rad/s per pu)."""
-    k_iPLL: float = 900.0
+    k_iPLL: Gain = 900.0
     """PLL integral gain (rad/s^2 per pu)."""
-    k_pc: float = 0.05
+    k_pc: Gain = 0.05
     """Current controller, proportional (pu)."""
-    k_ic: float = 5.0
+    k_ic: Gain = 5.0
     """Current controller, integral (1/s)."""
-    F_current: float = 0.6
+    F_current: Annotated[float, Plausible("the cross-coupling gain F_current", 0.0, 1.0)] = 0.6
     """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
-    T_if: float = 0.005
+    T_if: TimeConstant = 0.005
     """Current lag of the current-source form (s)."""
     frequency_watt: bool = True
     """Frequency-watt droop on."""
     volt_var: bool = True
     """Volt-var droop on."""
-    T_ff: float = 0.02
+    T_ff: TimeConstant = 0.02
     """Filter of the PLL frequency (s)."""
-    T_pf: float = 0.05
+    T_pf: TimeConstant = 0.05
     """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
-    T_vf: float = 0.05
+    T_vf: TimeConstant = 0.05
     """Filter of measured V (s)."""
-    T_qf: float = 0.1
+    T_qf: TimeConstant = 0.1
     """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with
     four GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
-    db_UF: float = 0.0
+    db_UF: FrequencyBand = 0.0
     """Dead band below nominal frequency (Hz)."""
-    db_OF: float = 0.0
+    db_OF: FrequencyBand = 0.0
     """Dead band above nominal frequency (Hz)."""
-    db_UV: float = 0.0
+    db_UV: VoltageBand = 0.0
     """Dead band below V_set (pu)."""
-    db_OV: float = 0.0
+    db_OV: VoltageBand = 0.0
     """Dead band above V_set (pu)."""
-    P_max: float = 1.0
+    P_max: LimitOfP = 1.0
     """Upper bound of the P reference (pu)."""
-    P_min: float = -1.0
+    P_min: LimitOfP = -1.0
     """Lower bound of the P reference (pu)."""
-    S_max: float = 1.2
+    S_max: Capacity = 1.2
     """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
-    i_max: float = 1.2
+    i_max: Capacity = 1.2
     """Bound of each axis of the current reference (pu)."""
-    P_set_lim: float = 1.0
+    P_set_lim: BoundOfPset = 1.0
     """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
     set-point that was wound up delay the inverter's response."""
-    V_set_min: float = 0.8
+    V_set_min: BoundOfVset = 0.8
     """Lower bound of V_set (pu)."""
-    V_set_max: float = 1.2
+    V_set_max: BoundOfVset = 1.2
     """Upper bound of V_set (pu)."""
 
 
 class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Synchronism check of a switch that is to join two live islands: the largest differences across it."""
 
-    angle: float = 0.0
+    angle: Annotated[float, Unit("deg"), Plausible("a window of angles", 0.0, 180.0)] = 0.0
     """Of the angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE 1547-2018,
     Table 5)."""
-    f: float = 0.0
+    f: Annotated[float, Unit("Hz"), Plausible("a window of frequencies", 0.0, 10.0)] = 0.0
     """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1 at 60 Hz, likewise, in proportion at another nominal frequency."""
-    V: float = 0.0
+    V: Annotated[float, Unit("pu"), Plausible("a window of voltages", 0.0, 1.0)] = 0.0
     """Of the voltage (pu of nominal); 0: 0.10, 0.05 or 0.03, likewise."""
-    timeout: float = 10.0
+    timeout: Annotated[float, Unit("s"), Plausible("the longest wait for synchronism", 0.0, 3600.0)] = 10.0
     """How long (s) a switch of the schedule waits for synchronism before it gives up."""
 
 
@@ -135,11 +151,13 @@ class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     category: Literal["II", "III", "off"] = "III"
     """Abnormal operating performance category whose default trip settings hold; "off": no inverter trips."""
-    trips: dict[str, tuple[float, float]] = {}
+    trips: Annotated[dict[str, tuple[float, float]], Example("{ UV2 = [0.5, 0.2] }")] = {}
     """Settings in place of the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
     pu or in Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }. The standard's own are for 60 Hz; at another
     nominal frequency the defaults are in proportion."""
-    enter_service: float = 5.0
+    enter_service: Annotated[
+        float, Unit("s"), Plausible("the delay of entering service", 0.01, 3600.0, above_zero=True)
+    ] = 5.0
     """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz, in proportion at another nominal
     frequency) must be normal before an inverter that tripped comes back. The standard's default is 300 s, longer than
     a run."""

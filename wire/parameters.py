@@ -15,26 +15,12 @@ from typing import Annotated, Any, ClassVar, get_args, get_origin, get_type_hint
 
 import msgspec
 
+from wire.plausible import Range, Unit
 from wire.printable import printable
 from wire.suggestion import suggestion
 
 REQUIRED = msgspec.NODEFAULT
 """Default of a parameter that must be given."""
-
-
-@dataclass(frozen=True)
-class Unit:
-    """Unit of a parameter, e.g. `Unit("1/s")`; without one it is a pure number or no number."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Range:
-    """Least and greatest value of a parameter, both allowed."""
-
-    low: float = -math.inf
-    high: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -193,30 +179,8 @@ def _objection(parameter: Parameter, value: Any) -> str:
     except msgspec.ValidationError:
         return f"must be {_named(parameter.type)}, got {shown}"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return range_objection(value, parameter.range, parameter.unit)
+        return parameter.range.objection(value, parameter.unit)
     return ""
-
-
-def range_objection(value: Any, allowed: Range, unit: str) -> str:
-    """Return why a value is no number within a range, "" if it is.
-
-    Examples
-    --------
-    >>> range_objection(70, Range(0.0, 60.0), "s")
-    'must be from 0 to 60 s, got 70'
-    """
-    shown = printable(str(value), 60)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return f"must be a number, got {shown}"
-    shown = f"{value:g}"
-    low, high = allowed.low, allowed.high
-    if not math.isfinite(value):
-        return f"must be a finite number, got {shown}"
-    if low <= value <= high:
-        return ""
-    bounds = f"from {low:g} to {high:g}" if math.isfinite(low + high) else f"at least {low:g}"
-    bounds = f"at most {high:g}" if math.isinf(low) else bounds
-    return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
 
 
 def _named(kind: Any) -> str:

@@ -14,7 +14,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from wire.parameters import Range, Unit, values_of
+from wire.parameters import values_of
+from wire.plausible import Range, Unit
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""

@@ -15,11 +15,10 @@ from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.spec import ScenarioError
-from scenarios.spec.loading import read_toml
+from scenarios.spec.loading import read_tables, read_toml
 from scenarios.spec.portability import check_portable
 from scenarios.spec.scenario_changes import as_in
 from scenarios.spec.scenario_errors import Mistakes
-from scenarios.spec.scenario_reading import read_tables
 from wire.suggestion import suggestion
 
 if TYPE_CHECKING:

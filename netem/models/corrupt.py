@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import msgspec
 
 from netem.draws import Stream
-from netem.netem_errors import Mistake, probability
+from wire.plausible import Probability
 
 _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 """Indices of the draws of the first copy; those of the next follow."""
@@ -16,7 +17,7 @@ _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
 
-    p: float
+    p: Annotated[float, Probability("a corruption")]
     """Probability that an arriving copy of a message is corrupted."""
     checksum: bool = False
     """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
@@ -33,10 +34,6 @@ class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             return below(8 * size, seq, index + _WHICH)
 
         return bit
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        return probability("p", self.p, "a corruption")
 
 
 def flip(payload: bytes, bit: int) -> bytes:

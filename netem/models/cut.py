@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import msgspec
 
-from netem.netem_errors import Mistake
-
 
 class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Nothing passes as long as the entry holds; in a file `cut = true` says the same."""
@@ -16,7 +14,3 @@ class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
         """Until when the link is down at t (s of run time), None if it is up."""
         return to_s if from_s <= t < to_s else None
-
-    def mistakes(self) -> list[Mistake]:
-        """There is nothing to get wrong."""
-        return []

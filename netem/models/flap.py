@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import msgspec
 
-from netem.netem_errors import Mistake, seconds
+from wire.plausible import Plausible, Unit
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""
@@ -15,9 +16,9 @@ LONGEST_FLAP = 600.0
 class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Up for up_s, down for down_s, and so on, beginning with up at the entry's from_s."""
 
-    up_s: float
+    up_s: Annotated[float, Unit("s"), Plausible("the up time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
     """How long the link is up (s)."""
-    down_s: float
+    down_s: Annotated[float, Unit("s"), Plausible("the down time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
     """How long it is down (s)."""
     hold: bool = False
     """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
@@ -32,8 +33,3 @@ class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         if t < end - self.down_s:
             return None
         return min(end, to_s)
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = seconds("up_s", self.up_s, "the up time of a flap", high=LONGEST_FLAP, above_zero=True)
-        return found + seconds("down_s", self.down_s, "the down time of a flap", high=LONGEST_FLAP, above_zero=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
 
-from netem.netem_errors import Mistake, amount
-from netem.plausible_links import Range
+from wire.plausible import Plausible, Unit
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -15,9 +16,11 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     not yet sent. It goes if q is 0 or if q + b fits the queue, and is through at :math:`\max(t, T) + b / R`.
     """
 
-    bytes_per_s: float
+    bytes_per_s: Annotated[
+        float, Unit("bytes/s"), Plausible("a rate", 1.0, 1e11, hint="; it is in bytes, not bits, per second")
+    ]
     """R (bytes per second). A line of 9.6 kbit/s has 1200."""
-    queue_bytes: int = 10_000
+    queue_bytes: Annotated[int, Unit("bytes"), Plausible("a queue", 1, 1e9)] = 10_000
     """Most bytes that may wait, the message being sent included; an idle line takes any message."""
 
     def through(self, ready: float, busy_until: float, size: int) -> float | None:
@@ -36,9 +39,3 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         if waiting + size > self.queue_bytes + 1e-6:
             return None
         return busy_until + size / self.bytes_per_s
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        hint = "; it is in bytes, not bits, per second"
-        found = amount("bytes_per_s", self.bytes_per_s, Range("a rate", "bytes/s", 1.0, 1e11), hint)
-        return found + amount("queue_bytes", self.queue_bytes, Range("a queue", "bytes", 1, 1e9))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import msgspec
 
 from netem.models.instant import INSTANT
-from netem.netem_errors import Mistake, seconds
+from wire.plausible import Plausible, Unit
+from wire.table_schema import Problem
 
 
 class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -17,11 +19,11 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     give a rate as well where it has not.
     """
 
-    period_s: float
+    period_s: Annotated[float, Unit("s"), Plausible("the period of slots", 0.0, 10.0, above_zero=True)]
     """Distance of the slots' beginnings (s)."""
-    offset_s: float = 0.0
+    offset_s: Annotated[float, Unit("s"), Plausible("the offset of slots", 0.0, 10.0)] = 0.0
     """Beginning of the first slot (s), below period_s."""
-    length_s: float
+    length_s: Annotated[float, Unit("s"), Plausible("the length of a slot", 0.0, 10.0, above_zero=True)]
     """Length of a slot (s), up to period_s."""
 
     def opens(self, ready: float) -> float:
@@ -38,14 +40,12 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             return ready
         return max(self.offset_s + (number + 1) * self.period_s, ready)
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = seconds("period_s", self.period_s, "the period of slots", above_zero=True)
-        found += seconds("offset_s", self.offset_s, "the offset of slots")
-        found += seconds("length_s", self.length_s, "the length of a slot", above_zero=True)
-        for key in () if found else ("offset_s", "length_s"):
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        found = []
+        for key in ("offset_s", "length_s"):
             value = getattr(self, key)
             if value > self.period_s or (key == "offset_s" and value == self.period_s):
                 text = f"{value:g} s does not go with period_s = {self.period_s:g} s: slots repeat with the period"
-                found.append(Mistake(key, text))
+                found.append(Problem(key, text))
         return found

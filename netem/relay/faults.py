@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from netem.netem_errors import probability, seconds
+from netem.models.delay.delay_model import LONGEST_DELAY
+from wire.plausible import Plausible, Probability
 
 
 class FaultsError(ValueError):
@@ -54,11 +55,14 @@ class Faults:
             raise FaultsError("\n".join(mistakes))
 
     def _mistakes(self) -> Iterator[str]:
-        times = [mistake for name in ("delay", "jitter") for mistake in seconds(name, getattr(self, name), f"a {name}")]
-        for path, text in times + probability("loss", self.loss, "a loss"):
-            yield f"{path}: {text}"
-        for path, text in probability("reorder", self.reorder, "reordering"):
-            yield f"{path}: {text}"
+        for key, text in (
+            ("delay", Plausible("a delay", 0.0, LONGEST_DELAY).objection(self.delay, "s")),
+            ("jitter", Plausible("a jitter", 0.0, LONGEST_DELAY).objection(self.jitter, "s")),
+            ("loss", Probability("a loss").objection(self.loss)),
+            ("reorder", Probability("reordering").objection(self.reorder)),
+        ):
+            if text:
+                yield f"{key}: {text}"
         if not (self.rate == 0.0 or 1.0 <= self.rate < float("inf")):
             yield f"rate: {self.rate:g} bytes/s; write at least 1, or 0 for no limit"
         if not self.queue >= 1500.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -17,26 +17,23 @@ from netem.models.loss import AnyLoss, Bernoulli
 from netem.models.own_fault import FAULTS
 from netem.models.rate import Rate
 from netem.models.slots import Slots
-from netem.netem_errors import Mistake, below, seconds
 from netem.spec.pattern import parse
 from netem.spec.profiles import PROFILES
-from wire.plugin import Plugin, problems
+from wire.path_text import is_no_path
+from wire.plausible import Plausible, Unit
+from wire.plugin import Plugin, plugin_of, problems, scalar_objection
 from wire.suggestion import suggestion
+from wire.table_reading import shown
+from wire.table_schema import Example, OtherKeys, Problem, Shorthand, below, fields_of, problems_of
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""
 
+RunTime = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
+RunTimeOrNone = Annotated[float | None, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
+
 KINDS = ("cut", "flap", "loss", "rate", "slots", "delay", "duplicate", "corrupt")
 """What an entry may do to a link, in the order in which it is done."""
-
-_SHORTHAND: dict[str, tuple[type, str]] = {
-    "delay": (Constant, "delay_s"),
-    "loss": (Bernoulli, "p"),
-    "duplicate": (Duplicate, "p"),
-    "corrupt": (Corrupt, "p"),
-    "rate": (Rate, "bytes_per_s"),
-}
-"""What a bare number means."""
 
 
 class Span(NamedTuple):
@@ -52,26 +49,47 @@ class Span(NamedTuple):
     """The struct of `netem.models`, or the `Plugin` of somebody's own fault."""
 
 
+def _is_own(key: str) -> bool:
+    """Return whether a key names a fault of the user's own."""
+    return ":" in key or key in FAULTS.names
+
+
+def _read_own(name: str, raw: Any, found: list[Problem]) -> tuple[Plugin, ...]:
+    """Convert the value under the name of a fault of the user's own: a table of its parameters, or true."""
+    if raw is False:
+        return ()
+    table = {} if raw is True else raw
+    if not isinstance(table, Mapping):
+        text = f"must be true or a table of its parameters such as {{ p = 0.1 }}, got {shown(raw)}"
+        found.append(Problem(name, text))
+        return ()
+    wrong = [Problem(f"{name}.{key}", text) for key, value in table.items() if (text := scalar_objection(value))]
+    if not wrong and (not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", ""))):
+        wrong = [Problem(f"{name}.folder", f"must be the path of a folder, got {shown(table['folder'])}")]
+    found += wrong
+    return () if wrong else (plugin_of({**table, "use": name}),)
+
+
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What some links do for a time. A message is judged by the entries that hold at the time it was sent."""
 
-    on: str
+    on: Annotated[str, Example('"inv4 <-> inv7"')]
     """Which links, e.g. "inv4 <-> inv7"; see `netem.spec.pattern`."""
-    from_s: float = 0.0
+    from_s: RunTime = 0.0
     """From when (s of run time)."""
-    to_s: float | None = None
+    to_s: RunTimeOrNone = None
     """Until when (s); without it, to the end of the run."""
     profile: str = ""
     """Name of a profile; keys given beside it take the place of the profile's."""
-    delay: AnyDelay | float | None = None
+    delay: Annotated[AnyDelay | float | None, Shorthand(Constant, "delay_s")] = None
     """Delay; a number is a constant one (s)."""
-    loss: AnyLoss | float | None = None
+    loss: Annotated[AnyLoss | float | None, Shorthand(Bernoulli, "p")] = None
     """Loss; a number is an independent probability."""
-    duplicate: Duplicate | float | None = None
+    duplicate: Annotated[Duplicate | float | None, Shorthand(Duplicate, "p")] = None
     """Duplicates; a number is their probability."""
-    corrupt: Corrupt | float | None = None
+    corrupt: Annotated[Corrupt | float | None, Shorthand(Corrupt, "p")] = None
     """Flipped bits; a number is their probability."""
-    rate: Rate | float | None = None
+    rate: Annotated[Rate | float | None, Shorthand(Rate, "bytes_per_s")] = None
     """Finite rate; a number is bytes per second."""
     slots: Slots | None = None
     """Time slots."""
@@ -79,7 +97,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Whether the link is down."""
     flap: Flap | None = None
     """Up and down in turn."""
-    own: tuple[Plugin, ...] = ()
+    own: Annotated[tuple[Plugin, ...], OtherKeys(_is_own, _read_own)] = ()
     """Faults of your own, each under its name: "mine:Jammer" = { share = 0.2 } (`gridpeers doc faults`)."""
 
     @property
@@ -104,8 +122,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             if kind == "cut" and isinstance(value, bool):
                 value = Cut() if value else None
             elif isinstance(value, (int, float)):
-                model, key = _SHORTHAND[kind]
-                value = model(**{key: float(value)})
+                value = _SHORTHANDS[kind].of(float(value))
             if value is not None:
                 found[kind] = value
         return found | {plugin.name: plugin for plugin in self.own}
@@ -116,34 +133,26 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             return []
         return [Span(kind, self.from_s, self.end, model) for kind, model in self.models().items()]
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant; `on` is judged where the names are known."""
-        found = wrong_times(self.from_s, self.to_s)
+    def problems(self) -> list[Problem]:
+        """Return the values that cannot be meant; `on` is judged where the names are known."""
+        found = problems_of(self) + times_problems(self.from_s, self.to_s)
         if self.profile and self.profile not in PROFILES:
             text = f'there is no profile "{self.profile}"; {suggestion(self.profile, PROFILES, "profiles")}'
-            found.append(Mistake("profile", text))
-        models = self.models()
-        if not models and not found:
+            found.append(Problem("profile", text))
+        if not self.models() and not found:
             text = "does nothing; give it one of profile, " + ", ".join(KINDS)
-            found.append(Mistake("cut" if self.cut is False else "", text))
+            found.append(Problem("cut" if self.cut is False else "", text))
         for plugin in self.own:
-            found += below(plugin.name, [Mistake(*wrong) for wrong in problems(FAULTS, plugin)])
-        for kind, model in models.items():
-            if isinstance(model, Plugin):
-                continue
-            wrong = model.mistakes()
-            if isinstance(getattr(self, kind), (int, float)):  # the number has no key of its own
-                wrong = [Mistake("", mistake.text) for mistake in wrong]
-            found += below(kind, wrong)
+            found += below(plugin.name, [Problem(*wrong) for wrong in problems(FAULTS, plugin)])
         return found
 
 
-def wrong_times(from_s: float, to_s: float | None) -> list[Mistake]:
-    """Mistakes of an entry's times by themselves."""
-    found = seconds("from_s", from_s, "a time of the run", high=LONGEST_RUN)
-    if to_s is None:
-        return found
-    found += seconds("to_s", to_s, "a time of the run", high=LONGEST_RUN)
-    if not found and to_s <= from_s:
-        found.append(Mistake("to_s", f"{to_s:g} s is not after from_s = {from_s:g} s, so that the entry never holds"))
-    return found
+_SHORTHANDS = {field.name: field.mark(Shorthand) for field in fields_of(Fault)}
+"""By kind: what a number alone stands for."""
+
+
+def times_problems(from_s: float, to_s: float | None) -> list[Problem]:
+    """Return whether an entry ends before it begins."""
+    if to_s is None or to_s > from_s:
+        return []
+    return [Problem("to_s", f"{to_s:g} s is not after from_s = {from_s:g} s, so that the entry never holds")]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from netem.models.cut import Cut
-from netem.netem_errors import Mistake
-from netem.spec.fault import Span, wrong_times
+from netem.spec.fault import RunTime, RunTimeOrNone, Span, times_problems
 from wire.messages import PLANT
 from wire.suggestion import suggestion
+from wire.table_schema import Example, Problem, problems_of
 
 _REST = "the rest"
 
@@ -24,16 +24,16 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     The plant is cut off from nobody unless a group names it.
     """
 
-    groups: tuple[tuple[str, ...], ...] = ()
+    groups: Annotated[tuple[tuple[str, ...], ...], Example('[["inv1", "inv2"], ["MG2"]]')] = ()
     """Groups of inverters or microgrids, e.g. [["inv1", "inv2"], ["MG2"]]."""
     by: Literal["", "microgrid", "island", "halves"] = ""
     """Instead of groups: each microgrid one, each electrical island one, or the first half of the inverters' table
     and the second."""
     alone: str = ""
     """Instead of groups: this inverter's agent, from everybody else."""
-    from_s: float = 0.0
+    from_s: RunTime = 0.0
     """From when (s of run time)."""
-    to_s: float | None = None
+    to_s: RunTimeOrNone = None
     """Until when (s); without it, to the end of the run."""
     hold: bool = False
     """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
@@ -105,34 +105,34 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
                 )
         return tuple(found)
 
-    def mistakes(self, names: Sequence[str] | None, microgrids: Mapping[str, str]) -> list[Mistake]:
-        """Values that cannot be meant, names that nobody has, and partitions that part nobody.
+    def problems(self, names: Sequence[str] | None, microgrids: Mapping[str, str]) -> list[Problem]:
+        """Return values that cannot be meant, names that nobody has, and that the partition parts nobody.
 
         Without names of agents any may be one.
         """
-        found = wrong_times(self.from_s, self.to_s)
+        found = problems_of(self) + times_problems(self.from_s, self.to_s)
         given = [key for key in ("groups", "by", "alone") if getattr(self, key)]
         if len(given) != 1:
             got = f"got {' and '.join(given)}" if given else "got none"
-            found.append(Mistake("", f'a partition needs one of groups, by = "microgrid" or alone = "inv1"; {got}'))
+            found.append(Problem("", f'a partition needs one of groups, by = "microgrid" or alone = "inv1"; {got}'))
         if names is None:
             return found
         known = [*names, *dict.fromkeys(microgrids.values())]
         lower = {name.lower() for name in microgrids.values()} | {*names, PLANT}
         if self.alone and self.alone not in names:
-            found.append(Mistake("alone", f'no agent "{self.alone}"; {suggestion(self.alone, names, "agents")}'))
+            found.append(Problem("alone", f'no agent "{self.alone}"; {suggestion(self.alone, names, "agents")}'))
         seen: dict[str, int] = {}
         for i, group in enumerate(self.groups):
             for name in group:
                 if name not in lower and name.lower() not in lower:
                     text = f'nobody is called "{name}"; {suggestion(name, known, "names")}'
-                    found.append(Mistake(f"groups[{i}]", text))
+                    found.append(Problem(f"groups[{i}]", text))
                 elif name in seen:
                     text = f'"{name}" is in groups[{seen[name]}] already; nobody is on both sides'
-                    found.append(Mistake(f"groups[{i}]", text))
+                    found.append(Problem(f"groups[{i}]", text))
                 seen.setdefault(name, i)
         if not found and self.by != "island" and not self._parts(names, microgrids):
-            found.append(Mistake("", "parts nobody: all agents are in one group"))
+            found.append(Problem("", "parts nobody: all agents are in one group"))
         return found
 
     def _parts(self, names: Sequence[str], microgrids: Mapping[str, str]) -> bool:

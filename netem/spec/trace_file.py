@@ -10,9 +10,10 @@ from typing import TextIO
 import msgspec
 
 from netem.models.delay import Trace
-from netem.netem_errors import LONGEST_DELAY, Mistake, seconds
+from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
 from netem.spec.netem import Netem
 from wire.suggestion import suggestion
+from wire.table_schema import Problem
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""
@@ -54,8 +55,8 @@ def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
         except ValueError:
             wrong.append(f'{file} row {reader.line_num}: {COLUMN} must be a number of seconds, got "{text}"')
             continue
-        mistakes = seconds("", delay_s, "a delay")
-        wrong += [f"{file} row {reader.line_num}: {mistake.text}" for mistake in mistakes]
+        if text := DELAY.objection(delay_s, "s"):
+            wrong.append(f"{file} row {reader.line_num}: {text}")
         delays.append(delay_s)
     if wrong and len(wrong) == len(delays) and all(math.isfinite(d) and d > LONGEST_DELAY for d in delays):
         return (), [f"{file}: all {len(delays)} delays are above {LONGEST_DELAY:g} s; are they in milliseconds?"]
@@ -66,7 +67,7 @@ def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
     return tuple(delays), wrong
 
 
-def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Mistake]]:
+def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Problem]]:
     """The same with the delays of every trace read, and what is wrong with the files.
 
     Parameters
@@ -76,12 +77,12 @@ def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Mistake]]:
     folder : Path
         The scenario's, from which paths are seen.
     """
-    found: list[Mistake] = []
+    found: list[Problem] = []
     faults = list(netem.links)
     for i, fault in enumerate(faults):
         delay = fault.delay
         if isinstance(delay, Trace) and delay.file and not delay.delays_s:
             delays_s, wrong = read_delays(folder / delay.file)
-            found += [Mistake(f"link[{i}].delay.file", text) for text in wrong]
+            found += [Problem(f"link[{i}].delay.file", text) for text in wrong]
             faults[i] = msgspec.structs.replace(fault, delay=msgspec.structs.replace(delay, delays_s=delays_s))
     return msgspec.structs.replace(netem, links=tuple(faults)), found

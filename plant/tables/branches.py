@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -163,7 +164,7 @@ def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tup
         ends = buses.find_ends(row, "ABC")
         connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))
         most = power_of("a transformer", min(end.V_nom for end in ends), RATED_CURRENT, 3) if ends else None
-        S_rated = row.number("S_rated_kVA", above=0.0, plausible=most and most._replace(low=1.0)) * 1000.0
+        S_rated = row.number("S_rated_kVA", above=0.0, plausible=most and replace(most, low=1.0)) * 1000.0
         R = row.number("R_percent", at_least=0.0, plausible=R_PERCENT)
         z = complex(R, row.number("X_percent", above=0.0, plausible=X_PERCENT)) / 100.0
         if name in transformers:

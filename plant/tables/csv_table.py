@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from plant.equipment import PHASES
-from plant.tables.plausible_feeder import Plausible, objection
+from wire.plausible import Plausible
 from wire.suggestion import suggestion
 
 
@@ -70,7 +70,7 @@ class Row:
         if at_least is not None and number < at_least:
             self.mistake(f"{column} must not be less than {at_least:g}{unit}, got {number:g}{unit}")
             return math.nan
-        if plausible is not None and (wrong := objection(number, unit.strip(), plausible)):
+        if plausible is not None and (wrong := plausible.objection(number, unit.strip())):
             self.mistake(f"{column}: {wrong}")
         return number
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.equipment import F_NOM
-from plant.tables.plausible_feeder import NOMINAL_FREQUENCY, objection
+from plant.tables.plausible_feeder import NOMINAL_FREQUENCY
 from wire.suggestion import suggestion
 
 MANIFEST = "feeder.toml"
@@ -27,7 +27,7 @@ def read_f_nom(folder: Path, mistakes: list[str]) -> float:
     if not isinstance(f_nom, (int, float)) or isinstance(f_nom, bool):
         mistakes.append(f"{MANIFEST}: f_nom_Hz: must be a number, got {f_nom!r}; write f_nom_Hz = 50.0")
         return F_NOM
-    if wrong := objection(float(f_nom), "Hz", NOMINAL_FREQUENCY):
+    if wrong := NOMINAL_FREQUENCY.objection(float(f_nom), "Hz"):
         mistakes.append(f"{MANIFEST}: f_nom_Hz: {wrong}")
         return F_NOM
     return float(f_nom)

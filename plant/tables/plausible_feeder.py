@@ -5,19 +5,7 @@ A range is wide: it holds every value that a distribution feeder may have, and n
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-
-class Plausible(NamedTuple):
-    """Numbers that make sense, bounds included, in the unit of their column."""
-
-    what: str
-    """What the number is, for the sentence."""
-    low: float
-    """Lowest value."""
-    high: float
-    """Highest value."""
-
+from wire.plausible import Plausible
 
 NOMINAL_FREQUENCY = Plausible("a nominal frequency", 16.0, 400.0)
 BUS_VOLTAGE = Plausible("a nominal voltage", 0.1, 150.0)
@@ -41,19 +29,6 @@ RATED_CURRENT = 5000.0
 TIMES_THE_LOAD = 50.0
 """Largest rating of one inverter beside the total real power of the feeder's loads."""
 
-_OTHER_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
-    "kW": ((1e-3, "W"), (1e3, "MW")),
-    "kvar": ((1e-3, "var"), (1e3, "Mvar")),
-    "kVA": ((1e-3, "VA"), (1e3, "MVA")),
-    "kV": ((1e-3, "V"),),
-    "m": ((1e3, "km"), (1e-3, "mm")),
-    "Hz": ((1e3, "kHz"), (1e-3, "mHz")),
-    "ohm/km": ((1e-3, "ohm/1000 km"), (1e3, "ohm/m")),
-    "pu": ((1e-2, "%"),),
-    "%": ((1e2, "pu"),),
-}
-"""By unit of a column: factors that turn a number written in another unit into the column's."""
-
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
     """Range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound at a nominal voltage (V, L-N).
@@ -61,33 +36,11 @@ def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
     Examples
     --------
     >>> power_of("a load", 2400.0, 2000.0, 1)
-    Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0)
+    Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0, above_zero=False, hint='')
     """
     high = phases * V_nom * current / 1e3
     where = f"{what} {'on a phase of' if phases == 1 else 'at'} {V_nom * 3.0**0.5 / 1e3:.3g} kV"
     return Plausible(where, -high, high)
-
-
-def objection(value: float, unit: str, allowed: Plausible) -> str:
-    """Why a number cannot be right, and what would be; empty when it can.
-
-    Examples
-    --------
-    >>> objection(4160.0, "kV", BUS_VOLTAGE)
-    '4160 kV is not plausible for a nominal voltage (0.1 to 150 kV); did you mean 4.16 (4160 V)?'
-    >>> objection(0.01, "pu", P_F_DROOP)
-    ''
-    """
-    if not (value < allowed.low or value > allowed.high):  # also where a bound is not a number, told elsewhere
-        return ""
-    text = f" {unit}".rstrip()
-    span = f"{allowed.low:.4g} to {allowed.high:.4g}{text}"
-    meant = [
-        f"; did you mean {value * factor:g} ({value:g} {other})?"
-        for factor, other in _OTHER_UNITS.get(unit, ())
-        if allowed.low <= value * factor <= allowed.high
-    ]
-    return f"{value:g}{text} is not plausible for {allowed.what} ({span}){(*meant, '')[0]}"
 
 
 def positive_definite(matrix: tuple[tuple[float, ...], ...]) -> bool:

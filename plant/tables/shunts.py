@@ -19,11 +19,11 @@ from plant.tables.plausible_feeder import (
     SOURCE_ANGLE,
     SOURCE_VOLTAGE,
     TIMES_THE_LOAD,
-    Plausible,
     power_of,
 )
 from wire.keys import check_name
 from wire.messages import OFF, PLANT
+from wire.plausible import Plausible
 
 TAKEN = {
     PLANT: "the plant sends under it",

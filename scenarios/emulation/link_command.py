@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from netem.netem_errors import Mistake, seconds
 from netem.spec.change import Change, Heal
 from netem.spec.fault import LONGEST_RUN, Fault
 from netem.spec.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words
+from wire.plausible import Plausible
+from wire.table_schema import Problem
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""
@@ -45,18 +46,20 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
         return msgspec.structs.replace(self._change, **times)
 
-    def mistakes(self, microgrids: Mapping[str, str]) -> list[Mistake]:
+    def mistakes(self, microgrids: Mapping[str, str]) -> list[Problem]:
         """All that is wrong with it in a run of these inverters."""
-        links = [Mistake("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
+        links = [Problem("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
         return links + self.wrong_values()
 
-    def wrong_values(self) -> list[Mistake]:
+    def wrong_values(self) -> list[Problem]:
         """Values that cannot be meant, in whatever run."""
-        found = []
+        found: list[Problem] = []
         if self.fault is not None:
-            found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).mistakes()
+            found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).problems()
         if self.for_s is not None:
-            found += seconds("for", self.for_s, "a time of the run", high=LONGEST_RUN, above_zero=True)
+            allowed = Plausible("a time of the run", 0.0, LONGEST_RUN, above_zero=True)
+            if text := allowed.objection(self.for_s, "s"):
+                found.append(Problem("for", text))
         return found
 
     def __str__(self) -> str:

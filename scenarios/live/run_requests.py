@@ -11,7 +11,6 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from agents.own_nameplate import check_nameplate
-from netem.netem_errors import Mistake
 from scenarios.emulation.emulation_config import Setup
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import LinkStand, decode_stands
@@ -21,6 +20,7 @@ from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
 from wire.messages import PLANT, Answer, Command, LinkAnswer
+from wire.table_schema import Problem
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
@@ -224,7 +224,7 @@ def links_of_run(client: RunClient) -> tuple[Setup, AgentConfig]:
 
 def check_link_command(command: LinkCommand, setup: Setup | None) -> None:
     """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
-    problems: Iterable[Mistake] = command.wrong_values() if setup is None else command.mistakes(setup.microgrids)
+    problems: Iterable[Problem] = command.wrong_values() if setup is None else command.mistakes(setup.microgrids)
     options = [(path.partition(".")[0], text) for path, text in problems]
     wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
     if wrong:

@@ -9,16 +9,16 @@ import msgspec
 
 from agents.agent_config import Gains, Handling
 from netem.spec.fault import Fault
-from netem.spec.netem import Netem
 from netem.spec.node_fault import NodeFault
 from netem.spec.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.results.own import pages as own_pages
-from scenarios.spec.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time, key_of
+from scenarios.spec.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
+from wire.table_schema import INLINE, fields_of
 
 TOPICS = ("keys", "messages", "scenario", *own_pages.PAGES)
 """Pages there are."""
@@ -94,7 +94,7 @@ def _scenario() -> Iterator[str]:
     yield "inverter's own rating or nominal voltage). What has no default must be given. Gains have the units told"
     yield "here."
     for title, cls in _SCENARIO_TABLES:
-        by_name = {field.encode_name: key_of(cls, field) for field in msgspec.structs.fields(cls)}
+        by_name = {field.info.encode_name: field.key for field in fields_of(cls)}
         by_name |= {"own": '"mine:Name"'} if cls is Fault else {}  # what it is called in the file is up to its author
         yield ""
         yield f"## {title}"
@@ -123,10 +123,10 @@ def _is_table(cls: type, key: str) -> bool:
     """Return whether a field is a table of its own, which has a section of its own."""
     if cls in (Fault, NodeFault):  # their models are written on one line; docs/netem.md has them
         return False
-    kind = next(field.type for field in msgspec.structs.fields(cls) if field.encode_name == key)
-    if kind is Netem:
+    field = next(field for field in fields_of(cls) if field.info.encode_name == key)
+    if INLINE in field.marks:
         return True
-    inner = [kind, *typing.get_args(kind)]
+    inner = [field.type, *typing.get_args(field.type)]
     return cls is not Case and any(isinstance(part, type) and issubclass(part, msgspec.Struct) for part in inner)
 
 

@@ -17,8 +17,9 @@ from agents.laws.law import Law, limits_in
 from scenarios.spec.scenario_errors import Mistakes
 from scenarios.spec.scenario_model import LawKey, Scenario
 from wire.module_folder import folder_of
-from wire.parameters import Range, objections, range_objection
+from wire.parameters import objections
 from wire.path_text import is_no_path
+from wire.plausible import Range
 from wire.plugin import scalar_objection, table_of
 from wire.registry import PluginError
 
@@ -134,7 +135,7 @@ def _wrong_values(table: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _limit_problem(given: Any) -> str:
-    return range_objection(given, TIME_LIMIT, "s")
+    return TIME_LIMIT.objection(given, "s")
 
 
 def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:

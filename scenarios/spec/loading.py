@@ -34,8 +34,7 @@ from scenarios.spec.power_limits import check_limits
 from scenarios.spec.protection_table import check_protection
 from scenarios.spec.scenario_changes import as_in, check_changes
 from scenarios.spec.scenario_errors import Mistakes, ScenarioError
-from scenarios.spec.scenario_model import Scenario
-from scenarios.spec.scenario_reading import read_tables
+from scenarios.spec.scenario_model import AS_RUN, Scenario
 from scenarios.spec.supply import check_supply
 
 ReadFeeder = Callable[[str, str], Feeder]
@@ -101,6 +100,11 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
         raise ScenarioError([_malformed(path.name, text, str(error))]) from None
     except RecursionError:
         raise ScenarioError([f"{path.name}: brackets or names are nested too deeply to be read"]) from None
+
+
+def read_tables(data: Mapping[str, Any], mistakes: Mistakes) -> Scenario:
+    """Return the scenario of parsed TOML; it is of use only while no mistake is noted."""
+    return mistakes.read(Scenario, {key: value for key, value in data.items() if key != AS_RUN})
 
 
 def check_tables(

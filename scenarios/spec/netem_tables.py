@@ -9,7 +9,6 @@ from pathlib import Path
 import msgspec
 
 from netem.models.own_fault import FAULTS
-from netem.netem_errors import Mistake
 from netem.spec.netem import Netem
 from netem.spec.node_fault import NodeFault
 from netem.spec.trace_file import with_traces
@@ -20,6 +19,7 @@ from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.plugins import placed_plugin
 from scenarios.spec.scenario_errors import Mistakes
 from scenarios.spec.scenario_model import Scenario
+from wire.table_schema import Problem
 
 
 def netem_of(scenario: Scenario, case: str) -> Netem:
@@ -103,36 +103,36 @@ def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -
     T_c = scenario.time.T_c_s
     end_s = inf if mistakes.touch("time.end_s", "time") else scenario.time.end_s
 
-    def wrong_in(netem: Netem) -> list[Mistake]:
-        nodes = [mistake for i, node in enumerate(netem.nodes) for mistake in _wrong_node(f"node[{i}]", node, T_c)]
-        return netem.mistakes(names, microgrids, end_s) + nodes
+    def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
+        nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
+        return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
 
-    common = wrong_in(scenario.netem)
+    common = wrong_in(scenario.netem, mistakes.paths_below(""))
     _add(common, "", mistakes)
     for name, case in scenario.cases.items():
         path = f"case.{name}."
-        own = wrong_in(case.netem)
+        own = wrong_in(case.netem, mistakes.paths_below(path))
         _add(own, path, mistakes)
-        if not common and not own and not is_calm(case.netem):
+        if not (common or own or mistakes.paths_below("") or mistakes.paths_below(path)) and not is_calm(case.netem):
             where = _paths_in(scenario.netem, path)
-            for mistake in wrong_in(netem_of(scenario, name)):
-                mistakes.add(where(mistake.path), mistake.text)
+            for problem in wrong_in(netem_of(scenario, name), set()):
+                mistakes.add(where(problem.path), problem.text)
 
 
-def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Mistake]:
+def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
     """What a run asks of an entry beyond what it says by itself."""
     found = []
     ticks = node.from_s / T_c
     if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
         near = max(1, round(ticks)) * T_c
         text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; write {near:g}"
-        found.append(Mistake(f"{path}.from_s", text))
+        found.append(Problem(f"{path}.from_s", text))
     if node.skew is not None and (node.from_s or node.to_s is not None):
-        found.append(Mistake(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
+        found.append(Problem(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
     return found
 
 
-def _add(wrong: list[Mistake], path: str, mistakes: Mistakes) -> None:
+def _add(wrong: list[Problem], path: str, mistakes: Mistakes) -> None:
     for mistake in wrong:
         mistakes.add(path + mistake.path, mistake.text)
 

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, TypeVar
+
+import msgspec
 
 from wire.printable import printable
+from wire.table_reading import read_table
+
+T = TypeVar("T", bound=msgspec.Struct)
 
 _TABLE = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
 _ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
@@ -71,6 +77,18 @@ class Mistakes:
     def below(self, path: str) -> bool:
         """Whether a mistake was noted anywhere in a table."""
         return any(noted.startswith(f"{path}.") for noted in self._paths)
+
+    def paths_below(self, prefix: str) -> set[str]:
+        """Return the keys of entries `[[link]]`, `[[partition]]`, `[[node]]` with a mistake, seen from a table."""
+        entries = tuple(f"{prefix}{entry}[" for entry in ("link", "partition", "node"))
+        return {path.removeprefix(prefix) for path in self._paths if path.startswith(entries)}
+
+    def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
+        """Return a file's tables as a struct, of use only while nothing is noted."""
+        table, problems = read_table(struct, data)
+        for problem in problems:
+            self.add(*problem)
+        return table
 
     @property
     def any(self) -> bool:

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 
 from netem.spec.netem import Netem
-from scenarios.spec.scenario_model import Case, Scenario, key_of
-from scenarios.spec.scenario_reading import AS_RUN, FOR_EVERY_CASE
+from scenarios.spec.scenario_model import AS_RUN, Scenario
+from wire.table_schema import INHERITED, fields_of
 
 
 def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
@@ -39,10 +39,10 @@ def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
 def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]:
     """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats a common table."""
     below: list[str] = []
-    for field in msgspec.structs.fields(struct):
-        value, key = getattr(struct, field.name), key_of(type(struct), field)
+    for field in fields_of(type(struct)):
+        value, key = getattr(struct, field.name), field.key
         where = f"{path}.{_key(key)}" if path else _key(key)
-        if isinstance(struct, Case) and field.name in FOR_EVERY_CASE and value == getattr(common, field.name):
+        if INHERITED in field.marks and value == getattr(common, field.name):
             continue
         if isinstance(value, Netem):
             for entries, items in msgspec.to_builtins(value).items():

@@ -12,9 +12,10 @@ import msgspec
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
 from netem.spec.fault import KINDS
-from netem.spec.netem_reading import read_netem
+from netem.spec.netem import Netem
 from netem.spec.profiles import PROFILES
 from tests.netem.links import MICROGRIDS
+from wire.table_reading import read_table
 
 TEXT = (Path(__file__).parents[2] / "docs" / "netem.md").read_text(encoding="utf-8")
 
@@ -22,10 +23,10 @@ TEXT = (Path(__file__).parents[2] / "docs" / "netem.md").read_text(encoding="utf
 def test_the_example_is_a_scenario_without_a_mistake() -> None:
     """Who copies the example gets what it says."""
     (example,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)
-    netem, form = read_netem(tomllib.loads(example), seed=1)
+    netem, form = read_table(Netem, tomllib.loads(example))
 
     assert not form
-    assert not netem.mistakes(list(MICROGRIDS), MICROGRIDS, 10.0)
+    assert not netem.problems(list(MICROGRIDS), MICROGRIDS, 10.0)
     assert (len(netem.links), len(netem.partitions), len(netem.nodes)) == (2, 1, 1)
 
 

@@ -18,12 +18,12 @@ from netem.receiver import Receiver
 from netem.spec.change import replayed
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.netem_reading import read_netem
 from netem.spec.pattern import Link
 from scenarios.emulation.emulation_config import Setup
 from scenarios.emulation.link_command import LinkCommand
 from wire.plugin import Plugin, problems
 from wire.registry import PluginError
+from wire.table_reading import read_table
 
 MODULE = '''
 from typing import Annotated
@@ -188,20 +188,18 @@ def test_every_mistake_of_an_entry_is_told_at_its_key(folder: str) -> None:
     tables = {
         "link": [{"on": "* <-> *", "my_faults:Jam": {"share": 3, "folder": folder}, "my_faults:Jem": True, "jam": 1}]
     }
-    netem, wrong = read_netem(tables, seed=1)
+    netem, wrong = read_table(Netem, tables)
     (entry,) = netem.links
     placed = msgspec.structs.replace(
         entry, own=tuple(msgspec.structs.replace(it, folder=folder) for it in reversed(entry.own))
     )
-    told = {mistake.path: mistake.text for mistake in placed.mistakes()}
+    told = {mistake.path: mistake.text for mistake in placed.problems()}
 
     assert [mistake.path for mistake in wrong] == ["link[0].jam"]
     assert told["my_faults:Jam.share"] == "must be from 0 to 1, got 3"
     assert 'module my_faults has no "Jem"; did you mean "Jam"?' in told["my_faults:Jem"]
     assert "judge(self, message, draws)" in problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
-    assert read_netem({"link": [{"on": "* <-> *", "my_faults:Jam": 3}]}, seed=1)[1][0].text.startswith(
-        "must be true or"
-    )
+    assert read_table(Netem, {"link": [{"on": "* <-> *", "my_faults:Jam": 3}]})[1][0].text.startswith("must be true or")
 
 
 def test_a_run_with_one_can_be_replayed(folder: str) -> None:

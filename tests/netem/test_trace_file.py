@@ -22,7 +22,7 @@ def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None
 
     assert not wrong
     assert netem.links[0].models()["delay"].delays_s == (0.01, 0.02)
-    assert not netem.mistakes(NAMES, MICROGRIDS, 10.0)
+    assert not netem.problems(NAMES, MICROGRIDS, 10.0)
 
 
 @pytest.mark.parametrize(

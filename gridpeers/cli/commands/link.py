@@ -133,16 +133,18 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     from netem.models.delay import Uniform
-    from netem.netem_errors import seconds
+    from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
     from scenarios.live.run_address import UsageError
+    from wire.plausible import Plausible
 
     if jitter is None:
         return {} if delay is None else {"delay": delay}
     if delay is None:
         raise UsageError("--jitter: is around a delay; give --delay too")
-    wrong = seconds("--delay", delay, "a delay") + seconds("--jitter", jitter, "a jitter", above_zero=True)
-    if wrong:
-        raise UsageError("; ".join(f"{path}: {text}" for path, text in wrong))
+    around = Plausible("a jitter", 0.0, LONGEST_DELAY, above_zero=True)
+    wrong = {"--delay": DELAY.objection(delay, "s"), "--jitter": around.objection(jitter, "s")}
+    if any(wrong.values()):
+        raise UsageError("; ".join(f"{option}: {text}" for option, text in wrong.items() if text))
     if jitter > delay:
         raise UsageError(f"--jitter: {jitter:g} s is more than the delay of {delay:g} s: some would be negative")
     return {"delay": Uniform(low_s=round(delay - jitter, 9), high_s=round(delay + jitter, 9))}

@@ -18,12 +18,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from statistics import NormalDist
+from typing import Annotated
 
 import msgspec
 
 from netem.draws import Stream
 from netem.models.chain import Chain
-from netem.netem_errors import Mistake
+from wire.plausible import Plausible, in_percent
+
+LONGEST_DELAY = 10.0
+"""Delays above this (s) are taken for milliseconds by mistake: control over such a link is not what netem is for."""
+
+DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
+"""Delay of one message (s)."""
 
 STANDARD = NormalDist()
 """The standard normal law."""
@@ -42,15 +49,11 @@ class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         """How the delays (s) of one link are drawn."""
         raise NotImplementedError
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        raise NotImplementedError
-
 
 class RandomDelay(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
     """What every delay from a law has."""
 
-    correlation: float = 0.0
+    correlation: Annotated[float, Plausible("a correlation", 0.0, 0.999999, hint=in_percent)] = 0.0
     """phi of the AR(1) process behind the draws, from 0 (independent) to below 1."""
 
     def quantile(self, u: float) -> float:
@@ -72,10 +75,3 @@ class RandomDelay(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=T
         latent = Chain(normal, lambda x, seq: phi * x + rest * normal(seq))
         # The normal law ends, in doubles, at 8.3 standard deviations, where the quantile function is not defined.
         return lambda seq: quantile(min(max(share(latent.at(seq)), 2.0**-53), 1.0 - 2.0**-53))
-
-    def _wrong_correlation(self) -> list[Mistake]:
-        phi = self.correlation
-        if 0.0 <= phi < 1.0:
-            return []
-        meant = f"; did you mean {phi / 100.0:g} ({phi:g} %)?" if 1.0 < phi < 100.0 else ""
-        return [Mistake("correlation", f"a correlation goes from 0 to below 1, got {phi:g}{meant}")]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from netem.models.delay.delay_model import STANDARD, RandomDelay
-from netem.netem_errors import Mistake, seconds
+from typing import Annotated
+
+from netem.models.delay.delay_model import LONGEST_DELAY, STANDARD, RandomDelay
+from wire.plausible import Plausible, Unit
 
 
 class Normal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="normal"):
@@ -14,9 +16,9 @@ class Normal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True,
     With mu above 3 sigma the truncation moves mean and spread by less than half a percent of sigma.
     """
 
-    mean_s: float
+    mean_s: Annotated[float, Unit("s"), Plausible("a mean delay", 0.0, LONGEST_DELAY)]
     """mu (s), mean before the truncation."""
-    std_s: float
+    std_s: Annotated[float, Unit("s"), Plausible("the spread of a delay", 0.0, LONGEST_DELAY, above_zero=True)]
     """sigma (s), standard deviation before the truncation: the jitter."""
 
     def quantile(self, u: float) -> float:
@@ -29,9 +31,3 @@ class Normal(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True,
         """Share up to a delay (s)."""
         above = STANDARD.cdf(self.mean_s / self.std_s)
         return 1.0 - STANDARD.cdf((self.mean_s - delay_s) / self.std_s) / above if delay_s > 0.0 else 0.0
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = seconds("mean_s", self.mean_s, "a mean delay")
-        found += seconds("std_s", self.std_s, "the spread of a delay", above_zero=True)
-        return found + self._wrong_correlation()

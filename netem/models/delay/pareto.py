@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from netem.models.delay.delay_model import RandomDelay
-from netem.netem_errors import Mistake, amount, seconds
-from netem.plausible_links import Range
+from typing import Annotated
+
+from netem.models.delay.delay_model import LONGEST_DELAY, RandomDelay
+from wire.plausible import Plausible, Unit
 
 
 class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="pareto"):
@@ -15,9 +16,11 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True,
     The variance is infinite for a <= 2, and so is the mean for a <= 1.
     """
 
-    minimum_s: float
+    minimum_s: Annotated[float, Unit("s"), Plausible("the shortest delay", 0.0, LONGEST_DELAY, above_zero=True)]
     """d_min (s), shortest delay."""
-    shape: float
+    shape: Annotated[
+        float, Plausible("a Pareto shape", 1.01, 100.0, hint="; at 1 and below the mean delay is infinite")
+    ]
     """a: the smaller, the heavier the tail; 3 is a usual choice."""
 
     def quantile(self, u: float) -> float:
@@ -27,10 +30,3 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True,
     def cdf(self, delay_s: float) -> float:
         """Share up to a delay (s)."""
         return 1.0 - float((self.minimum_s / delay_s) ** self.shape) if delay_s > self.minimum_s else 0.0
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = seconds("minimum_s", self.minimum_s, "the shortest delay", above_zero=True)
-        hint = "; at 1 and below the mean delay is infinite"
-        found += amount("shape", self.shape, Range("a Pareto shape", "", 1.01, 100.0), hint)
-        return found + self._wrong_correlation()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from netem.draws import Stream
-from netem.models.delay.delay_model import DelayModel, Sampler
-from netem.netem_errors import Mistake, below, seconds
+from netem.models.delay.delay_model import DELAY, DelayModel, Sampler
+from wire.table_schema import Problem
 
 MOST_SHOWN = 5
 """So many wrong delays of a trace are named; a file in milliseconds has thousands."""
@@ -33,14 +33,14 @@ class Trace(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, t
         """Index of the delay that message 0 has."""
         return stream.below(len(self.delays_s), 0) if self.spread else 0
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
+    def relations(self) -> list[Problem]:
+        """Return the delays that cannot be meant, and whether there are none."""
         if not self.delays_s:
-            return [] if self.file else [Mistake("", 'a trace needs delays: write file = "delays.csv"')]
+            return [] if self.file else [Problem("", 'a trace needs delays: write file = "delays.csv"')]
         wrong = [
-            mistake
+            Problem(f"delays_s[{i}]", text)
             for i, delay_s in enumerate(self.delays_s)
-            for mistake in below(f"delays_s[{i}]", seconds("", delay_s, "a delay"))
+            if (text := DELAY.objection(delay_s, "s"))
         ]
         more = len(wrong) - MOST_SHOWN
-        return wrong[:MOST_SHOWN] + ([Mistake("delays_s", f"{more} more like these")] if more > 0 else [])
+        return wrong[:MOST_SHOWN] + ([Problem("delays_s", f"{more} more like these")] if more > 0 else [])

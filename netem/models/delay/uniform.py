@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from netem.models.delay.delay_model import RandomDelay
-from netem.netem_errors import Mistake, seconds
+from typing import Annotated
+
+from netem.models.delay.delay_model import DELAY, RandomDelay
+from wire.plausible import Unit
+from wire.table_schema import Problem
 
 
 class Uniform(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="uniform"):
     """Delay uniform on (low, high): F^-1(u) = low + u (high - low)."""
 
-    low_s: float
+    low_s: Annotated[float, Unit("s"), DELAY]
     """Shortest delay (s)."""
-    high_s: float
+    high_s: Annotated[float, Unit("s"), DELAY]
     """Longest delay (s)."""
 
     def quantile(self, u: float) -> float:
@@ -22,10 +25,10 @@ class Uniform(RandomDelay, frozen=True, kw_only=True, forbid_unknown_fields=True
         """Share up to a delay (s)."""
         return min(max((delay_s - self.low_s) / (self.high_s - self.low_s), 0.0), 1.0)
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = seconds("low_s", self.low_s, "a delay") + seconds("high_s", self.high_s, "a delay")
-        if not found and self.low_s >= self.high_s:
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        found = []
+        if self.low_s >= self.high_s:
             text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
-            found.append(Mistake("low_s", text))
-        return found + self._wrong_correlation()
+            found.append(Problem("low_s", text))
+        return found

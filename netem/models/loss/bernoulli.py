@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from netem.draws import Stream
 from netem.models.loss.loss_model import LossModel, Lost
-from netem.netem_errors import Mistake, probability
+from wire.plausible import Probability
 
 
 class Bernoulli(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="bernoulli"):
     """Loss with probability p; in a file `loss = 0.02` says the same."""
 
-    p: float
+    p: Annotated[float, Probability("a loss")]
     """Probability of loss."""
 
     @property
@@ -32,7 +34,3 @@ class Bernoulli(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True
         """Draw one number a message, without a chain."""
         uniform, p = stream.uniform, self.p
         return lambda seq: uniform(seq) < p
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        return probability("p", self.p, "a loss")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from netem.models.loss.loss_model import LossModel
-from netem.netem_errors import Mistake, probability
+from wire.plausible import Probability
+from wire.table_schema import Problem
 
 
 class GilbertElliott(
@@ -22,13 +25,13 @@ class GilbertElliott(
     Elliott, Bell System Technical Journal 42 (1963) 1977-1997. https://doi.org/10.1002/j.1538-7305.1963.tb00955.x
     """
 
-    p: float
+    p: Annotated[float, Probability("p (good to bad)")]
     """Probability of going from good to bad, from one message to the next."""
-    r: float
+    r: Annotated[float, Probability("r (bad to good)", above_zero=True)]
     """Probability of going from bad to good; a bad time lasts 1/r messages on average."""
-    loss_good: float = 0.0
+    loss_good: Annotated[float, Probability("loss_good")] = 0.0
     """Probability of loss in the good state (`tc netem`: 1 - k)."""
-    loss_bad: float = 1.0
+    loss_bad: Annotated[float, Probability("loss_bad")] = 1.0
     """Probability of loss in the bad state (`tc netem`: 1 - h)."""
 
     @property
@@ -47,13 +50,10 @@ class GilbertElliott(
         """Good, bad."""
         return (self.loss_good, self.loss_bad)
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = probability("p", self.p, "p (good to bad)")
-        found += probability("r", self.r, "r (bad to good)", above_zero=True)
-        found += probability("loss_good", self.loss_good, "loss_good")
-        found += probability("loss_bad", self.loss_bad, "loss_bad")
-        if not found and self.loss_good > self.loss_bad:
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        found = []
+        if self.loss_good > self.loss_bad:
             text = f"{self.loss_good:g} is above loss_bad = {self.loss_bad:g}; swap them: the bad state loses more"
-            found.append(Mistake("loss_good", text))
+            found.append(Problem("loss_good", text))
         return found

@@ -13,7 +13,6 @@ import msgspec
 
 from netem.draws import Stream
 from netem.models.chain import Chain
-from netem.netem_errors import Mistake
 
 Lost = Callable[[int], bool]
 """From a message number to whether that message is lost."""
@@ -60,10 +59,6 @@ class LossModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             return probability > 0.0 and (probability >= 1.0 or uniform(seq, _LOSS) < probability)
 
         return lost
-
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        raise NotImplementedError
 
 
 def _chosen(cumulated: tuple[float, ...], u: float) -> int:

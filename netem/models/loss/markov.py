@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from netem.models.loss.loss_model import LossModel
-from netem.netem_errors import Mistake, probability
+from wire.plausible import Probability
+from wire.table_schema import Problem
 
 
 class Markov(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="markov"):
@@ -22,15 +25,15 @@ class Markov(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, t
     implementation in the Netem module in the Linux kernel", University of Rome Tor Vergata, v3.1, 2012.
     """
 
-    p13: float
+    p13: Annotated[float, Probability("p13")]
     """Probability that a burst begins."""
-    p31: float
+    p31: Annotated[float, Probability("p31", above_zero=True)]
     """Probability that a burst ends."""
-    p32: float = 0.0
+    p32: Annotated[float, Probability("p32")] = 0.0
     """Probability that, within a burst, messages come through for a while."""
-    p23: float = 1.0
+    p23: Annotated[float, Probability("p23", above_zero=True)] = 1.0
     """Probability that the burst then goes on."""
-    p14: float = 0.0
+    p14: Annotated[float, Probability("p14")] = 0.0
     """Probability of a single loss between bursts."""
 
     @property
@@ -55,14 +58,12 @@ class Markov(LossModel, frozen=True, kw_only=True, forbid_unknown_fields=True, t
         """States 1 to 4."""
         return (0.0, 0.0, 1.0, 1.0)
 
-    def mistakes(self) -> list[Mistake]:
-        """Values that cannot be meant."""
-        found = probability("p13", self.p13, "p13") + probability("p31", self.p31, "p31", above_zero=True)
-        found += probability("p32", self.p32, "p32") + probability("p23", self.p23, "p23", above_zero=True)
-        found += probability("p14", self.p14, "p14")
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        found = []
         for first, second in (("p13", "p14"), ("p31", "p32")):
             both = getattr(self, first) + getattr(self, second)
-            if not found and both > 1.0:
+            if both > 1.0:
                 text = f"{first} and {second} leave the same state, so their sum is at most 1, got {both:g}"
-                found.append(Mistake(first, text))
+                found.append(Problem(first, text))
         return found

@@ -16,9 +16,6 @@ from wire.suggestion import suggestion
 
 LAWS = ("uniform", "loguniform", "choice")
 
-MOST_SAMPLES = 1_000_000
-"""Most samples of one sweep; more are a slip."""
-
 
 @dataclass(frozen=True)
 class Law:
@@ -73,12 +70,10 @@ def laws_of(axis: RandomAxis, mistakes: Mistakes) -> dict[str, Law]:
 
 def check_random(axis: RandomAxis, mistakes: Mistakes) -> None:
     """Samples and keys come together."""
-    if axis.keys and not 1 <= axis.samples <= MOST_SAMPLES:
-        mistakes.add("random.samples", f"must be from 1 to {MOST_SAMPLES} samples, got {axis.samples}")
+    if axis.keys and not axis.samples and not mistakes.touch("random.samples"):
+        mistakes.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
     elif axis.samples and not axis.keys:
         mistakes.add("random", "samples are asked for, but no key is drawn; write a table [random.keys]")
-    if axis.seed < 0:
-        mistakes.add("random.seed", f"must be 0 or more, got {axis.seed}")
 
 
 def of_laws(axis: RandomAxis, laws: Mapping[str, Law]) -> Axis:

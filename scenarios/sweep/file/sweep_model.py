@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
+
+from wire.plausible import Range
+from wire.table_schema import Example
 
 
 class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[random]`: keys that are drawn together, once per sample."""
 
-    samples: int = 0
+    samples: Annotated[int, Range(0, 1_000_000)] = 0
     """How many samples are drawn."""
-    seed: int = 1
+    seed: Annotated[int, Range(low=0)] = 1
     """Seed of the draws; it has nothing to do with the seed of the scenario."""
     method: Literal["latin-hypercube", "plain"] = "latin-hypercube"
     """How: "latin-hypercube" spreads each key's samples evenly over its law, "plain" draws them independently."""
@@ -23,9 +26,9 @@ class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 class GraphAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[graph]`: random connected communication graphs of all inverters, for every case of the sweep."""
 
-    links: tuple[int, ...] = ()
+    links: Annotated[tuple[int, ...], Example("[8, 12, 36]")] = ()
     """Numbers of links, e.g. [8, 12, 36]."""
-    per_count: int = 10
+    per_count: Annotated[int, Range(1, 10_000)] = 10
     """Different graphs for each number of links; fewer where there are no more."""
     seed: int = 1
     """Seed of the graphs. A graph depends on it, its number of links and its own number, and on nothing else here."""
@@ -40,11 +43,11 @@ class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """One line on what is studied."""
     scenario: str
     """What is varied: a scenario of the catalogue, or the path of a file, seen from this one."""
-    cases: tuple[str, ...] = ()
+    cases: Annotated[tuple[str, ...], Example('["IV"]')] = ()
     """Cases that are run for every sample; all when left out."""
-    seeds: int = 1
+    seeds: Annotated[int, Range(1, 10_000)] = 1
     """How many seeds every point is run with: the scenario's, and those that follow it."""
-    max_runs: int = 20_000
+    max_runs: Annotated[int, Range(low=1)] = 20_000
     """A sweep with more runs than this is refused as a slip; raise it when it is meant."""
     set: dict[str, Any] = {}
     """Table `[set]`: keys of the scenario that are other than there, the same in every run."""

@@ -17,7 +17,6 @@ from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.file_lookup import find_file
 from scenarios.spec.loading import read_toml
 from scenarios.spec.scenario_errors import Mistakes
-from scenarios.spec.scenario_reading import read_struct
 from scenarios.sweep.file import axes as of
 from scenarios.sweep.file.axes import Axis, check_graph, check_zip, of_graphs, of_values, values_of
 from scenarios.sweep.file.paths import PathError, Tree, flatten, steps
@@ -26,6 +25,7 @@ from scenarios.sweep.file.random_axis import Law, check_random, laws_of, of_laws
 from scenarios.sweep.file.samples import Samples
 from scenarios.sweep.file.sweep_model import Sweep
 from wire.suggestion import suggestion
+from wire.table_schema import problems_of
 
 
 def sweeps() -> tuple[str, ...]:
@@ -50,7 +50,7 @@ def read_sweep(name: str | Path) -> Plan:
     path = find_file(str(name), SWEEPS, "sweep")
     text, data = read_toml(path)
     mistakes = Mistakes(path.name, text)
-    sweep = read_struct(Sweep, data, mistakes)
+    sweep = mistakes.read(Sweep, data)
     laws = _check(sweep, mistakes)
     base, scenario, feeder = _base(sweep, path, mistakes)
     named = msgspec.structs.replace(sweep, name=sweep.name or path.stem)
@@ -111,10 +111,8 @@ def _plan(sweep: Sweep, text: str, laws: dict[str, Law], base: Base, mistakes: M
 
 def _check(sweep: Sweep, mistakes: Mistakes) -> dict[str, Law]:
     """What is wrong with the file by itself; the laws that it draws by."""
-    if not 1 <= sweep.seeds <= 10_000:
-        mistakes.add("seeds", f"must be from 1 to 10000 seeds, got {sweep.seeds}")
-    if sweep.max_runs < 1:
-        mistakes.add("max_runs", f"must be 1 or more, got {sweep.max_runs}")
+    for problem in problems_of(sweep):
+        mistakes.add(*problem)
     values_of(sweep.grid, "grid", mistakes)
     check_zip(values_of(sweep.zip, "zip", mistakes), mistakes)
     check_random(sweep.random, mistakes)

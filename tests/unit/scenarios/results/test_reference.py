@@ -7,15 +7,18 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.agent_config import Gains
+from agents.agent_config import Gains, Handling
 from gridpeers.cli.commands.show import Topic
+from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from netem.spec.netem_reading import ENTRIES
-from plant.plant_config import GflParameters, GfmParameters
+from netem.spec.node_fault import NodeFault
+from netem.spec.partition import Partition
+from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import field_docs
 from scenarios.results.reference import TOPICS, page
-from scenarios.spec.scenario_model import UNIT_OF_KEY, Case, Event, PlantTable, Processes, Scenario, Time, key_of
+from scenarios.spec.scenario_model import Case, Event, PlantTable, Processes, Scenario, Time
 from wire import keys, messages
+from wire.table_schema import fields_of
 
 DOCS = Path(__file__).parents[4] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (
@@ -37,13 +40,13 @@ def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
     assert [doc.name for doc in field_docs(cls) if not doc.text] == []
 
 
-@pytest.mark.parametrize("cls", list(UNIT_OF_KEY))
+@pytest.mark.parametrize("cls", [Gains, Handling, Protection, GfmParameters, GflParameters, SyncCheck])
 def test_the_unit_in_a_key_is_the_one_in_its_sentence(cls: type[msgspec.Struct]) -> None:
     """T_p_s is in seconds, and its docstring says so; what is in s, pu or Hz carries it in the key."""
     units = {doc.name: re.search(r"\((s|pu|Hz)\)", doc.text) for doc in field_docs(cls)}
 
-    for field in msgspec.structs.fields(cls):
-        unit = UNIT_OF_KEY[cls].get(field.name)
+    for field in fields_of(cls):
+        unit = field.key.removeprefix(f"{field.name}_") if field.key != field.name else None
         found = units[field.name]
         if unit is not None:
             expected = unit if found is None else found[1]
@@ -56,9 +59,9 @@ def test_every_key_of_a_scenario_is_on_its_page() -> None:
     """The page names each key with its unit; tables have sections of their own."""
     text = page("scenario")
 
-    for cls in (*TABLES, *ENTRIES.values()):
-        for field in msgspec.structs.fields(cls):
-            key = key_of(cls, field)
+    for cls in (*TABLES, Fault, Partition, NodeFault):
+        for field in fields_of(cls):
+            key = field.key
             if key == "own":
                 key = '"mine:Name"'
             if field.type is Netem:  # written as the entries, which have sections of their own

@@ -31,7 +31,10 @@ LINK = BASE + '\n[[link]]\non = "inv1 -> inv2"\n'
         (BASE + "\nx = \u202e\n", r"\x202e"),
         (BASE + '\n[protection]\ntrips = { "\\u001b" = [1, 1] }\n', r'no trip function "\x1b"'),
         (BASE.replace('"microgrid123"', f'"{"a" * 300}"'), "no such feeder"),
-        (LINK + 'delay = { model = "trace", file = "a\\u0000b" }\n', "there is no file"),
+        (
+            LINK + 'delay = { model = "trace", file = "a\\u0000b" }\n',
+            "file: has characters that cannot be printed",
+        ),
         (LINK + 'delay = { model = "trace", file = "/dev/zero" }\n', "it is no file"),
         (LINK + 'loss = { model = "markov", p13 = 1.0, p31 = 1e-320 }\n', "p31 is a probability above 0"),
     ],

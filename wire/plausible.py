@@ -1,0 +1,170 @@
+"""Units and ranges of numbers as annotations of a field, and what was probably meant by a number out of range. Pure.
+
+    T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
+
+`Range` bounds what a law can do with a number. `Plausible` bounds what makes sense: wide enough for every value that
+somebody might want to try, and too narrow for one that only a lost unit explains.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from wire.printable import printable
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit of a number, e.g. `Unit("1/s")`; without one it is a pure number or no number."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Range:
+    """Least and greatest value of a parameter, both allowed."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    def objection(self, value: Any, unit: str = "") -> str:
+        """Return why a value is no number within the range, "" if it is.
+
+        Examples
+        --------
+        >>> Range(0.0, 60.0).objection(70, "s")
+        'must be from 0 to 60 s, got 70'
+        """
+        shown = printable(str(value), 60)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return f"must be a number, got {shown}"
+        shown = f"{value:g}"
+        low, high = self.low, self.high
+        if not math.isfinite(value):
+            return f"must be a finite number, got {shown}"
+        if low <= value <= high:
+            return ""
+        bounds = f"from {low:g} to {high:g}" if math.isfinite(low + high) else f"at least {low:g}"
+        bounds = f"at most {high:g}" if math.isinf(low) else bounds
+        return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """Numbers that make sense, bounds included."""
+
+    what: str
+    """What the number is, with its article: the subject of the sentence."""
+    low: float
+    """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
+    high: float
+    """Highest value."""
+    above_zero: bool = False
+    """Whether zero makes no sense at all."""
+    hint: str | Callable[[float], str] = ""
+    """End of the sentence about a value that is not plausible, or a function from the value to it."""
+
+    def objection(self, value: float, unit: str = "") -> str:
+        """Return why a number cannot be right and what would be, "" if it can.
+
+        Examples
+        --------
+        >>> period, power = Plausible("a control period", 5e-4, 2.0, above_zero=True), Plausible("a power", 0.0, 1.2)
+        >>> period.objection(20.0, "s")
+        '20 s is not plausible for a control period (0.0005 to 2 s); did you mean 0.02 (20 ms)?'
+        >>> period.objection(-0.02, "s")
+        'a control period must be above 0, got -0.02 s; 0.0005 to 2 s makes sense'
+        >>> power.objection(64.7, "pu")
+        '64.7 pu is not plausible for a power (0 to 1.2 pu); did you mean 0.647 (64.7 %)?'
+        >>> power.objection(-0.1, "pu")
+        'a power must not be negative, got -0.1 pu; 0 to 1.2 pu makes sense'
+        >>> Plausible("a nominal voltage", 0.1, 150.0).objection(4160.0, "kV")
+        '4160 kV is not plausible for a nominal voltage (0.1 to 150 kV); did you mean 4.16 (4160 V)?'
+        """
+        text = f" {unit}" if unit else ""
+        span = f"{self.low:g} to {self.high:g}{text}"
+        try:
+            value = float(value)  # a whole number may be beyond any float
+        except OverflowError:
+            value = math.inf if value > 0 else -math.inf
+        hint = self.hint if isinstance(self.hint, str) else self.hint(value)
+        if not math.isfinite(value):
+            return f"{self.what} must be a finite number, got {value}; {span} makes sense{hint}"
+        if self.above_zero and value <= 0:
+            return f"{self.what} must be above 0, got {value:g}{text}; {span} makes sense{hint}"
+        if self.low == 0 and value < 0:
+            return f"{self.what} must not be negative, got {value:g}{text}; {span} makes sense{hint}"
+        if self.low <= value <= self.high:
+            return ""
+        return f"{value:g}{text} is not plausible for {self.what} ({span}){self._meant(value, unit) or hint}"
+
+    def _meant(self, value: float, unit: str) -> str:
+        for factor, other in _OTHER_UNITS.get(unit, ()):
+            if self.low <= value * factor <= self.high:
+                return f"; did you mean {value * factor:g} ({value:g} {other})?"
+        return "; it is per unit of the rating, neither kW nor V" if unit == "pu" and abs(value) > 100 else ""
+
+
+@dataclass(frozen=True)
+class Probability:
+    """A probability from 0 to 1."""
+
+    what: str
+    """What has the probability."""
+    above_zero: bool = False
+    """Whether 0 is none, as the number is divided by."""
+
+    def objection(self, value: float, unit: str = "") -> str:
+        """Return why a number is no such probability, "" if it is.
+
+        Examples
+        --------
+        >>> Probability("a loss").objection(30.0)
+        'a loss is a probability from 0 to 1, got 30; did you mean 0.3 (30 %)?'
+        """
+        if (LEAST if self.above_zero else 0.0) <= value <= 1.0:
+            return ""
+        bounds = "above 0 and up to 1" if self.above_zero else "from 0 to 1"
+        return f"{self.what} is a probability {bounds}, got {value:g}{in_percent(value)}"
+
+
+def in_percent(value: float) -> str:
+    """Return the end of a sentence about a number from 0 to 1 that was written in percent, "" if it was not."""
+    return f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
+
+
+LEAST = 1e-12
+"""Least probability that must be above 0: dividing by a smaller one leaves no number."""
+
+_OTHER_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
+    "s": ((1e-3, "ms"),),
+    "kW": ((1e-3, "W"), (1e3, "MW")),
+    "kvar": ((1e-3, "var"), (1e3, "Mvar")),
+    "kVA": ((1e-3, "VA"), (1e3, "MVA")),
+    "kV": ((1e-3, "V"),),
+    "m": ((1e3, "km"), (1e-3, "mm")),
+    "Hz": ((1e-3, "mHz"), (1e3, "kHz")),
+    "ohm/km": ((1e-3, "ohm/1000 km"), (1e3, "ohm/m")),
+    "pu": ((1e-2, "%"),),
+    "%": ((1e2, "pu"),),
+}
+"""By unit: factors that turn a number written in another unit into it."""
+
+
+def number_in(text: str) -> str:
+    """Return the end of a sentence that says what to write instead of a text with a unit, "" if it is none.
+
+    Examples
+    --------
+    >>> number_in("20 ms"), number_in("64.7%"), number_in("soon")
+    ('; write 0.02', '; write 0.647', '')
+    """
+    match = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(us|ms|s|%|pu|Hz|mHz)?\s*", text)
+    if match is None:
+        return ""
+    factor = {"us": 1e-6, "ms": 1e-3, "%": 1e-2, "mHz": 1e-3}.get(match[2] or "", 1.0)
+    return f"; write {float(match[1]) * factor:g}"

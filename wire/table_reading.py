@@ -1,0 +1,293 @@
+"""Convert the tables of a file to structs by their annotations, and collect every problem on the way. Pure."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import operator
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, TypeVar, get_args, get_origin
+
+import msgspec
+
+from wire.plausible import number_in
+from wire.suggestion import suggestion
+from wire.table_schema import INHERITED, INLINE, NO_KEY, Example, Field, OtherKeys, Problem, Shorthand, fields_of, named
+
+T = TypeVar("T", bound=msgspec.Struct)
+
+_UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
+_KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", "mHz", "Hz")
+_KIND_WORDS = {
+    float: "a number",
+    int: "a whole number",
+    str: "a text in quotes",
+    bool: "true or false",
+    dict: "a table",
+}
+
+
+def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Problem]]:
+    """Convert a file's tables to a struct.
+
+    Returns
+    -------
+    tuple[T, list[Problem]]
+        A key with a problem has its default, so that later checks find what else is wrong; the struct is of use only
+        without problems.
+
+    Examples
+    --------
+    >>> from netem.spec.netem import Netem
+    >>> netem, problems = read_table(Netem, {"link": [{"on": "* <-> *", "delay": "20 ms", "los": 0.1}]})
+    >>> for path, text in problems:  # doctest: +ELLIPSIS
+    ...     print(f"{path}: {text}")
+    link[0].los: unknown key; did you mean "loss"? The keys are on, from_s, to_s, profile, delay, loss, duplicate, ...
+    link[0].delay: must be a number or a table with a model, got "20 ms"; write 0.02
+    """
+    reader = _Reader(struct)
+    return reader.table(struct, data, ""), reader.problems
+
+
+def shown(raw: object) -> str:
+    """Return a value as TOML writes it, or nearly."""
+    return json.dumps(raw, ensure_ascii=False, default=str)
+
+
+class _Reader:
+    """Reads one file whose top table is `root`."""
+
+    def __init__(self, root: type[msgspec.Struct]) -> None:
+        self._root = root
+        self._top: dict[str, Any] = {}
+        self.problems: list[Problem] = []
+
+    def table(self, struct: type[T], data: Any, path: str, base: T | None = None) -> T:
+        """Convert one table; what it leaves out comes from `base`, without one from the defaults."""
+        fields = [field for field in fields_of(struct) if not ({INLINE, NO_KEY} & {*map(str, field.marks)})]
+        inline = [field for field in fields_of(struct) if INLINE in field.marks]
+        others = next((field for field in fields if field.mark(OtherKeys)), None)
+        keys = [field.key for field in fields if field is not others]
+        keys += [key for field in inline for key in _keys(field.type)]
+        values: dict[str, Any] = self._top if struct is self._root else {}
+        is_table = isinstance(data, Mapping)
+        if not is_table:
+            self._add(path, f"must be a table with the keys {', '.join(keys)}, got {shown(data)}")
+            data = {}
+        for field in inline:
+            values[field.name] = self.table(
+                field.type, {key: data[key] for key in _keys(field.type) if key in data}, path
+            )
+        if others is not None:
+            values[others.name] = ()
+        for key in data:
+            if others is not None and key not in keys and others.mark(OtherKeys).accepts(key):
+                found: list[Problem] = []
+                values[others.name] += others.mark(OtherKeys).read(key, data[key], found)
+                self.problems += [Problem(_join(path, problem.path), problem.text) for problem in found]
+            elif key not in keys and key != struct.__struct_config__.tag_field:
+                self._add(_join(path, key), self._unknown(key, struct, keys))
+        for field in fields:
+            if field is others:
+                continue
+            start = self._top.get(field.name) if INHERITED in field.marks else None
+            if field.key in data:
+                values[field.name] = self._value(field, data[field.key], _join(path, field.key), start)
+            elif base is not None or start is not None:
+                values[field.name] = getattr(base, field.name) if base is not None else start
+            elif not field.required:
+                values[field.name] = field.default
+            else:
+                if is_table:
+                    self._add(_join(path, field.key), f"is missing; {_expected(field)}")
+                values[field.name] = _placeholder(field.type)
+        return struct(**values)
+
+    def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
+        """Convert the value of one key; return the default for a wrong one."""
+        kind = _without_none(field.type)
+        structs = _structs(kind)
+        if structs == [kind]:
+            return self.table(kind, raw, path, base)
+        if structs and isinstance(raw, Mapping):
+            before, chosen = len(self.problems), self._chosen(structs, raw, path)
+            value = self.table(chosen, raw, path) if chosen else None
+            return value if len(self.problems) == before else _fallback(field)
+        if (inner := _inner_struct(kind, tuple)) is not None:
+            if isinstance(raw, list):
+                return tuple(self.table(inner, item, f"{path}[{i}]") for i, item in enumerate(raw))
+            self._add(path, f"must be written as [[{path}]], got {shown(raw)}")
+            return ()
+        if (inner := _inner_struct(kind, dict)) is not None:
+            if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
+                return {name: self.table(inner, item, f"{path}.{name}") for name, item in raw.items()}
+            self._add(path, f"must be written as tables [{path}.NAME], got {shown(raw)}")
+            return {}
+        try:
+            value = msgspec.convert(raw, kind)
+        except msgspec.ValidationError:
+            self._add(path, _wrong_type(field, raw))
+            return _fallback(field)
+        wrong = ""
+        if isinstance(value, str) and not value.isprintable():
+            wrong = f"has characters that cannot be printed: {value!a}; write letters, digits and signs"
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            shorthand = field.mark(Shorthand)
+            wrong = (named(shorthand.struct, shorthand.field) if shorthand else field).objection(value)
+            if not wrong and isinstance(value, float) and not math.isfinite(value):
+                wrong = f"must be a finite number, got {value}"
+        if wrong:
+            self._add(path, wrong)
+            return _fallback(field)
+        return value
+
+    def _chosen(self, structs: list[type[T]], raw: Mapping[str, Any], path: str) -> type[T] | None:
+        """Return the struct that a table names by its tag, after noting that it names none."""
+        if len(structs) == 1:
+            return structs[0]
+        tags = {str(struct.__struct_config__.tag): struct for struct in structs}
+        key = str(structs[0].__struct_config__.tag_field)
+        if key not in raw:
+            self._add(_join(path, key), f"is missing; write one of {', '.join(tags)}")
+        elif (tag := raw[key]) not in list(tags):
+            self._add(_join(path, key), f"there is no {shown(tag)}; {suggestion(str(tag), tags, f'{key}s')}")
+        else:
+            return tags[tag]
+        return None
+
+    def _unknown(self, key: str, struct: type, known: list[str]) -> str:
+        """Say what to write instead of an unknown key."""
+        bare, _, unit = key.rpartition("_")
+        for stem in [key] + ([bare] if unit in _KNOWN_UNITS else []):
+            for right, word in _UNIT_WORDS.items():
+                if f"{stem}_{right}" in known:
+                    return f"unknown key; write {stem}_{right}, {word}"
+            if stem != key and stem in known:
+                return f"unknown key; write {stem}"
+        if f"{key}s" not in known:
+            for where, table in _tables(self._root):
+                if table is not struct and key in _keys(table):
+                    return f"unknown key here; it belongs {where}"
+        return f"unknown key; {suggestion(key, known, 'keys')}"
+
+    def _add(self, path: str, text: str) -> None:
+        self.problems.append(Problem(path, text))
+
+
+def _tables(root: type[msgspec.Struct]) -> Iterator[tuple[str, type[msgspec.Struct]]]:
+    """Yield every table of a file with the words that say where it is, the outer ones first."""
+    yield "at the top of the file, before any table", root
+    below = [("", root)]
+    while below:
+        path, struct = below.pop(0)
+        for field in fields_of(struct):
+            kind, key = field.type, _join(path, field.key)
+            if INLINE in field.marks:
+                below.append((path, kind))
+            elif _structs(kind) == [kind]:
+                yield f"into [{key}]", kind
+                below.append((key, kind))
+            elif (inner := _inner_struct(kind, dict)) is not None:
+                yield f"into [{key}.NAME]", inner
+                below.append((f"{key}.NAME", inner))
+            elif (inner := _inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
+                yield f"into [[{key}]]", inner
+
+
+def _keys(struct: type[msgspec.Struct]) -> list[str]:
+    """Return the keys of a table."""
+    return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(OtherKeys))]
+
+
+def _without_none(kind: Any) -> Any:
+    """Return a type without None: TOML has no null."""
+    rest = [part for part in _parts(kind) if part is not types.NoneType]
+    return functools.reduce(operator.or_, rest)
+
+
+def _parts(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) in (types.UnionType, typing.Union) else (kind,)
+
+
+def _structs(kind: Any) -> list[Any]:
+    """Return the structs that a value may be."""
+    return [part for part in _parts(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
+
+
+def _inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
+    """Return the struct in a `tuple[Struct, ...]` or a `dict[str, Struct]`."""
+    if get_origin(kind) is not container:
+        return None
+    inner = get_args(kind)[1 if container is dict else 0]
+    return inner if _structs(inner) == [inner] else None
+
+
+def _wrong_type(field: Field, raw: Any) -> str:
+    kinds = _parts(_without_none(field.type))
+    literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
+    if literal is not None and isinstance(raw, str):
+        rest = [kind for kind in kinds if kind is not literal]
+        more = f"; or write {_named(rest, field)}" if rest else ""
+        choices = [choice for choice in get_args(literal) if choice]
+        return f"there is no {shown(raw)}; {suggestion(raw, choices, 'choices')}{more}"
+    hint = number_in(raw) if isinstance(raw, str) and {float, int} & {*kinds} else ""
+    return f"must be {_named(kinds, field)}, got {shown(raw)}{hint}"
+
+
+def _expected(field: Field) -> str:
+    """Say what to write for a key that is missing."""
+    kind, example = _without_none(field.type), field.mark(Example)
+    if get_origin(kind) is dict:
+        return f"write at least one table [{field.key}.NAME]"
+    if _structs(kind) == [kind]:
+        return f"write a table [{field.key}]"
+    if kind is str and example:
+        return f"write {field.key} = {example.text}"
+    return f"write {_named(_parts(kind), field)}"
+
+
+def _named(kinds: typing.Sequence[Any], field: Field) -> str:
+    """Name what a key takes, for people, with an example."""
+    example = field.mark(Example)
+    words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(_structs(kind))))
+    return " or ".join(words) + (f" such as {example.text}" if example else "")
+
+
+def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
+    """Name one type."""
+    origin = get_origin(kind)
+    if origin is Literal:
+        return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
+    if _structs(kind):
+        several = sum(bool(_structs(other)) for other in kinds) > 1
+        keys = f"a {kind.__struct_config__.tag_field}" if several else f"the keys {', '.join(_keys(kind))}"
+        return f"a table with {keys}"
+    if origin is tuple:
+        inner = get_args(kind)[0]
+        if inner in (int, float):
+            return "a list of numbers"
+        pairs = get_origin(inner) is tuple and Ellipsis not in get_args(inner)
+        return "a list of pairs" if pairs else "a list of lists" if get_origin(inner) is tuple else "a list"
+    return _KIND_WORDS.get(origin or kind, getattr(kind, "__name__", str(kind)))
+
+
+def _fallback(field: Field) -> Any:
+    """Return what stands for a wrong value while the rest is read."""
+    return _placeholder(field.type) if field.required else field.default
+
+
+def _placeholder(kind: Any) -> Any:
+    """Return something of a type; nobody sees it."""
+    kind = _parts(kind)[0]
+    if get_origin(kind) is Literal:
+        return get_args(kind)[0]
+    if _structs(kind):
+        return kind(**{field.name: _placeholder(field.type) for field in fields_of(kind) if field.required})
+    return (get_origin(kind) or kind)()
+
+
+def _join(path: str, key: str) -> str:
+    return f"{path}.{key}" if path else key
