@@ -6,7 +6,7 @@ IEEE Trans. Smart Grid 2022.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gridpeers.benchmarks import DIGITS, Published, Quantity
@@ -66,117 +66,97 @@ def tables_of(experiment: str) -> tuple[PaperTable, ...]:
     return tuple(table for table in TABLES if table.experiment == experiment)
 
 
-def _cells(
-    table: TableNumber,
-    columns: tuple[tuple[str, Quantity], ...],
-    rows: dict[str, tuple[float, ...]],
+def _table(
+    number: TableNumber,
+    experiment: str,
+    title: str,
+    columns: Iterable[tuple[str, Quantity]],
+    rows: Mapping[str, Sequence[float]],
+    *,
     island: bool = False,
-) -> Iterator[Cell]:
-    """Return the cells of a table with a row per case (or per island of case IV) and columns (event, quantity)."""
-    for row, numbers in rows.items():
-        for (event, quantity), paper in zip(columns, numbers, strict=True):
-            digits = 3 if (table, quantity) == ("III", "MQSI") else DIGITS[quantity]
-            case, of = ("IV", row) if island else (row, "")
-            yield Cell(
-                source=f"Table {table}",
-                table=table,
-                case=case,
-                event=event,
-                island=of,
-                quantity=quantity,
-                paper=paper,
-                digits=digits,
-                limit=TABLE[table, quantity].value,
-            )
+) -> PaperTable:
+    """Return a table with a row per case (or per island of case IV) and columns (event, quantity)."""
+    places = tuple(columns)
+    cells = tuple(
+        Cell(
+            source=f"Table {number}",
+            table=number,
+            case="IV" if island else row,
+            event=event,
+            island=row if island else "",
+            quantity=quantity,
+            paper=paper,
+            digits=3 if (number, quantity) == ("III", "MQSI") else DIGITS[quantity],
+            limit=TABLE[number, quantity].value,
+        )
+        for row, numbers in rows.items()
+        for (event, quantity), paper in zip(places, numbers, strict=True)
+    )
+    return PaperTable(number=number, experiment=experiment, title=title, cells=cells)
 
 
-def _of_events(*quantities: Quantity) -> tuple[tuple[str, Quantity], ...]:
-    return tuple((event, quantity) for event in ("event1", "event2") for quantity in quantities)
+def _columns(events: Sequence[str], *quantities: Quantity) -> tuple[tuple[str, Quantity], ...]:
+    return tuple((event, quantity) for event in events for quantity in quantities)
 
 
-_ALL: tuple[Quantity, ...] = ("f_error_Hz", "MPSI", "V_error", "MQSI")
-_CLOUDS: tuple[tuple[str, Quantity], ...] = tuple(
-    ("clouds", quantity) for quantity in ("MPSI", "f_error_Hz", "V_error", "MQSI")
-)
+_BOTH = ("event1", "event2")
 
 TABLES: tuple[PaperTable, ...] = (
-    PaperTable(
-        number="I",
-        experiment="islanding",
-        title="Frequency and power sharing after islanding and after loss of load",
-        cells=tuple(
-            _cells(
-                "I",
-                _of_events("f_error_Hz", "MPSI"),
-                {
-                    "I": (0.14, 0.00, 0.07, 0.00),
-                    "II": (0.08, 0.12, 0.00, 0.24),
-                    "III": (0.08, 0.12, 0.00, 0.24),
-                    "IV": (0.00, 0.00, 0.00, 0.00),
-                },
-            )
-        ),
+    _table(
+        "I",
+        "islanding",
+        "Frequency and power sharing after islanding and after loss of load",
+        _columns(_BOTH, "f_error_Hz", "MPSI"),
+        {
+            "I": (0.14, 0.00, 0.07, 0.00),
+            "II": (0.08, 0.12, 0.00, 0.24),
+            "III": (0.08, 0.12, 0.00, 0.24),
+            "IV": (0.00, 0.00, 0.00, 0.00),
+        },
     ),
-    PaperTable(
-        number="II",
-        experiment="islanding",
-        title="Voltage and var sharing after islanding and after loss of load",
-        cells=tuple(
-            _cells(
-                "II",
-                _of_events("V_error", "MQSI"),
-                {
-                    "I": (0.015, 0.22, 0.006, 0.30),
-                    "II": (0.001, 2.03, 0.000, 1.66),
-                    "III": (0.002, 1.77, 0.002, 1.07),
-                    "IV": (0.002, 0.04, 0.001, 0.05),
-                },
-            )
-        ),
+    _table(
+        "II",
+        "islanding",
+        "Voltage and var sharing after islanding and after loss of load",
+        _columns(_BOTH, "V_error", "MQSI"),
+        {
+            "I": (0.015, 0.22, 0.006, 0.30),
+            "II": (0.001, 2.03, 0.000, 1.66),
+            "III": (0.002, 1.77, 0.002, 1.07),
+            "IV": (0.002, 0.04, 0.001, 0.05),
+        },
     ),
-    PaperTable(
-        number="III",
-        experiment="intermittency",
-        title="Intermittency: available power of inverters 2, 5 and 8",
-        cells=tuple(
-            _cells(
-                "III",
-                _CLOUDS,
-                {
-                    f"{kW}kW": (MPSI, 0.00, 0.002, 0.004)
-                    for kW, MPSI in ((350, 0.00), (275, 0.07), (250, 0.11), (225, 0.15), (200, 0.20))
-                },
-            )
-        ),
+    _table(
+        "III",
+        "intermittency",
+        "Intermittency: available power of inverters 2, 5 and 8",
+        _columns(("clouds",), "MPSI", "f_error_Hz", "V_error", "MQSI"),
+        {
+            "350kW": (0.00, 0.00, 0.002, 0.004),
+            "275kW": (0.07, 0.00, 0.002, 0.004),
+            "250kW": (0.11, 0.00, 0.002, 0.004),
+            "225kW": (0.15, 0.00, 0.002, 0.004),
+            "200kW": (0.20, 0.00, 0.002, 0.004),
+        },
     ),
-    PaperTable(
-        number="IV",
-        experiment="communication",
-        title="Reduced communication and link failure",
-        cells=tuple(
-            _cells(
-                "IV",
-                tuple(("event1", quantity) for quantity in _ALL),
-                {
-                    "full": (0.00, 0.00, 0.002, 0.04),
-                    "reduced": (0.00, 0.00, 0.002, 0.14),
-                    "link-failure": (0.00, 0.00, 0.002, 0.05),
-                },
-            )
-        ),
+    _table(
+        "IV",
+        "communication",
+        "Reduced communication and link failure",
+        _columns(("event1",), "f_error_Hz", "MPSI", "V_error", "MQSI"),
+        {
+            "full": (0.00, 0.00, 0.002, 0.04),
+            "reduced": (0.00, 0.00, 0.002, 0.14),
+            "link-failure": (0.00, 0.00, 0.002, 0.05),
+        },
     ),
-    PaperTable(
-        number="V",
-        experiment="switching",
-        title="Microgrid switching: three islands",
-        cells=tuple(
-            _cells(
-                "V",
-                tuple(("event2", quantity) for quantity in _ALL),
-                dict.fromkeys(("inv1", "inv4", "inv7"), (0.00, 0.00, 0.000, 0.00)),
-                island=True,
-            )
-        ),
+    _table(
+        "V",
+        "switching",
+        "Microgrid switching: three islands",
+        _columns(("event2",), "f_error_Hz", "MPSI", "V_error", "MQSI"),
+        dict.fromkeys(("inv1", "inv4", "inv7"), (0.00, 0.00, 0.000, 0.00)),
+        island=True,
     ),
 )
 """The paper's tables."""

@@ -51,14 +51,14 @@ def draw_all(table: pa.Table, folder: Path) -> tuple[Path, ...]:
             if choice.map_of is not None:
                 x, y = choice.map_of
                 for case in choice.cases:
-                    figure = _heat_maps(choice, window, x, y, case)
+                    figure = heat_maps(choice, window, x, y, case)
                     drawn.append(_save(figure, folder, f"{window}_{x}_{y}_{case}"))
             for x in choice.alone:
-                drawn.append(_save(_curves(choice, window, x), folder, f"{window}_{x}"))
+                drawn.append(_save(curves(choice, window, x), folder, f"{window}_{x}"))
     return tuple(drawn)
 
 
-def _curves(choice: Choice, window: str, x: str) -> Figure:
+def curves(choice: Choice, window: str, x: str) -> Figure:
     """Draw every index of a window against one parameter, a curve for each case."""
     figure, panels = _page(choice.indexes[window])
     for panel, index in zip(panels, choice.indexes[window], strict=True):
@@ -103,7 +103,7 @@ def _bars(panel: Axes, spread: Spread, case: str, number: int, order: Sequence[A
     panel.set_xticks(range(len(order)), [str(value) for value in order], rotation=30, ha="right")
 
 
-def _heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure:
+def heat_maps(choice: Choice, window: str, x: str, y: str, case: str) -> Figure:
     """Draw median of every index of a window over two parameters."""
     figure, panels = _page(choice.indexes[window])
     rows = choice.rows(case)

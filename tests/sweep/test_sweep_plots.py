@@ -16,7 +16,7 @@ from scenarios.catalogue_files import CATALOGUE
 from scenarios.sweep.column_labels import label_of
 from scenarios.sweep.statistics import choose, spread_of, values
 from scenarios.sweep.sweep_case import FATE
-from scenarios.sweep.sweep_plots import _curves, _heat_maps, draw_all
+from scenarios.sweep.sweep_plots import curves, draw_all, heat_maps
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:
@@ -44,7 +44,7 @@ CHOICES: list[tuple[dict[str, list[Any]], list[str], tuple[str, str] | None]] = 
 def test_an_axis_shows_all_of_a_metric_of_somebodys_own() -> None:
     """0 neither flattens a frequency nor cuts off what is less; ours begin at 0, and their highest value is seen."""
     own = {"f_min_Hz": [59.7, 59.8], "slope": [-2.0, 1.0], "V_error": [0.00208, 0.00209]}
-    figure = _curves(choose(table({"a": [0.1, 0.2]}, **own)), "event1", "a")
+    figure = curves(choose(table({"a": [0.1, 0.2]}, **own)), "event1", "a")
 
     bounds = {panel.get_ylabel(): panel.get_ylim() for panel in figure.axes if panel.get_visible()}
     assert 59.0 < bounds["f_min (Hz)"][0] < 59.7
@@ -95,9 +95,9 @@ def test_rounding_is_not_drawn_as_structure() -> None:
     """What differs by 1e-16 lies flat at the foot of an axis, and has one colour in a map; 0.1 of MPSI is seen."""
     noise = [1e-16 * number for number in range(4)]
     swept = choose(table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
-    flat, seen = _curves(swept, "event1", "a").axes[:2]
+    flat, seen = curves(swept, "event1", "a").axes[:2]
     mapped = choose(table({"a": [1, 1, 2, 2], "b": [1, 2, 1, 2]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
-    plain, told = (axes.collections[0] for axes in _heat_maps(mapped, "event1", "a", "b", "IV").axes[:2])
+    plain, told = (axes.collections[0] for axes in heat_maps(mapped, "event1", "a", "b", "IV").axes[:2])
 
     assert flat.get_ylim() == (0.0, 0.01)
     assert seen.get_ylim()[1] > 0.1
