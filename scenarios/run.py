@@ -26,18 +26,16 @@ from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.claims import judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
-from scenarios.results.findings import find
 from scenarios.results.history import History, Plates
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
 from scenarios.results.link_records import LinkRecord
-from scenarios.results.metrics import messages_saved, windows
+from scenarios.results.measured_run import measure_run
+from scenarios.results.metrics import windows
 from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
-from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.agentless import with_agent
 from scenarios.spec.configs import configs
 from scenarios.spec.own_modules import claims_of
 from scenarios.spec.scenario_writing import to_toml
@@ -145,7 +143,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
     came = {case: as_they_came(scenario, record.events) for case, record in recorded.items()}
     events = came[list(came)[-1]]  # in wall-clock time each case has its own
-    found = find(scenario, request.feeder, plates, histories, came)
+    opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
+    found, saved = measure_run(scenario, request.feeder, plates, histories, opened, recorded)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
     compared = _compared(request, recorded)
     unlike = {
@@ -160,16 +159,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         for case, one in compared.items()
         if one.disturbed
     ]
-    opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
-    saved = {
-        case: messages_saved(
-            record.quiet, opened[case], len(with_agent(scenario, request.feeder, case)), scenario.time.T_c_s
-        )
-        for case, record in recorded.items()
-    }
     notes += [f"case {case}: {note}" for case, record in recorded.items() for note in _of_laws(record, saved[case])]
-    own = own_measures(scenario, request.feeder, plates, histories, opened, saved)
-    found = dataclasses.replace(found, own=own)
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
     if request.lasting:
         _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")

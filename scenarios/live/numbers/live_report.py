@@ -14,17 +14,15 @@ from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.findings import find_in
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
 from scenarios.results.joins_and_leaves import late_moves
-from scenarios.results.metrics import Window, messages_saved
+from scenarios.results.measured_run import measure_run
+from scenarios.results.metrics import Window
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
-from scenarios.spec.agentless import with_agent
 from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
@@ -59,17 +57,8 @@ class LiveReport:
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
         history, plates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
-        found = find_in({case: compared.opened.measured}, compared.happened, ran.feeder, plates, {case: history})
-        saved = messages_saved(
-            recorded.quiet,
-            compared.opened.measured,
-            len(with_agent(ran.scenario, ran.feeder, case)),
-            ran.scenario.time.T_c_s,
-        )
-        own = own_measures(
-            compared.happened, ran.feeder, plates, {case: history}, {case: compared.opened.measured}, {case: saved}
-        )
-        found = replace(found, own=own)
+        windows = {case: compared.opened.measured}
+        found, saved = measure_run(compared.happened, ran.feeder, plates, {case: history}, windows, {case: recorded})
         report = RunReport(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},
@@ -94,7 +83,7 @@ class LiveReport:
             by_hand["unrecorded"] = [window.label for window in compared.unrecorded]
         write_whole(
             ran.folder / "metrics.json",
-            metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand, saved={case: saved}),
+            metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand, saved=saved),
         )
         write_whole(ran.folder / "report.txt", plain(report))
 
