@@ -18,6 +18,7 @@ import msgspec
 from wire.plausible import Range, Unit
 from wire.printable import printable
 from wire.suggestion import suggestion
+from wire.table_reading import in_words
 
 REQUIRED = msgspec.NODEFAULT
 """Default of a parameter that must be given."""
@@ -151,7 +152,7 @@ def objections(cls: type, given: Mapping[str, Any]) -> list[tuple[str, str]]:
             if text := _objection(parameter, given[name]):
                 wrong.append((name, text))
         elif parameter.default is REQUIRED:
-            wrong.append((name, f"must be given, {_named(parameter.type)}"))
+            wrong.append((name, f"must be given, {in_words(parameter.type)}"))
     return wrong
 
 
@@ -177,18 +178,7 @@ def _objection(parameter: Parameter, value: Any) -> str:
     try:
         value = msgspec.convert(value, parameter.type)
     except msgspec.ValidationError:
-        return f"must be {_named(parameter.type)}, got {shown}"
+        return f"must be {in_words(parameter.type)}, got {shown}"
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return parameter.range.objection(value, parameter.unit)
     return ""
-
-
-def _named(kind: Any) -> str:
-    """Return a type in words."""
-    names = {float: "a number", int: "a whole number", bool: "true or false", str: "a text in quotes"}
-    if kind in names:
-        return names[kind]
-    choices = get_args(kind)
-    if choices and all(isinstance(choice, str) for choice in choices):
-        return "one of " + ", ".join(f'"{choice}"' for choice in choices)
-    return str(kind).removeprefix("typing.")

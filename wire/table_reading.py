@@ -252,8 +252,19 @@ def _expected(field: Field) -> str:
 def _named(kinds: typing.Sequence[Any], field: Field) -> str:
     """Name what a key takes, for people, with an example."""
     example = field.mark(Example)
+    return in_words(*kinds) + (f" such as {example.text}" if example else "")
+
+
+def in_words(*kinds: Any) -> str:
+    """Return types in words.
+
+    Examples
+    --------
+    >>> in_words(Literal["a", "b"], list[float])
+    'one of "a", "b" or a list of numbers'
+    """
     words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(_structs(kind))))
-    return " or ".join(words) + (f" such as {example.text}" if example else "")
+    return " or ".join(words)
 
 
 def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
@@ -265,7 +276,7 @@ def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
         several = sum(bool(_structs(other)) for other in kinds) > 1
         keys = f"a {kind.__struct_config__.tag_field}" if several else f"the keys {', '.join(_keys(kind))}"
         return f"a table with {keys}"
-    if origin is tuple:
+    if origin in (tuple, list):
         inner = get_args(kind)[0]
         if inner in (int, float):
             return "a list of numbers"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from plant.equipment import Feeder, InverterRow
 from plant.plant_config import Move
-from scenarios.spec.multiples import multiple
 from scenarios.spec.scenario_errors import Mistakes
 from scenarios.spec.scenario_model import Scenario
+from scenarios.spec.time_checks import multiple
 from wire.suggestion import suggestion
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 
 from plant.equipment import Feeder
-from scenarios.spec.multiples import divides, multiple
+from plant.trip_settings import DEFAULTS, defaults
 from scenarios.spec.scenario_errors import Mistakes
 from scenarios.spec.scenario_model import Scenario
 from wire.plugin import plugin_of
@@ -15,69 +14,17 @@ from wire.suggestion import suggestion
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
 
-PART_OF_T = 0.3
-"""Longest integration step, as a part of the inverters' shortest time constant: at 0.4 microgrid123 oscillates."""
+TRIPS = "protection.trips"
+
+LONGEST_CLEARING_TIME = 3600.0
+"""Longest clearing time (s)."""
 
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """What a run folder holds beside the folders of the cases."""
 
 
-def check_times(scenario: Scenario, mistakes: Mistakes) -> None:
-    """Every time of the scenario falls on the grid it belongs to, and events come in the order of time."""
-    time = scenario.time
-    paths = ["time.end_s", "time.record_s", *(f"event[{i}].t_s" for i in range(len(scenario.events)))]
-    read = {path for path in paths if not mistakes.touch(path)}  # a time off its grid is a time nevertheless
-    divides("time.h_s", time.h_s, "time.T_c_s", time.T_c_s, mistakes)
-    multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "", mistakes)
-    divides("time.record_s", time.record_s, "time.T_c_s", time.T_c_s, mistakes)
-    multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "", mistakes)
-    for i, event in enumerate(scenario.events):
-        path = f"event[{i}].t_s"
-        multiple(path, event.t_s, "time.h_s", time.h_s, "the step of the plant", mistakes)
-        if {path, "time.end_s"} <= read and event.t_s >= time.end_s:
-            mistakes.add(
-                path,
-                f'event "{event.label}" at {event.t_s:g} s does not come before the end at {time.end_s:g} s; '
-                "move it, or raise end_s",
-            )
-    for i, (first, second) in enumerate(pairwise(scenario.events)):
-        path, gap = f"event[{i + 1}].t_s", second.t_s - first.t_s
-        if not {f"event[{i}].t_s", path} <= read:
-            continue
-        if gap <= 0:
-            mistakes.add(
-                path,
-                f'event "{second.label}" at {second.t_s:g} s is written after "{first.label}" at {first.t_s:g} s; '
-                "write events in the order of time, and what happens at once as one event",
-            )
-        elif "time.record_s" in read and gap < 1.5 * time.record_s:
-            mistakes.add(
-                path,
-                f'event "{second.label}" follows "{first.label}" by {gap:g} s, so that no recorded row lies between '
-                f"them to measure; write them as one event, or lower record_s = {time.record_s:g} s",
-            )
-
-
-def check_step(scenario: Scenario, mistakes: Mistakes) -> None:
-    """The integration step resolves every time constant of the inverters; if not, the numbers ring or run away."""
-    gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
-    of = {("plant.gfm", name): getattr(gfm, name) for name in ("T_p", "T_q", "T_v")}
-    of |= {("plant.gfl", name): getattr(gfl, name) for name in ("T_ff", "T_pf", "T_vf", "T_qf")}
-    if gfl.model == "current_source":
-        of["plant.gfl", "T_if"] = gfl.T_if
-    (table, name), least = min(of.items(), key=lambda item: item[1])
-    most, h = PART_OF_T * least, scenario.time.h_s
-    if mistakes.touch("time.h_s", f"{table}.{name}_s") or h <= most * (1.0 + 1e-9):
-        return
-    mistakes.add(
-        "time.h_s",
-        f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}]: what it computes would ring; "
-        f"at most {most:g} s, {PART_OF_T:g} of the shortest time constant",
-    )
-
-
 def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
-    """Names can become folders, labels are unique, limits are in order."""
+    """Note names that cannot become folders, labels that are there twice, and limits out of order."""
     for path, name in [
         ("name", scenario.name),
         *((f"case.{case}", case) for case in scenario.cases),
@@ -111,7 +58,7 @@ def check_names(scenario: Scenario, mistakes: Mistakes) -> None:
 
 
 def check_start(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
-    """Every inverter can give its first set-point, else the start is no equilibrium and moves without an event."""
+    """Note a first set-point that an inverter cannot give: the start would be no equilibrium and move by itself."""
     plant = scenario.plant
     gfm, gfl, start = plant.gfm, plant.gfl, plant.P_set0_pu
     limits = {
@@ -156,7 +103,7 @@ def check_start(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
 
 
 def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistakes) -> None:
-    """Listed links join two known inverters, and are listed where the graph is "links"."""
+    """Note listed links that do not join two known inverters, and links listed for another graph than "links"."""
     for name, case in scenario.cases.items():
         if name in _RUN_FOLDER:
             mistakes.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
@@ -175,7 +122,7 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], mistakes: Mistak
 
 
 def check_events(scenario: Scenario, mistakes: Mistakes) -> None:
-    """Every event does something, and the cases name events that there are."""
+    """Note events that do nothing, and cases that name an event that there is not."""
     for i, event in enumerate(scenario.events):
         keys = ("open", "close", "leave", "join", "P_max_kW")
         if not any(getattr(event, key) for key in keys) and not mistakes.touch(*(f"event[{i}].{key}" for key in keys)):
@@ -196,7 +143,7 @@ def check_events(scenario: Scenario, mistakes: Mistakes) -> None:
 
 
 def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> None:
-    """Switches exist and are in the other position when an event operates them."""
+    """Note switches that there are not, and those that are in the position already into which an event brings them."""
     position = {switch.name: switch.closed for switch in feeder.switches}
     canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
     buses = {bus.name for bus in feeder.buses}
@@ -221,6 +168,39 @@ def check_switches(scenario: Scenario, feeder: Feeder, mistakes: Mistakes) -> No
                 position[switch] = closed
 
 
+def check_protection(scenario: Scenario, f_nom: float, mistakes: Mistakes) -> None:
+    """Note settings of unknown functions, on the wrong side of nominal, and second stages within their first."""
+    given = scenario.protection.trips
+    if mistakes.touch("protection", TRIPS):
+        return
+    names = DEFAULTS["III"]
+    for name, (threshold, time) in given.items():
+        if name not in names:
+            mistakes.add(TRIPS, f'no trip function "{name}"; {suggestion(name, names, "functions")}')
+            continue
+        nominal, unit = (f_nom, "Hz") if name[1] == "F" else (1.0, "pu")
+        low, high = (nominal, 2.0 * nominal) if name[0] == "O" else (0.0, nominal)
+        if not low < threshold < high:
+            mistakes.add(TRIPS, f"{name} must be between {low:g} and {high:g} {unit}, got {threshold:g} {unit}")
+        if not 0.0 < time <= LONGEST_CLEARING_TIME:
+            mistakes.add(
+                TRIPS,
+                f"{name}: the clearing time must be above 0 and at most {LONGEST_CLEARING_TIME:g} s, got {time:g} s",
+            )
+    if mistakes.touch(TRIPS) or scenario.protection.category == "off":
+        return
+    in_force = defaults(scenario.protection.category, f_nom) | given
+    for kind in ("OV", "UV", "OF", "UF"):
+        (first, _), (second, _) = in_force[f"{kind}1"], in_force[f"{kind}2"]
+        if second < first if kind[0] == "O" else second > first:
+            unit = "Hz" if kind[1] == "F" else "pu"
+            mistakes.add(
+                TRIPS,
+                f"{kind}2 = {second:g} {unit} must be farther from nominal than {kind}1 = {first:g} {unit}; "
+                f"set both, or leave {kind}2 as it is",
+            )
+
+
 def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, mistakes: Mistakes) -> None:
     if not mistakes.touch(f"{path}.{low_key}", f"{path}.{high_key}") and low >= high:
         mistakes.add(f"{path}.{low_key}", f"{low:g} must be below {high_key} = {high:g}; swap them or set both")
@@ -240,7 +220,7 @@ def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple
 
 
 def _unknown_switch(name: str, known: list[str], buses: set[str]) -> str:
-    """Say whether it is the switch or a bus that does not exist."""
+    """Return a sentence on a switch that does not exist, or whose bus does not."""
     ends = name.split("-")
     strange = [end for end in ends if end[:1].isdigit() and end not in buses]
     why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""

@@ -15,27 +15,25 @@ from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.spec.agent_schedule import check_moves, inverters_of
 from scenarios.spec.agentless import check_agentless
-from scenarios.spec.benchmark import check_benchmark, with_benchmark_folder
 from scenarios.spec.checks import (
     check_cases,
     check_events,
     check_names,
+    check_protection,
     check_start,
-    check_step,
     check_switches,
-    check_times,
 )
 from scenarios.spec.file_lookup import find_file
 from scenarios.spec.graph import check_graphs, with_graph_folders
 from scenarios.spec.law_choice import check_laws, with_law_folders
 from scenarios.spec.netem_tables import check_netem, with_delays
-from scenarios.spec.own_modules import check_own, with_own_folders
+from scenarios.spec.own_modules import check_benchmark, check_own, with_benchmark_folder, with_own_folders
 from scenarios.spec.power_limits import check_limits
-from scenarios.spec.protection_table import check_protection
 from scenarios.spec.scenario_changes import as_in, check_changes
 from scenarios.spec.scenario_errors import Mistakes, ScenarioError
 from scenarios.spec.scenario_model import AS_RUN, Scenario
 from scenarios.spec.supply import check_supply
+from scenarios.spec.time_checks import check_step, check_times
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""

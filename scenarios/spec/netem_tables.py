@@ -1,4 +1,4 @@
-"""The links and agents of a scenario that suffer: checked, and put together for one case."""
+"""The faults of links and agents in a scenario: checked, and put together for one case."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from wire.table_schema import Problem
 
 
 def netem_of(scenario: Scenario, case: str) -> Netem:
-    """What all links and agents do in a case: the scenario's entries, then the case's own, with the scenario's seed."""
+    """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
     common, own = scenario.netem, scenario.cases[case].netem
     return Netem(
         seed=scenario.seed,
@@ -34,7 +34,7 @@ def netem_of(scenario: Scenario, case: str) -> Netem:
 
 
 def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> Setup:
-    """What the processes are told of a case's faults: islands resolved, as the scenario's switches make them."""
+    """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
     if any(partition.by == "island" for partition in netem.partitions):
         netem = netem.over(_islands_over_time(scenario, feeder))
     microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
@@ -42,12 +42,12 @@ def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bo
 
 
 def deaths_of(netem: Netem) -> tuple[Move, ...]:
-    """Agents that die on schedule."""
+    """Return the agents that die on schedule."""
     return tuple(Move(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
 
 
 def _islands_over_time(scenario: Scenario, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
-    """From when on (s) each inverter stands in which island, named after the first bus in it."""
+    """Return from when on (s) each inverter stands in which island."""
     from plant.network import Network  # scipy: only for who parts by island
 
     network = Network(feeder)
@@ -64,12 +64,12 @@ def _islands_over_time(scenario: Scenario, feeder: Feeder) -> list[tuple[float, 
 
 
 def is_calm(netem: Netem) -> bool:
-    """Whether there is no entry at all."""
+    """Return whether there is no entry at all."""
     return not (netem.links or netem.partitions or netem.nodes)
 
 
 def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenario:
-    """The scenario with the delays of its trace files, which are seen from its folder."""
+    """Return the scenario with the delays of its trace files, whose paths start in its folder."""
 
     def read(netem: Netem, path: str) -> Netem:
         netem, wrong = with_traces(_with_folders(netem, folder), folder)
@@ -84,7 +84,7 @@ def with_delays(scenario: Scenario, folder: Path, mistakes: Mistakes) -> Scenari
 
 
 def _with_folders(netem: Netem, folder: Path) -> Netem:
-    """The entries with the folder of each fault of somebody's own that stands beside the file."""
+    """Return the entries with the folder of each user's fault that stands beside the file."""
     if not any(fault.own for fault in netem.links):
         return netem
     replace = msgspec.structs.replace
@@ -93,7 +93,7 @@ def _with_folders(netem: Netem, folder: Path) -> Netem:
 
 
 def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -> None:
-    """Links, groups and agents exist, values are plausible, and no two entries contradict each other.
+    """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
 
     Without a feeder, which could not be read, nobody's name is known, and the rest is checked.
     """
@@ -120,7 +120,7 @@ def check_netem(scenario: Scenario, feeder: Feeder | None, mistakes: Mistakes) -
 
 
 def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
-    """What a run asks of an entry beyond what it says by itself."""
+    """Return what a run asks of an entry beyond what it says by itself."""
     found = []
     ticks = node.from_s / T_c
     if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
@@ -138,7 +138,7 @@ def _add(wrong: list[Problem], path: str, mistakes: Mistakes) -> None:
 
 
 def _paths_in(common: Netem, case: str) -> Callable[[str], str]:
-    """From the path of an entry among all of a case to where it is written: behind the common ones come the own."""
+    """Return a function from the path of an entry among all of a case to where it is written."""
     before = {"link": len(common.links), "partition": len(common.partitions), "node": len(common.nodes)}
 
     def where(path: str) -> str:

@@ -1,4 +1,4 @@
-"""The keys `metrics` and `claims`: what a scenario's runs are measured and judged by, beside what every run is."""
+"""The keys `paper`, `metrics` and `claims`: by what a scenario's runs are measured and judged."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.results.benchmark_registry import CLAIMS
+from scenarios.results.benchmark_registry import BENCHMARKS, CLAIMS
 from scenarios.results.own.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.spec.plugins import check_plugin, placed
 from scenarios.spec.scenario_errors import Mistakes
@@ -78,3 +78,19 @@ def _placed_metric(key: PluginKey, folder: Path) -> PluginKey:
     if METRICS.reference(use) != use and "name" not in table and good_name(use):
         key = table | {"name": use}
     return placed(key, METRICS, folder)
+
+
+def with_benchmark_folder(scenario: Scenario, folder: Path) -> Scenario:
+    """Return the scenario with the folder of a benchmark that stands beside its file."""
+    return replace(scenario, paper=placed(scenario.paper, BENCHMARKS, folder)) if scenario.paper else scenario
+
+
+def check_benchmark(scenario: Scenario, mistakes: Mistakes) -> None:
+    """Note a benchmark that is not there.
+
+    One that is known by name is not imported before a run is judged: to read a scenario takes no numpy.
+    """
+    name = scenario.paper
+    if mistakes.touch("paper") or not name or (isinstance(name, str) and name in BENCHMARKS.names):
+        return
+    check_plugin("paper", name, BENCHMARKS, mistakes)
