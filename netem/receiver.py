@@ -21,6 +21,7 @@ from netem.spec.change import Change, Heal, changed, schedule_of
 from netem.spec.fault import Fault, Span
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
+from wire.messages import AnyMessage
 
 MOST_FAILURES = 8
 """Faults of somebody's own that failed and are told of in one report, which must not become too long."""
@@ -35,9 +36,11 @@ class Arrival(NamedTuple):
     src: str
     """Who sent it."""
     payload: bytes
-    """The message, with a flipped bit if it was corrupted."""
+    """Its bytes, with a flipped bit if the link has corrupted it."""
     delay: float
-    """By how much netem delayed it (s)."""
+    """The delay that netem added (s)."""
+    message: AnyMessage | None = None
+    """The message as it was offered; None if the link has corrupted it."""
 
 
 class _Special(NamedTuple):
@@ -51,7 +54,10 @@ class _Special(NamedTuple):
     held_until: float
 
 
-_Waiting = tuple[float, int, str, int, bytes, float, _Special | None]
+_Content = tuple[bytes, AnyMessage | None]
+"""A message as it came, and decoded."""
+
+_Waiting = tuple[float, int, str, int, _Content, float, _Special | None]
 """A copy of a message on its way: when it arrives (ns of run time), its number and sender, a number of its own so that
 no two are compared further, the message, its delay (s). A plain tuple, as it is made for every message."""
 
@@ -88,7 +94,7 @@ class Receiver:
     >>> receiver = Receiver("inv2", netem, {"inv1": "MG1", "inv2": "MG1"})
     >>> receiver.offer("inv1", seq=0, t=0.0, at=0.0, payload=b"state")
     >>> receiver.until, receiver.due(0.2), receiver.due(0.25)
-    (0.25, [], [Arrival(src='inv1', payload=b'state', delay=0.25)])
+    (0.25, [], [Arrival(src='inv1', payload=b'state', delay=0.25, message=None)])
     """
 
     def __init__(self, name: str, netem: Netem, microgrids: Mapping[str, str], *, keep_trace: bool = True) -> None:
@@ -119,7 +125,9 @@ class Receiver:
         """Whether the link from somebody has had a fault by t (s of run time), one that holds now included."""
         return any(span.from_s <= t + INSTANT for span in self._link(src).channel.schedule.spans)
 
-    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+    def offer(
+        self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None
+    ) -> None:
         """Judge a message.
 
         Parameters
@@ -133,14 +141,16 @@ class Receiver:
         at : float
             When it is here without faults (s of run time, on the receiver's clock); t in simulated time.
         payload : bytes
-            The message.
+            The message as it came.
+        message : AnyMessage, optional
+            The message decoded; `due` hands it on, so that nobody decodes it again.
         """
         inbound = self._links.get(src) or self._link(src)
         inbound.ledger.sent += 1
         if inbound.is_clear:
-            self._wait(inbound, src, seq, t, at, payload, 0.0, None)
+            self._wait(inbound, src, seq, t, at, (payload, message), 0.0, None)
         else:
-            self._judge(inbound, src, seq, t, at, payload)
+            self._judge(inbound, src, seq, t, at, (payload, message))
 
     def due(self, now: float) -> list[Arrival]:
         """What has arrived by `now` (s of run time), in the order of arrival; at one time, of number and sender."""
@@ -149,16 +159,16 @@ class Receiver:
             return []
         limit, arrived = round(now * NANO), []
         while heap and heap[0][0] <= limit:
-            _, _, src, _, payload, delay, special = heappop(heap)
+            _, _, src, _, (payload, message), delay, special = heappop(heap)
             ledger = self._links[src].ledger
             if special is not None and special.bit is not None:
                 ledger.corrupted += 1
-                sound, payload = payload, flip(payload, special.bit)
+                sound, payload, message = payload, flip(payload, special.bit), None
                 if special.checksum and crc32(payload) != crc32(sound):
                     ledger.dropped["checksum"] += 1
                     continue
             ledger.delivered += 1
-            arrived.append(Arrival(src, payload, delay))
+            arrived.append(Arrival(src, payload, delay, message))
         return arrived
 
     @property
@@ -199,22 +209,22 @@ class Receiver:
                 kept = self._take_kept(src, t)
                 channel.reschedule(schedule, rewind=bool(kept))
                 inbound.is_clear = channel.is_clear
-                for seq, payload, special in kept:
-                    self._judge(inbound, src, seq, special.t, special.at, payload)
+                for seq, content, special in kept:
+                    self._judge(inbound, src, seq, special.t, special.at, content)
         return tuple(concerned)
 
-    def _take_kept(self, src: str, t: float) -> list[tuple[int, bytes, _Special]]:
+    def _take_kept(self, src: str, t: float) -> list[tuple[int, _Content, _Special]]:
         """Take back, to be judged anew, what a cut keeps beyond t: number, message and times."""
         found = []
         for waiting in (self._heap, self._kept):
             for entry in sorted(waiting):
-                _, seq, sender, _, payload, _, special = entry
+                _, seq, sender, _, content, _, special = entry
                 if sender == src and special is not None and special.held_until > t:
                     waiting.remove(entry)
                     if special.copy:
                         self._links[src].ledger.duplicated -= 1
                     else:
-                        found.append((seq, payload, special))
+                        found.append((seq, content, special))
         heapify(self._heap)
         if found:
             self._links[src].story = self._links[src].due = NEVER
@@ -262,15 +272,15 @@ class Receiver:
             self._links[src] = inbound
         return inbound
 
-    def _judge(self, inbound: _Inbound, src: str, seq: int, t: float, at: float, payload: bytes) -> None:
+    def _judge(self, inbound: _Inbound, src: str, seq: int, t: float, at: float, content: _Content) -> None:
         channel = inbound.channel
-        fate = channel.judge(seq, t, len(payload))
+        fate = channel.judge(seq, t, len(content[0]))
         inbound.ledger.note(seq, t, fate)
         held_until, checksum, copy = fate.held_until, channel.checksum, 0
         for delay, bit in fate.deliveries:
             plain = copy == 0 and bit is None and held_until == NEVER
             special = None if plain else _Special(copy, bit, checksum, t, at, held_until)
-            self._wait(inbound, src, seq, t, at, payload, delay, special)
+            self._wait(inbound, src, seq, t, at, content, delay, special)
             copy += 1  # noqa: SIM113  enumerate costs a tenth of a message
 
     def _wait(
@@ -280,7 +290,7 @@ class Receiver:
         seq: int,
         t: float,
         at: float,
-        payload: bytes,
+        content: _Content,
         delay: float,
         special: _Special | None,
     ) -> None:
@@ -291,7 +301,7 @@ class Receiver:
         """
         self._number += 1
         if delay == FOREVER:
-            self._kept.append((FOREVER, seq, src, self._number, payload, delay, special))
+            self._kept.append((FOREVER, seq, src, self._number, content, delay, special))
             return
         due: float = round((at + delay) * NANO)
         story = t + delay
@@ -299,4 +309,4 @@ class Receiver:
             if due < inbound.due:
                 due = inbound.due
             inbound.story, inbound.due = story, due
-        heappush(self._heap, (due, seq, src, self._number, payload, delay, special))
+        heappush(self._heap, (due, seq, src, self._number, content, delay, special))

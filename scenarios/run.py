@@ -28,6 +28,7 @@ from scenarios.results.claims import judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.history import History, Plates
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
+from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
 from scenarios.results.measured_run import measure_run
 from scenarios.results.metrics import windows
@@ -69,6 +70,8 @@ class Request(RunMetrics):
     driver: Driver
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
+    self_check: bool = False
+    """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
     lasting: bool = True
     """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
 
@@ -124,8 +127,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         links = LinkRecord(folder / case)
         plant, agents = _configs(request, case)
         recorded[case], outcome = _run_case(request, case, plant, agents, progress, links)
-        checked = _checked_links(plant.links, links, folder / case)
-        notes += [f"case {case}: {note}" for note in (*outcome.notes, *checked)]
+        accounts = _write_links(plant.links, links, folder / case, checked=request.self_check)
+        notes += [f"case {case}: {note}" for note in (*outcome.notes, *accounts)]
         links_sha256 |= {case: links.sha256} if links.counts else {}
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
@@ -204,14 +207,15 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, C
     }
 
 
-def _checked_links(links: str, record: LinkRecord, folder: Path) -> list[str]:
-    """Hold what emulated links did against what they were told; write it, and say what a reader must know of it."""
+def _write_links(links: str, record: LinkRecord, folder: Path, *, checked: bool) -> list[str]:
+    """Write the accounts of emulated links, with the self-check if it is asked for; return lines for the report."""
     if not record.counts:
         return []
-    from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
+    if not checked:
+        return LinkAccounts(record).write(folder)
+    from scenarios.results.link_self_check import self_check  # scipy.stats takes half a second to import
 
-    setup = Setup.of_text(links)
-    return LinkCheck(record, setup.netem, setup.microgrids).write(folder)
+    return LinkAccounts(record, self_check(record, Setup.of_text(links))).write(folder)
 
 
 def _run_case(

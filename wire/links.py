@@ -1,9 +1,9 @@
-"""What may stand between the wire and a core: emulated links, of which the cores know only this. Pure."""
+"""The interface between a node and the emulated links in front of it; `netem` has the real ones. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from wire.admission import Admission
 from wire.codec import RejectedError, RejectedMessages, decode
@@ -15,46 +15,58 @@ class Arrival(Protocol):
 
     @property
     def src(self) -> str:
-        """Who sent it."""
+        """The sender."""
         ...
 
     @property
     def payload(self) -> bytes:
-        """Its bytes, as the link left them."""
+        """The bytes, as the link left them."""
         ...
+
+    @property
+    def message(self) -> AnyMessage | None:
+        """The message as it was offered; None if the link has corrupted it."""
+        ...
+
+
+class CommandEffect(NamedTuple):
+    """What a command to links does."""
+
+    text: str
+    """The command in words, in one line; a heal names the links that it heals."""
+    receivers: tuple[str, ...]
+    """Receivers, in the whole run, of the links that it changes."""
+    changed: str
+    """The links here that it changes, "" if none."""
 
 
 class Links(Protocol):
     """All links into one receiver. Times are run time (s), on whichever clock the receiver uses throughout.
 
-    `netem` has the real one; without any (None) a core takes messages as they come.
+    Without any (None), a node takes messages as they come.
     """
 
     @property
     def clear(self) -> Set[str]:
-        """Senders whose messages `offer` is known not to take: asked of every message, so no call."""
+        """Senders whose messages `offer` is known not to take; an attribute, as it is read for every message."""
         ...
 
     @property
     def dropped(self) -> int:
-        """Messages that the links have lost, of all senders."""
+        """Number of messages that the links have lost, of all senders."""
         ...
 
-    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> bool:
-        """Take a message off the wire, unless nothing ever happens to messages from there; whether it was taken.
+    def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
+        """Take a message off the wire and return True; return False if no fault ever acts on its link.
 
         Parameters
         ----------
-        src : str
-            Who sent it.
-        seq : int
-            Its number, by which its fate is drawn.
-        t : float
-            When it was sent, for what the links do at certain times.
-        at : float
-            When it would be here if the link did nothing: now.
+        message : State or Measurement
+            The message. Its number finds its random numbers; its time decides which faults act on it.
         payload : bytes
-            The message.
+            The same message as it came, whose size counts, and which a link may corrupt.
+        at : float
+            Now: when the message arrives if the link does nothing.
         """
         ...
 
@@ -63,86 +75,77 @@ class Links(Protocol):
         ...
 
     def stalled(self, t: float) -> bool:
-        """Whether the receiver itself is to stand still at t (s of run time)."""
+        """Return whether the receiver itself is paused at t (s of run time)."""
         ...
 
-    def order(self, text: str, t: float) -> str:
-        """Change what the links do from t on, as a person said; which links changed, "" if none of those here.
+    def command(self, text: str, t: float) -> CommandEffect:
+        """Change what the links do to messages sent at t (s of run time) or later.
 
         Raises
         ------
         ValueError
-            If it is no order to links.
-        """
-        ...
-
-    def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
-        """Say an order that is to hold from t on for people, in one line; and whose links it changes: their receivers.
-
-        Raises
-        ------
-        ValueError
-            If it is no order to links, or none that can be meant.
+            If the text is no command to links, or its values are wrong; nothing has changed then.
         """
         ...
 
     def impaired(self, t: float) -> tuple[str, ...]:
-        """From whom links have a fault at t (s of run time)."""
+        """Return the senders whose links have a fault at t (s of run time)."""
         ...
 
-    def standing(self, t: float) -> bytes:
-        """How the links stand at t (s of run time), for who asked."""
+    def status(self, t: float) -> bytes:
+        """Return the status of all links at t (s of run time), encoded for the client that asked."""
         ...
 
     def restart(self) -> None:
-        """Begin anew, without what was ordered and what is on its way: the run's time starts from 0 again."""
+        """Forget all commands and all messages on their way: the run's time starts from 0 again."""
         ...
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
-        """Take out what the links did since last asked, for the record; the last time, something in any case."""
+        """Take out, for the record, what the links did since the last report; the last report is never empty."""
         ...
 
 
 def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
-    """Whether a message off the wire is of use at once; if not, it may come out of `arrived` later, or never.
+    """Return whether a message off the wire is of use at once; if not, `arrived` may yield it later.
 
-    An emulated link takes the message if it came over one. The state of an agent that stands still only keeps the
-    lock-step going: no link carries it, and nobody uses it.
+    An emulated link takes the message if it came over one. The state of a paused agent only keeps the lock-step going:
+    no link carries it, and no node uses it.
 
     Parameters
     ----------
     links : Links or None
         All links into the receiver.
     message, payload : State or Measurement, bytes
-        What came off the wire.
+        The message, decoded and as it came.
     at : float
         Now (s of run time, on the receiver's clock).
     who : Admission
-        Who speaks.
+        The epochs and numbers of all senders.
     """
     if isinstance(message, State) and message.idle:
         return False
-    if links is not None and message.sender not in links.clear:
-        taken = links.offer(message.sender, message.seq, message.t, at, payload)
-        return not taken and who.passes(message)
+    if links is not None and message.sender not in links.clear and links.offer(message, payload, at):
+        return False
     return who.passes(message)
 
 
 def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
-    """What the links have let through by now (s of run time) and is of use.
+    """Yield the messages that the links have let through by now (s of run time) and that are of use.
 
-    What they have garbled is counted and dropped; what was overtaken on the way, and what the dead once said, is only
-    dropped: links that delay do that to sound messages.
+    A corrupted message is decoded again, which its CRC-32 does not survive: it is counted and dropped. A message that
+    was overtaken on its way, or whose sender has gone, is only dropped: delays do that to sound messages.
     """
     if links is None:
         return
     for arrival in links.due(now):
-        try:
-            message = decode(arrival.payload)
-            if message.sender != arrival.src:
-                raise RejectedError("foreign", f"sender {message.sender}")
-        except RejectedError as rejected:
-            rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
-            continue
+        message = arrival.message
+        if message is None:
+            try:
+                message = decode(arrival.payload)
+                if message.sender != arrival.src:
+                    raise RejectedError("foreign", f"sender {message.sender}")
+            except RejectedError as rejected:
+                rejects.add(rejected.kind, f"the link from {arrival.src}", rejected.text)
+                continue
         if admission.passes(message):
             yield message

@@ -39,14 +39,14 @@ class LinkCommandReceiver:
         if self._links is None:
             return self._answer(order, ok=False, text="there are no emulated links to this agent")
         if order.seq == 0:
-            return self._answer(order, ok=True, text="", data=self._links.standing(t))
+            return self._answer(order, ok=True, text="", data=self._links.status(t))
         if order.seq > self._last + 1:
             return None
         if order.seq <= self._last:
             return self._answer(order, ok=True, text="done before")
         self._last = order.seq
         try:
-            return self._answer(order, ok=True, text=self._links.order(order.text, order.t))
+            return self._answer(order, ok=True, text=self._links.command(order.text, order.t).changed)
         except ValueError as error:
             return self._answer(order, ok=False, text=str(error))
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 class How(Pace, total=False):
     """How a run goes, beside its driver; `gridpeers.Scenario.run` says what the words mean."""
 
+    self_check: bool
     progress: Progress | None
     folder: str | Path | None
 
@@ -37,6 +38,7 @@ def run(
     cases: Iterable[str] | None,
     driver: Driver,
     *,
+    self_check: bool = False,
     progress: Progress | None = None,
     folder: str | Path | None = None,
     **pace: Unpack[Pace],
@@ -64,6 +66,7 @@ def run(
         scenario=spec,
         feeder=scenario.feeder,
         driver=driver,
+        self_check=self_check,
         folder=home.path,
         lasting=folder is not None,
         **pace,

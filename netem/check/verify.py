@@ -14,7 +14,7 @@ from netem.check.own_check import AS_IT_SAYS, added_by, check_own
 from netem.check.rows import Messages, Row, messages
 from netem.draws import Stream
 from netem.fault_schedule import GATES
-from netem.ledger import LinkCounts, LinkTrace
+from netem.ledger import LinkTrace
 from netem.spec.fault import Span
 from netem.spec.pattern import Link
 from wire.plugin import Plugin
@@ -38,27 +38,24 @@ class Report(NamedTuple):
     rows: tuple[Row, ...]
     """Every test, by link."""
     warnings: tuple[str, ...]
-    """One sentence for each that failed, and for each link whose accounts do not close."""
+    """One sentence for each that failed."""
 
 
 def verify(
     traces: Iterable[LinkTrace],
     spans: Mapping[Link, Sequence[Span]],
     seed: int,
-    counts: Mapping[Link, LinkCounts] | None = None,
 ) -> Report:
-    """Hold what links did against what they were told.
+    """Compare what links did with what is configured.
 
     Parameters
     ----------
     traces : Iterable[LinkTrace]
         Verdicts of all receivers, as they were taken.
     spans : Mapping[Link, Sequence[Span]]
-        What each link was told, without overlaps: `Netem.spans`, or after live changes `Schedule.flat`.
+        What is configured for each link, without overlaps: `Netem.spans`, or after live changes `Schedule.flat`.
     seed : int
         Seed of the run.
-    counts : Mapping[Link, LinkCounts], optional
-        Accounts of the links.
 
     References
     ----------
@@ -74,11 +71,7 @@ def verify(
         for finding in _findings(tuple(by_link.get(link, ())), span, spans[link], link, seed)
     ]
     judged = _holm(rows)
-    warnings = [_warning(row) for row in judged if row.ok is False]
-    for link, count in (counts or {}).items():
-        if not count.closes:
-            warnings.append(f"{link}: the account does not close: {count}")
-    return Report(tuple(judged), tuple(warnings))
+    return Report(tuple(judged), tuple(_warning(row) for row in judged if row.ok is False))
 
 
 def _warning(row: Row) -> str:

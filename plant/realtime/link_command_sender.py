@@ -69,8 +69,7 @@ class LinkCommandSender:
         ValueError
             If it is no command to links, or the run has no emulated links.
         """
-        said, receivers = self.links.told(text, t)
-        self.links.order(text, t)
+        said, receivers, _ = self.links.command(text, t)
         order = self._order(len(self._given) + 1, text, t, reply_to)
         self._given.append(order)
         self._publish(self._keys.telemetry, encode(order))
@@ -93,7 +92,7 @@ class LinkCommandSender:
         question = encode(self._order(0, "", t, reply_to))
         for name in names:
             self._publish(self._keys.order(name), question)
-        own = self.links.standing(t)
+        own = self.links.status(t)
         incarnation = self._incarnation
         self._pass_on(
             LinkAnswer(sender=PLANT, incarnation=incarnation, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)

@@ -15,8 +15,9 @@ from netem.spec.pattern import Link, links_among, parse
 from scenarios.emulation.emulation_config import Setup
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_descriptions import words
-from scenarios.emulation.link_reports import LinkStand, encode_stands, parts
-from wire.messages import PLANT
+from scenarios.emulation.link_reports import LinkStatus, encode_statuses, parts
+from wire.links import CommandEffect
+from wire.messages import PLANT, Measurement, State
 
 
 class _Spell(NamedTuple):
@@ -53,8 +54,9 @@ class EmulatedLinks:
             if node.slow_s or (node.pause and not setup.real_nodes):
                 self._spells.setdefault(node.name, []).append(_spell(node))
 
-    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes) -> bool:
-        """Take a message off the wire, unless nothing ever happens to those from there; see `Receiver.offer`."""
+    def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
+        """Take a message off the wire and return True; return False if no fault ever acts on its link."""
+        src, t = message.sender, message.t
         if not (src in self._spells or self._name in self._spells or self._receiver.touched(src)):
             self.clear.add(src)
             return False
@@ -67,7 +69,7 @@ class EmulatedLinks:
         for spell in self._spells.get(self._name, ()):
             if spell.since <= t < spell.until and math.isinf(spell.slow):
                 at += spell.until - t
-        self._receiver.offer(src, seq, t, at, payload)
+        self._receiver.offer(src, message.seq, t, at, payload, message)
         return True
 
     @property
@@ -86,47 +88,38 @@ class EmulatedLinks:
         spells = self._spells.get(self._name, ())
         return any(spell.since <= t < spell.until and math.isinf(spell.slow) for spell in spells)
 
-    def order(self, text: str, t: float) -> str:
-        """Do what a person ordered, from t on (s of run time); who is concerned, or nothing.
+    def command(self, text: str, t: float) -> CommandEffect:
+        """Change what the links do to messages sent at t (s of run time) or later.
 
         Raises
         ------
         ValueError
-            If it is no order.
+            If the text is no command to links, or its values are wrong; nothing has changed then.
         """
-        order = LinkCommand.of_text(text)
-        change = order.at(t)
-        links = [link.src for link in self._concerned(order, t) if link.dst == self._name]
-        self._changes.append(change)
-        if not links:
-            return ""
-        self.clear.clear()
-        if isinstance(change, Fault):
-            self._receiver.change(change, t)
-        else:
-            self._receiver.heal(change.on, t, change.kinds)
-        return f"{', '.join(links)} -> {self._name}"
-
-    def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
-        """Say an order that is to hold from t on in words, and who receives over links that it changes.
-
-        Raises
-        ------
-        ValueError
-            If it is no order, or has mistakes.
-        """
-        order = LinkCommand.of_text(text)
-        mistakes = order.mistakes(self._microgrids)
+        command = LinkCommand.of_text(text)
+        mistakes = command.mistakes(self._microgrids)
         if mistakes:
             raise ValueError("; ".join(f"{path}: {what}" for path, what in mistakes))
-        links = self._concerned(order, t)
-        return order.in_words(links), tuple(dict.fromkeys(link.dst for link in links))
+        links, change = self._concerned(command, t), command.at(t)
+        senders = [link.src for link in links if link.dst == self._name]
+        self._changes.append(change)
+        if senders:
+            self.clear.clear()
+            if isinstance(change, Fault):
+                self._receiver.change(change, t)
+            else:
+                self._receiver.heal(change.on, t, change.kinds)
+        return CommandEffect(
+            text=command.in_words(links),
+            receivers=tuple(dict.fromkeys(link.dst for link in links)),
+            changed=f"{', '.join(senders)} -> {self._name}" if senders else "",
+        )
 
-    def _concerned(self, order: LinkCommand, t: float) -> list[Link]:
-        """Links of the whole run that an order changes at t (s of run time): a heal those that have a fault then."""
-        pattern, netem = parse(order.on), self._setup.netem
+    def _concerned(self, command: LinkCommand, t: float) -> list[Link]:
+        """Return the links of the whole run that a command changes at t (s); a heal changes those that have a fault."""
+        pattern, netem = parse(command.on), self._setup.netem
         links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
-        if order.fault is not None:
+        if command.fault is not None:
             return links
         schedules = {link: schedule_of(link, netem, self._changes, self._microgrids) for link in links}
         return [link for link in links if schedules[link].at(t).active]
@@ -135,14 +128,14 @@ class EmulatedLinks:
         """From whom links have a fault at t (s of run time)."""
         return tuple(src for src in self._senders if self._receiver.holding(src, t))
 
-    def standing(self, t: float) -> bytes:
-        """How the links stand at t (s of run time) that do something, or once did: `LinkStand` of each sender."""
-        counts, stands = self._receiver.counts(), {}
+    def status(self, t: float) -> bytes:
+        """Return the `LinkStatus` at t (s of run time) of each link, by sender, that has or had a fault."""
+        counts, statuses = self._receiver.counts(), {}
         for src in self._senders:
             if self._receiver.was_impaired(src, t):
                 holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
-                stands[src] = LinkStand(holds=holds, counts=counts.get(src))
-        return encode_stands(stands)
+                statuses[src] = LinkStatus(holds=holds, counts=counts.get(src))
+        return encode_statuses(statuses)
 
     def restart(self) -> None:
         """Begin anew with what the scenario says: the run's time starts from 0 again."""

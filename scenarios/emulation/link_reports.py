@@ -22,7 +22,7 @@ class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Sentences on faults of somebody's own that failed since the last part."""
 
 
-class LinkStand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How a link stands while the run goes on."""
 
     holds: tuple[str, ...] = ()
@@ -31,10 +31,10 @@ class LinkStand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How its messages have fared so far; None if none was judged."""
 
 
-encode_stands = msgspec.msgpack.Encoder().encode
+encode_statuses = msgspec.msgpack.Encoder().encode
 """Bytes of the stands of a receiver's links, by sender."""
 
-decode_stands = msgspec.msgpack.Decoder(dict[str, LinkStand]).decode
+decode_statuses = msgspec.msgpack.Decoder(dict[str, LinkStatus]).decode
 """Stands of the bytes; msgspec.DecodeError if there are none."""
 
 encode_book = msgspec.msgpack.Encoder().encode

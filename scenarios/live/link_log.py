@@ -13,9 +13,9 @@ import msgspec
 from netem.spec.change import Change, replayed
 from netem.spec.netem import Netem
 from plant.equipment import Feeder
-from scenarios.emulation.emulation_config import Setup
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.run_address import UsageError
+from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
 from scenarios.results.run_files import shown, write_whole
 from scenarios.spec import Scenario
@@ -34,8 +34,6 @@ class LinkLog:
         As run, with its one case.
     feeder : Feeder
         Its feeder.
-    links : str
-        What the processes are told of links.
     folder : Path or None
         Where links.csv and links.json go; None for nowhere.
     replay : Path or None
@@ -48,12 +46,11 @@ class LinkLog:
         self,
         scenario: Scenario,
         feeder: Feeder,
-        links: str,
         folder: Path | None,
         replay: Path | None,
         by_the_way: Path | None,
     ) -> None:
-        self._scenario, self._feeder, self._setup = scenario, feeder, Setup.of_text(links)
+        self._scenario, self._feeder = scenario, feeder
         self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
         self._record = LinkRecord(folder)
         self._orders: dict[int, Change] = {}
@@ -82,10 +79,7 @@ class LinkLog:
         self._write_replay(t)
         told: list[str] = []
         if self._folder is not None and self.links_sha256:
-            from scenarios.results.link_check import LinkCheck  # scipy.stats takes half a second to import
-
-            check = LinkCheck(self._record, self._setup.netem, self._setup.microgrids, self.changes)
-            told += check.write(self._folder)
+            told += LinkAccounts(self._record).write(self._folder)
         file = self._replay or (self._by_the_way if self._orders else None)
         if file is not None:
             told.append(f"the links as they were: gridpeers run {shown(file)}")

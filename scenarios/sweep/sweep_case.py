@@ -23,10 +23,10 @@ from plant.feeder import Plant
 from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulation_config import Setup
 from scenarios.results import metrics
 from scenarios.results.history import History, Plates
 from scenarios.results.joins_and_leaves import as_they_came
+from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
 from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
@@ -65,7 +65,7 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     metric_warnings: str = ""
     """What of the scenario's own metrics has no value, and why; "" when all have."""
     link_warnings: str = ""
-    """What of the emulated links chance does not explain, and accounts that do not close; "" is as it should be."""
+    """Accounts of emulated links that do not close, and plugged-in faults that failed; "" if there are none."""
     measures: dict[str, float | None] = {}
     """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
     "event1.steady", 1 where all of them are steady values, else 0;
@@ -118,7 +118,7 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History 
         sha256=recorded.sha256,
         links_sha256=links.sha256 if links.counts else "",
         trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
-        link_warnings=_warnings(plant.links, links),
+        link_warnings=_warnings(links),
         measures=measures | _accounts(links),
     )
     return done, history
@@ -136,15 +136,10 @@ def _accounts(links: LinkRecord) -> dict[str, float | None]:
     }
 
 
-def _warnings(links: str, record: LinkRecord) -> str:
-    """Hold what emulated links did against what they were told, as every run does."""
-    if not record.counts:
-        return ""
-    from scenarios.results.link_check import LinkCheck  # scipy.stats takes longer to import than a run
-
-    setup = Setup.of_text(links)
-    check = LinkCheck(record, setup.netem, setup.microgrids)
-    return "; ".join((*check.warnings, *check.failures))
+def _warnings(record: LinkRecord) -> str:
+    """Return what is wrong with the accounts of emulated links, and which plugged-in faults failed."""
+    accounts = LinkAccounts(record)
+    return "; ".join((*accounts.warnings, *accounts.failures))
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:

@@ -20,10 +20,9 @@ FULL = Path("/dev/full")
     [
         command("--help"),
         command("run", "calm.toml", "--driver", "inprocess", "--out", "here"),
-        [sys.executable, "-m", "netem.tc"],
         [sys.executable, "-m", "netem.relay", "tcp/127.0.0.1:0", "tcp/127.0.0.1:1"],
     ],
-    ids=["help", "run", "netem.tc", "netem.relay"],
+    ids=["help", "run", "netem.relay"],
 )
 def test_output_that_cannot_be_written_is_told_in_one_line(words: list[str], tmp_path: Path) -> None:
     """Exit status 2, what could not be written and why, no traceback; a run's folder says why it is not whole."""

@@ -1,20 +1,13 @@
-"""Pairs of Zenoh sessions, and the time that each of many messages takes from the one to the other.
-
-As a process it measures a TCP and a UDP pair on a loopback that loses packets: in a network namespace of its own.
-"""
+"""Pairs of Zenoh sessions, and the time that each of many messages takes from the one to the other."""
 
 from __future__ import annotations
 
-import json
 import socket
-import sys
 from collections.abc import Callable
 from struct import pack, unpack_from
 from time import monotonic
 from types import TracebackType
 
-from netem.relay.faults import Faults
-from netem.tc import Impaired, steps_without_netem
 from wire.driver.inbox import Event, Inbox
 from wire.driver.session import Session
 
@@ -143,22 +136,3 @@ def measure(pairs: list[Pair], count: int, gap: float, over: Callable[[], object
     for pair in pairs:
         pair.greet()
     return [pair.times() for pair in pairs]
-
-
-def on_lossy_loopback(loss: float, count: int, gap: float) -> list[list[float]]:
-    """How long messages take over TCP and UDP on a loopback that loses packets; to be run where that hurts nobody."""
-    with Pair(free_endpoint("tcp")) as stream, Pair(free_endpoint("udp")) as datagrams:
-        for pair in (stream, datagrams):
-            pair.greet()
-        with Impaired("lo", steps_without_netem("lo", Faults(loss=loss))) as impaired:
-            return measure([stream, datagrams], count, gap, impaired.heal)
-
-
-def main(loss: str, count: str, gap: str) -> None:
-    """Print what was measured; a lost message is null."""
-    took = on_lossy_loopback(float(loss), int(count), float(gap))
-    print(json.dumps([[None if time == LOST else time for time in one] for one in took]))
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

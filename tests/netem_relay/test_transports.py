@@ -1,16 +1,8 @@
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
-from collections.abc import Iterator
-
-import pytest
 from scipy.stats import binom
 
 from netem.relay import Faults, Relay
-from netem.tc import steps_without_netem, try_out
 from tests.netem_relay.pair import LOST, Pair, free_endpoint, measure
 
 P = 0.02
@@ -58,33 +50,6 @@ def test_two_percent_loss_is_delay_on_tcp_and_loss_on_udp() -> None:
     # at the earliest the very next message tells of a loss: it is repeated after 5/4 of a round trip
     assert sorted(on_tcp)[round(0.99 * N)] >= way.delay + 1.25 * R
     assert later_than(way.delay + 1.25 * R, on_tcp) >= repeated * 0.9
-    assert FEWEST <= lost(on_udp) <= MOST
-
-
-@pytest.fixture
-def lossy_kernel() -> Iterator[list[str]]:
-    """What stands before a command to run it in a network namespace where packets can be lost."""
-    why = try_out(steps_without_netem("lo", Faults(loss=P)))
-    if why:
-        pytest.skip(f"this kernel loses no packets for us: {why}")
-    name = f"gppair{os.getpid()}"
-    subprocess.run(["ip", "netns", "add", name], check=True)
-    try:
-        subprocess.run(["ip", "-n", name, "link", "set", "lo", "up"], check=True)
-        yield ["ip", "netns", "exec", name]
-    finally:
-        subprocess.run(["ip", "netns", "delete", name], check=True)
-
-
-def test_two_percent_loss_in_the_kernel_does_the_same(lossy_kernel: list[str]) -> None:
-    """Where the kernel itself loses 2 % of the packets: TCP brings all, some late, UDP loses about 2 %."""
-    command = [*lossy_kernel, sys.executable, "-m", "tests.netem_relay.pair", str(P), str(N), str(GAP)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    on_tcp, on_udp = ([LOST if time is None else time for time in one] for one in json.loads(done.stdout))
-
-    assert lost(on_tcp) == 0
-    assert later_than(GAP / 2.0, on_tcp) >= FEWEST
     assert FEWEST <= lost(on_udp) <= MOST
 
 

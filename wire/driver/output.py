@@ -5,8 +5,8 @@ middle of a write would end the process too. So the write itself finds out, belo
 rich alike. What follows is one of two:
 
 - A command that exists for its output quits (`speaking`). If nobody reads, it does so without a word and with the exit
-  status that a shell gives for SIGPIPE; if it cannot be written, with one line on standard error. So do a relay and
-  faults set by tc: what they did to the network ends with them, and does not outlast whoever started them for it.
+  status that a shell gives for SIGPIPE; if it cannot be written, with one line on standard error. So does a relay: what
+  it did to the network ends with it, and does not outlast the process that started it.
 - A plant, an agent or a whole fleet goes on, and what it says is dropped. Its output is a log, and its work is to serve
   others. To leave as on SIGTERM would take an inverter off the network, or end the run for everybody, because somebody
   quit a pager: who wants that has `gridpeers stop`, `gridpeers down` and signals.

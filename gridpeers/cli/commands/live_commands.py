@@ -91,7 +91,7 @@ def _start(
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             replay = None if out is None else out / "replay.toml"
-            link_log = LinkLog(spec, feeder, config.links, kept.record, record, replay)
+            link_log = LinkLog(spec, feeder, kept.record, record, replay)
             if agents:
                 say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log)

@@ -58,6 +58,9 @@ def run(
     seed: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="Seed instead of the one in the scenario.")
     ] = None,
+    self_check: Annotated[
+        bool, typer.Option("--self-check", help="Test afterwards whether emulated links did what the scenario says.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
@@ -103,7 +106,7 @@ def run(
         fail([str(error)], BAD_INPUT)
 
     console = Console()
-    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder, **pace)
+    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder, self_check=self_check, **pace)
     try:
         with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from scenarios.emulation.link_reports import LinkStand
+from scenarios.emulation.link_reports import LinkStatus
 from scenarios.short_names import in_order
 from wire.messages import PLANT
 
 _HEAD = ("link", "sent", "delivered", "dropped", "now")
 
 
-def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStand]) -> str:
+def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStatus]) -> str:
     """One line for each link that is impaired now, one for all that once were.
 
     Parameters
@@ -25,7 +25,7 @@ def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStand]) 
 
     Examples
     --------
-    >>> print(links_text("lab", 2.0, {("inv1", "inv4"): LinkStand(holds=("loss 0.2",))}), end="")
+    >>> print(links_text("lab", 2.0, {("inv1", "inv4"): LinkStatus(holds=("loss 0.2",))}), end="")
     run lab   t = 2.00 s   1 link impaired
     link          sent  delivered  dropped  now
     inv1 -> inv4     0          0        0  loss 0.2
@@ -52,7 +52,7 @@ def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStand]) 
     return "\n".join(text) + "\n"
 
 
-def _counts(stand: LinkStand) -> tuple[str, str, str]:
+def _counts(stand: LinkStatus) -> tuple[str, str, str]:
     book = stand.counts
     if book is None:
         return "0", "0", "0"

@@ -26,7 +26,7 @@ from scenarios.drivers.fault_injector import FaultInjector
 from scenarios.emulation.emulated_links import EmulatedLinks
 from scenarios.emulation.emulation_config import Setup
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.emulation.link_reports import decode_stands
+from scenarios.emulation.link_reports import decode_statuses
 from scenarios.live.link_log import replay_of
 from scenarios.spec import load_scenario
 from scenarios.spec.netem_tables import netem_of, setup_of
@@ -37,7 +37,8 @@ from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
 from tests.unit.plant import test_realtime_plant as plant_side
 from wire.codec import decode
-from wire.messages import LinkAnswer, LinkOrder, Measurement
+from wire.links import CommandEffect
+from wire.messages import LinkAnswer, LinkOrder, Measurement, State
 
 SETUP = Setup(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
 CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
@@ -71,16 +72,13 @@ def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
     wire: list[LinkOrder] = []
 
     class Note:
-        def told(self, text: str, t: float) -> tuple[str, tuple[str, ...]]:
-            return text, ()
-
-        def order(self, text: str, t: float) -> str:
-            return text
+        def command(self, text: str, t: float) -> CommandEffect:
+            return CommandEffect(text, (), "")
 
     class Taking(Note):
-        def order(self, text: str, t: float) -> str:
+        def command(self, text: str, t: float) -> CommandEffect:
             taken.append(text)
-            return text
+            return super().command(text, t)
 
     def publish(key: str, payload: bytes) -> None:
         message = decode(payload)
@@ -175,9 +173,10 @@ def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> No
     fault = Fault(on="inv2 -> inv1", loss=0.5, from_s=2.0, to_s=3.0)
     links = EmulatedLinks("inv1", replace(SETUP, netem=Netem(links=(fault,))))
     for k in range(200):
-        links.offer("inv2", k, 0.02 * k, 0.02 * k, b"state")
+        state = State(sender="inv2", incarnation=1, seq=k, t=0.02 * k, P_set=0.0, V_set=277.0, Q=0.0)
+        links.offer(state, b"state", state.t)
 
-    assert [set(decode_stands(links.standing(t))) for t in (1.9, 2.0, 4.0)] == [set(), {"inv2"}, {"inv2"}]
+    assert [set(decode_statuses(links.status(t))) for t in (1.9, 2.0, 4.0)] == [set(), {"inv2"}, {"inv2"}]
 
 
 def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() -> None:

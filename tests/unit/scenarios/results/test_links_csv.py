@@ -4,12 +4,16 @@ import csv
 import tracemalloc
 from pathlib import Path
 
+import msgspec
+
+from netem.ledger import LinkCounts
 from netem.models.corrupt import Corrupt
 from netem.models.duplicate import Duplicate
 from netem.receiver import Receiver
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from scenarios.emulation.link_reports import parts
+from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import COLUMNS, LinkRecord
 from wire.messages import LinkReport
 
@@ -43,6 +47,18 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     assert found == expected
     assert any("passed, bit" in row["fate"] for row in rows)
     assert any("copy, bit" in row["fate"] for row in rows)
+
+
+def test_an_account_that_does_not_close_is_a_warning_of_every_run() -> None:
+    """The report tells of a message that is neither delivered nor dropped nor on its way, without any self-check."""
+    record = LinkRecord()
+    count = LinkCounts(sent=3, duplicated=0, delivered=1, dropped={"loss": 1}, corrupted=0, in_flight=0)
+    record.counts["inv1", "inv2"] = count
+
+    (warning,) = LinkAccounts(record).warnings
+    assert warning.startswith("inv1 -> inv2: the account does not close")
+    record.counts["inv1", "inv2"] = msgspec.structs.replace(count, in_flight=1)
+    assert not LinkAccounts(record).warnings
 
 
 def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path) -> None:
