@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -185,8 +185,9 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     clock_rate: float = 1.0
     """How fast the agent's own clock goes: 1.0001 gains 100 ppm. Wall-clock: it ticks so much more often; simulated: it
     takes a period for so much longer."""
-    links: str = ""
-    """What the links to this agent do to its messages, as text for whoever puts them before it; empty: nothing."""
+    links: dict[str, Any] = {}
+    """Emulated links to this agent: `scenarios.emulation.emulation_config` as a tree, as agents know no netem. Empty:
+    none."""
     max_age: float = MAX_AGE
     """A measurement that came longer ago than this (s of run time) is not used; wall-clock: nor an older state of a
     neighbour."""

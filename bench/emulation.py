@@ -17,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, befor
 
 import statistics
 from time import process_time
+from typing import Any
 
 import msgspec
 from machine import machine
@@ -25,7 +26,7 @@ from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.record import Recorder
 from scenarios.spec import load_scenario
 from scenarios.spec.configs import configs
@@ -44,20 +45,20 @@ def main() -> None:
     microgrids = {row.name: row.microgrid for row in feeder.inverters}
     end = scenario.time.end_s
 
-    def setup(*links: Fault) -> str:
-        return Setup(netem=Netem(links=links), microgrids=microgrids).to_text()
+    def setup(*links: Fault) -> dict[str, Any]:
+        return EmulationConfig(netem=Netem(links=links), microgrids=microgrids).to_tree()
 
     first, second = list(microgrids)[:2]
     never = Fault(on=f"{first} -> {second}", from_s=end + 1.0, delay=0.1)
     kinds = {
-        "plain, once more": "",
+        "plain, once more": {},
         "an empty setup": setup(),
         "a fault that never acts": setup(never),
         "delay on all links": setup(Fault(on="* <-> *", delay=0.1)),
         "delay, loss on all": setup(Fault(on="* <-> *", delay=0.1, loss=0.1)),
     }
 
-    def once(links: str) -> float:
+    def once(links: dict[str, Any]) -> float:
         plant, agents = configs(scenario, feeder, arguments.case)
         plant = msgspec.structs.replace(plant, links=links)
         agents = tuple(msgspec.structs.replace(agent, links=links) for agent in agents)
@@ -67,15 +68,15 @@ def main() -> None:
         assert not outcome.broke, outcome.broke
         return process_time() - began
 
-    once("")  # loads the compiled step
+    once({})  # loads the compiled step
     times: dict[str, list[float]] = {name: [] for name in kinds}
     fastest: dict[str, float] = dict.fromkeys(kinds, math.inf)
     plain: list[float] = []
     for i in range(arguments.rounds):
         names = list(kinds)[i % len(kinds) :] + list(kinds)[: i % len(kinds)]
-        before = once("")
+        before = once({})
         took = {name: once(kinds[name]) for name in names}
-        after = once("")
+        after = once({})
         base = 0.5 * (before + after)
         plain += [before, after]
         for name, value in took.items():

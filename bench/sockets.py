@@ -67,7 +67,7 @@ def on_lossy_loopback(loss: float, count: int) -> list[Times]:
 
 
 def by_kernel(loss: float, count: int) -> list[Times]:
-    """Return the times (s) as `on_lossy_loopback` measures them, in a network namespace of their own; needs root and iproute2."""
+    """Return the times (s) as `on_lossy_loopback` measures them, in a network namespace of their own; needs root."""
     name = f"gpsockets{os.getpid()}"
     subprocess.run(["ip", "netns", "add", name], check=True)
     try:

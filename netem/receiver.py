@@ -125,9 +125,7 @@ class Receiver:
         """Whether the link from somebody has had a fault by t (s of run time), one that holds now included."""
         return any(span.from_s <= t + INSTANT for span in self._link(src).channel.schedule.spans)
 
-    def offer(
-        self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None
-    ) -> None:
+    def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
         """Judge a message.
 
         Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -269,8 +269,9 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Longest wait for any agent (s)."""
     listen: tuple[str, ...]
     """Endpoints the plant listens on; the rendezvous of the run."""
-    links: str = ""
-    """What the links to the plant do to its messages, as text for whoever puts them before it; empty: nothing."""
+    links: dict[str, Any] = {}
+    """Emulated links to the plant: `scenarios.emulation.emulation_config` as a tree, as the plant knows no netem.
+    Empty: none."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
     recorders: tuple[str, ...] = ()
@@ -287,5 +288,5 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Wall-clock: how long (s) the plant waits for its agents before it starts without those that are missing."""
     strict: bool = False
     """Wall-clock: whether the run breaks when it cannot keep pace."""
-    handout: dict[str, str] = {}
-    """Wall-clock: of each inverter the JSON that an agent started by hand is given to start with."""
+    agent_configs: dict[str, dict[str, Any]] = {}
+    """Wall-clock: of each inverter the configuration, as a tree, with which an agent that joins a live run starts."""

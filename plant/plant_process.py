@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from time import monotonic, time_ns
 
+import msgspec
 from msgspec.structs import replace
 
 from plant.lockstep_plant import LockstepPlant
@@ -86,8 +87,8 @@ def run_plant(
             return f"plant: cannot start: {error}"
         for key in node.publications:
             session.prepare(key)
-        for name, text in config.handout.items():
-            session.answer(node.keys.config(name), text.encode())
+        for name, agent_config in config.agent_configs.items():
+            session.answer(node.keys.config(name), msgspec.json.encode(agent_config))
         gc.freeze()  # what was built stays: later collections need not look at it
         on_word(READY)
         try:

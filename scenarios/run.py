@@ -21,7 +21,7 @@ from plant.plant_config import PlantConfig
 from plant.realtime.pacer import sentence
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.claims import judge, judged
@@ -207,7 +207,7 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, C
     }
 
 
-def _write_links(links: str, record: LinkRecord, folder: Path, *, checked: bool) -> list[str]:
+def _write_links(links: Mapping[str, Any], record: LinkRecord, folder: Path, *, checked: bool) -> list[str]:
     """Write the accounts of emulated links, with the self-check if it is asked for; return lines for the report."""
     if not record.counts:
         return []
@@ -215,7 +215,7 @@ def _write_links(links: str, record: LinkRecord, folder: Path, *, checked: bool)
         return LinkAccounts(record).write(folder)
     from scenarios.results.link_self_check import self_check  # scipy.stats takes half a second to import
 
-    return LinkAccounts(record, self_check(record, Setup.of_text(links))).write(folder)
+    return LinkAccounts(record, self_check(record, EmulationConfig.of_tree(links))).write(folder)
 
 
 def _run_case(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from time import monotonic
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from netem.spec.node_fault import NodeFault
 from scenarios.drivers.children import Children
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 
 
 class ProcessFault(NamedTuple):
@@ -46,14 +46,14 @@ class FaultInjector:
 
     Parameters
     ----------
-    links : str
-        The configurations' text on links and nodes.
+    links : Mapping[str, Any]
+        The tree `links` of the plant's configuration.
     speed : float
         Run time per wall time (s/s).
     """
 
-    def __init__(self, links: str, speed: float) -> None:
-        setup = Setup.of_text(links) if links else None
+    def __init__(self, links: Mapping[str, Any], speed: float) -> None:
+        setup = EmulationConfig.of_tree(links) if links else None
         self._due = process_faults(setup.netem.nodes) if setup is not None and setup.real_nodes else []
         self._speed = speed
         self._offset: float | None = None

@@ -48,7 +48,7 @@ class Supervisor:
         self.children = Children()
         self._plant, self._agents, self._log_dir = plant, {config.name: config for config in agents}, log_dir
         self._on_exit, self._on_word, self._plant_command = on_exit, on_word, plant_command
-        self._faults = FaultInjector(plant.links if plant.clock == "wall" else "", plant.speed)
+        self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
         self._awaited: set[str] = set()
 
     def __enter__(self) -> Supervisor:

@@ -11,7 +11,7 @@ from wire.driver.process import main
 
 
 def run(config: AgentConfig) -> str:
-    """Take part in a run; why the agent could not go on, or nothing."""
+    """Take part in a run; return why the agent could not go on, or ""."""
     return run_agent(config, links_of)
 
 

@@ -1,80 +1,79 @@
-"""The emulated links in front of one core: netem's receiver, and what befalls the processes at both ends."""
+"""The emulated links in front of one node: netem's receiver, and pauses and slow computers at both ends."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from netem.receiver import Arrival, Receiver
 from netem.spec.change import Change, schedule_of
 from netem.spec.fault import Fault
 from netem.spec.node_fault import NodeFault
 from netem.spec.pattern import Link, links_among, parse
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_descriptions import words
-from scenarios.emulation.link_reports import LinkStatus, encode_statuses, parts
+from scenarios.emulation.link_reports import LinkStatus, encode_statuses, report_data
 from wire.links import CommandEffect
 from wire.messages import PLANT, Measurement, State
 
 
-class _Spell(NamedTuple):
+class _Interval(NamedTuple):
     """A time in which an agent does not work, or works slowly (s of run time)."""
 
     since: float
     until: float
     slow: float
-    """By how much longer it computes (s); infinite while it is paused."""
+    """Time (s) by which it computes longer; infinite while it is paused."""
+
+    def holds(self, t: float) -> bool:
+        return self.since <= t < self.until
 
 
 class EmulatedLinks:
-    """All links into one receiver; `wire.links.Links` says what the core wants of it.
+    """All links into one receiver, as `wire.links.Links` describes them, and the faults of the nodes at their ends.
 
     Parameters
     ----------
     name : str
         The receiver: an inverter, or the plant.
-    setup : Setup
+    config : EmulationConfig
         The run's faults.
     """
 
-    def __init__(self, name: str, setup: Setup) -> None:
-        self._name, self._microgrids, self._setup = name, setup.microgrids, setup
-        self._senders = tuple(src for src in (*setup.microgrids, PLANT) if src != name)
+    def __init__(self, name: str, config: EmulationConfig) -> None:
+        self._name, self._microgrids, self._config = name, config.microgrids, config
+        self._senders = tuple(src for src in (*config.microgrids, PLANT) if src != name)
         self.clear: set[str] = set()
         """Senders whose messages `offer` is known not to take."""
         self._dropped_before = 0
         self._begin()
-        self._spells: dict[str, list[_Spell]] = {}
-        self._paused: Counter[str] = Counter()
-        """Messages of each sender that it never sent, as it was paused: only the lock-step needed them."""
-        for node in setup.netem.nodes:
-            if node.slow_s or (node.pause and not setup.real_nodes):
-                self._spells.setdefault(node.name, []).append(_spell(node))
+        self._intervals: dict[str, list[_Interval]] = {}
+        for node in config.netem.nodes:
+            if node.slow_s or (node.pause and not config.real_nodes):
+                self._intervals.setdefault(node.name, []).append(_interval(node))
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""
         src, t = message.sender, message.t
-        if not (src in self._spells or self._name in self._spells or self._receiver.touched(src)):
+        if not (src in self._intervals or self._name in self._intervals or self._receiver.touched(src)):
             self.clear.add(src)
             return False
-        for spell in self._spells.get(src, ()):
-            if spell.since <= t < spell.until:
-                if math.isinf(spell.slow):
-                    self._paused[src] += 1
+        for interval in self._intervals.get(src, ()):
+            if interval.holds(t):
+                if math.isinf(interval.slow):  # a paused agent sends nothing: only the lock-step needed its message
                     return True
-                at += spell.slow
-        for spell in self._spells.get(self._name, ()):
-            if spell.since <= t < spell.until and math.isinf(spell.slow):
-                at += spell.until - t
+                at += interval.slow
+        for interval in self._intervals.get(self._name, ()):
+            if interval.holds(t) and math.isinf(interval.slow):
+                at += interval.until - t
         self._receiver.offer(src, message.seq, t, at, payload, message)
         return True
 
     @property
     def dropped(self) -> int:
-        """Messages that were lost here, since the process began: a restart does not bring them back."""
+        """Number of messages lost here since the process began: a restart does not bring them back."""
         return self._dropped_before + self._receiver.dropped
 
     def due(self, now: float) -> Sequence[Arrival]:
@@ -82,11 +81,8 @@ class EmulatedLinks:
         return self._receiver.due(now)
 
     def stalled(self, t: float) -> bool:
-        """Whether the receiver itself is paused at t (s of run time)."""
-        if not self._spells:
-            return False
-        spells = self._spells.get(self._name, ())
-        return any(spell.since <= t < spell.until and math.isinf(spell.slow) for spell in spells)
+        """Return whether the receiver itself is paused at t (s of run time)."""
+        return any(at.holds(t) and math.isinf(at.slow) for at in self._intervals.get(self._name, ()))
 
     def command(self, text: str, t: float) -> CommandEffect:
         """Change what the links do to messages sent at t (s of run time) or later.
@@ -117,7 +113,7 @@ class EmulatedLinks:
 
     def _concerned(self, command: LinkCommand, t: float) -> list[Link]:
         """Return the links of the whole run that a command changes at t (s); a heal changes those that have a fault."""
-        pattern, netem = parse(command.on), self._setup.netem
+        pattern, netem = parse(command.on), self._config.netem
         links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
         if command.fault is not None:
             return links
@@ -125,7 +121,7 @@ class EmulatedLinks:
         return [link for link in links if schedules[link].at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
-        """From whom links have a fault at t (s of run time)."""
+        """Return the senders whose links have a fault at t (s of run time)."""
         return tuple(src for src in self._senders if self._receiver.holding(src, t))
 
     def status(self, t: float) -> bytes:
@@ -138,29 +134,29 @@ class EmulatedLinks:
         return encode_statuses(statuses)
 
     def restart(self) -> None:
-        """Begin anew with what the scenario says: the run's time starts from 0 again."""
+        """Forget all commands and all messages on their way: the run's time starts from 0 again."""
         self._dropped_before = self.dropped
         self._begin()
 
     def _begin(self) -> None:
-        setup = self._setup
+        config = self._config
         self.clear.clear()
         self._changes: list[Change] = []
-        """What was ordered so far, whomever it concerns."""
-        self._receiver = Receiver(self._name, setup.netem, setup.microgrids, keep_trace=setup.keep_trace)
+        """The commands so far, to whichever links."""
+        self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
-        """Take out what the links did since last asked, as parts of a `LinkBook`; none if nothing was ever judged."""
+        """Take out what the links did since the last report, as encoded `LinkReportData`; the last is never empty."""
         receiver, counts = self._receiver, self._receiver.counts()
         if not last and not any(book.sent for book in counts.values()):
             return ()
-        return parts(receiver.take_trace(), counts, receiver.trace_sha256, receiver.take_failures())
+        return report_data(receiver.take_trace(), counts, receiver.trace_sha256, receiver.take_failures())
 
 
-def _spell(node: NodeFault) -> _Spell:
-    return _Spell(node.from_s, math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s)
+def _interval(node: NodeFault) -> _Interval:
+    return _Interval(node.from_s, math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s)
 
 
-def links_of(name: str, text: str) -> EmulatedLinks | None:
-    """The links of a process, as its configuration says; None if it says nothing of any."""
-    return EmulatedLinks(name, Setup.of_text(text)) if text else None
+def links_of(name: str, tree: Mapping[str, Any]) -> EmulatedLinks | None:
+    """Return the links to a node from the tree in its configuration; None if it has none."""
+    return EmulatedLinks(name, EmulationConfig.of_tree(tree)) if tree else None

@@ -11,7 +11,7 @@ from wire.driver.process import main
 
 
 def run(config: PlantConfig) -> str:
-    """Run the plant; why the run broke, or nothing."""
+    """Run the plant; return why the run broke, or ""."""
     return run_plant(config, make_links=links_of)
 
 

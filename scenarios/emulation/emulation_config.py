@@ -1,29 +1,33 @@
-"""What every process of a run with faults is told, as one text in its configuration."""
+"""The configuration of a run's emulated links and nodes, which every process of the run starts with."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import msgspec
 
 from netem.spec.netem import Netem
 
 
-class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The run's faults, and who stands where."""
+class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The run's faults, and the microgrids that their patterns name."""
 
     netem: Netem
     """All entries; a partition by island is resolved already."""
     microgrids: dict[str, str]
     """Microgrid of every inverter, spare ones too, in the order of their table."""
     real_nodes: bool = False
-    """Whether what befalls processes really does, as in wall-clock time; else it is emulated."""
+    """Whether processes are really killed and paused, as in wall-clock time; else that is emulated."""
     keep_trace: bool = True
     """Whether every verdict is reported, not only their counts and their hash."""
 
-    def to_text(self) -> str:
-        """As it stands in a configuration."""
-        return msgspec.json.encode(self).decode()
+    def to_tree(self) -> dict[str, Any]:
+        """Return it as the tree `links` of `AgentConfig` and `PlantConfig`, whose packages know no netem."""
+        tree: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
+        return tree
 
     @classmethod
-    def of_text(cls, text: str) -> Setup:
-        """From a configuration."""
-        return msgspec.json.decode(text, type=cls)
+    def of_tree(cls, tree: Mapping[str, Any]) -> EmulationConfig:
+        """Return the configuration in a tree; raise msgspec.ValidationError if the tree is none."""
+        return msgspec.convert(tree, type=cls)

@@ -1,4 +1,4 @@
-"""An order of a person to the links of a running run: as it travels, what is wrong with it, and in words."""
+"""A command to the emulated links of a live run: as it travels, its errors, and in words."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ EVERYTHING = "{*, plant} <-> {*, plant}"
 
 
 class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Either a fault or its end. When it begins to hold is said beside it; times in it do not count."""
+    """Either a fault or its end. The time from which it holds is sent beside it; times in it do not count."""
 
     fault: Fault | None = None
-    """What links shall do."""
+    """The fault that links get."""
     heal: Heal | None = None
-    """On which links what holds shall end."""
+    """The links whose faults end."""
     for_s: float | None = None
-    """For how long a fault holds (s of run time); without it, until it is healed."""
+    """Duration of the fault (s of run time); without it, it holds until it is healed."""
 
     @property
     def on(self) -> str:
-        """Which links."""
+        """Pattern of the links."""
         return self._change.on
 
     @property
     def _change(self) -> Change:
-        """The one of the two that is given."""
+        """The fault or the heal."""
         found = self.fault or self.heal
         if found is None or (self.fault and self.heal):
-            raise ValueError("an order is either a fault or a heal")
+            raise ValueError("a command to links is either a fault or a heal")
         return found
 
     def at(self, t: float) -> Change:
-        """What changes if it begins to hold at t (s of run time)."""
+        """Return the change of links if it holds from t (s of run time) on."""
         to_s = None if self.for_s is None else round(t + self.for_s, 9)
         times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
         return msgspec.structs.replace(self._change, **times)
 
     def mistakes(self, microgrids: Mapping[str, str]) -> list[Problem]:
-        """All that is wrong with it in a run of these inverters."""
+        """Return all its errors in a run of these inverters."""
         links = [Problem("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
         return links + self.wrong_values()
 
     def wrong_values(self) -> list[Problem]:
-        """Values that cannot be meant, in whatever run."""
+        """Return the errors of its values, which are errors in every run."""
         found: list[Problem] = []
         if self.fault is not None:
             found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).problems()
@@ -63,7 +63,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return found
 
     def __str__(self) -> str:
-        """As people are told.
+        """Return it in words.
 
         Examples
         --------
@@ -79,7 +79,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def in_words(self, impaired: Sequence[Link]) -> str:
-        """As people are told by whom it was given to, who knows which of its links have a fault when it begins to hold.
+        """Return it in words, given which of its links have a fault when it begins to hold.
 
         Examples
         --------
@@ -96,28 +96,28 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{_listed(impaired)}: healed"
 
     def to_text(self) -> str:
-        """As it travels."""
+        """Return it as it travels."""
         return msgspec.json.encode(self).decode()
 
     @classmethod
     def of_text(cls, text: str) -> LinkCommand:
-        """What has come; ValueError if it is no order."""
+        """Return the command in a text; raise ValueError if it is none."""
         try:
-            order = msgspec.json.decode(text, type=cls)
+            command = msgspec.json.decode(text, type=cls)
         except msgspec.DecodeError as error:
-            raise ValueError(f"no order to links: {error}") from None
-        if order.fault is not None and order.fault.own:  # else whoever reaches the run could have any module imported
-            raise ValueError("no order to links: a fault of your own is written in the scenario before the run")
-        order.on  # noqa: B018  that it is one of the two
-        return order
+            raise ValueError(f"no command to links: {error}") from None
+        if command.fault is not None and command.fault.own:  # else anybody who reaches the run could import any module
+            raise ValueError("no command to links: a fault of your own is written in the scenario before the run")
+        command.on  # noqa: B018  checks that it is one of the two
+        return command
 
 
 MOST_NAMED = 8
-"""So many links are named; a partition of nine inverters hurts 36."""
+"""Links that are named at most; a partition of nine inverters affects 36."""
 
 
 def _listed(links: Sequence[Link]) -> str:
-    """Links for people, those that have a fault both ways as one."""
+    """Return links in words; those that have a fault both ways as one."""
     both = {link for link in links if Link(link.dst, link.src) in links}
     first = [link for link in links if link not in both or links.index(link) < links.index(Link(link.dst, link.src))]
     named = [f"{link.src} {'<->' if link in both else '->'} {link.dst}" for link in first]

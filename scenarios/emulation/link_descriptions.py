@@ -1,4 +1,4 @@
-"""What a link does, in few words."""
+"""Faults of links in words."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wire.plugin import Plugin
 
 
 def words(kind: str, model: Any) -> str:
-    """One fault for people: plain for those of one or two numbers, else the profile that has it, or its keys.
+    """Return a fault in words: plain if it has one or two numbers, else the profile that has it, or its keys.
 
     Parameters
     ----------

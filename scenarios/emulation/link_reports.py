@@ -1,4 +1,4 @@
-"""What the links into one receiver did, as it travels to the record."""
+"""What the links into one receiver report: verdicts and counts for the record, their status for clients."""
 
 from __future__ import annotations
 
@@ -9,57 +9,57 @@ from wire.bounds import Name, Text
 from wire.messages import LinkReport
 
 
-class LinkBook(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A part of a receiver's book."""
+class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The data of one `LinkReport`."""
 
     traces: tuple[LinkTrace, ...] = ()
-    """Verdicts since the last part."""
+    """Verdicts since the last report."""
     counts: dict[Name, LinkCounts] = {}
-    """Of each sender how its messages have fared so far."""
+    """Counts of the messages of each sender so far."""
     sha256: str = ""
     """Hash (hex) of all verdicts so far."""
     failures: tuple[Text, ...] = ()
-    """Sentences on faults of somebody's own that failed since the last part."""
+    """Sentences on plugged-in faults that have failed since the last report."""
 
 
 class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How a link stands while the run goes on."""
+    """The status of a link while the run goes on."""
 
     holds: tuple[str, ...] = ()
-    """What it does now, each fault in words."""
+    """The faults that it has now, each in words."""
     counts: LinkCounts | None = None
-    """How its messages have fared so far; None if none was judged."""
+    """Counts of its messages so far; None if none was judged."""
 
 
 encode_statuses = msgspec.msgpack.Encoder().encode
-"""Bytes of the stands of a receiver's links, by sender."""
+"""Encode the `LinkStatus` of a receiver's links, by sender."""
 
 decode_statuses = msgspec.msgpack.Decoder(dict[str, LinkStatus]).decode
-"""Stands of the bytes; msgspec.DecodeError if there are none."""
+"""Decode them; raise msgspec.DecodeError if the bytes are something else."""
 
-encode_book = msgspec.msgpack.Encoder().encode
-"""Bytes of a book."""
+encode_data = msgspec.msgpack.Encoder().encode
+"""Encode a `LinkReportData`."""
 
-_decode_book = msgspec.msgpack.Decoder(LinkBook).decode
+_decode_data = msgspec.msgpack.Decoder(LinkReportData).decode
 
 
-def book_of(report: LinkReport) -> LinkBook:
-    """The part of a receiver's book that is in a report; msgspec.DecodeError if it is none, or another's."""
-    book = _decode_book(report.data)
-    strangers = {trace.dst for trace in book.traces} - {report.sender}
+def data_of(report: LinkReport) -> LinkReportData:
+    """Return the data of a report; raise msgspec.DecodeError if they are not its sender's links."""
+    data = _decode_data(report.data)
+    strangers = {trace.dst for trace in data.traces} - {report.sender}
     if strangers:
         raise msgspec.ValidationError(f"{report.sender} reports of links to {', '.join(sorted(strangers))}")
-    return book
+    return data
 
 
 AT_ONCE = 1000
-"""Verdicts in one part: some 25 bytes each, so that a part is far below what a message may have."""
+"""Verdicts in one report: some 25 bytes each, so that a report is far below the longest message."""
 
 
-def parts(
+def report_data(
     traces: tuple[LinkTrace, ...], counts: dict[str, LinkCounts], sha256: str, failures: tuple[str, ...] = ()
 ) -> tuple[bytes, ...]:
-    """Cut a book into parts, none of them too long; the counts, the hash and what failed stand in the last one."""
+    """Return the encoded data of as many reports as are needed; the last one has the counts, hash and failures."""
     pieces = [
         LinkTrace(
             trace.src, trace.dst, trace.seq[i : i + AT_ONCE], trace.t[i : i + AT_ONCE], trace.outcome[i : i + AT_ONCE]
@@ -73,5 +73,5 @@ def parts(
             batches.append([])
         batches[-1].append(piece)
     *first, last = (tuple(batch) for batch in batches)
-    books = [LinkBook(traces=batch) for batch in first]
-    return tuple(map(encode_book, [*books, LinkBook(traces=last, counts=counts, sha256=sha256, failures=failures)]))
+    final = LinkReportData(traces=last, counts=counts, sha256=sha256, failures=failures)
+    return tuple(map(encode_data, [*(LinkReportData(traces=batch) for batch in first), final]))

@@ -83,7 +83,7 @@ def configure(
     case = chosen_case(scenario, options.case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
     # links are emulated even without a fault: gridpeers link may set one during the run
-    links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_text()
+    links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
     live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links}
     first = [agent for agent in agents if agent.name in plant.agents]
     everyone = tuple(
@@ -99,7 +99,7 @@ def configure(
         connect=beyond,
         wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
         strict=options.strict,
-        handout={agent.name: msgspec.json.encode(agent).decode() for agent in everyone},
+        agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
     )
     return plant, everyone
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from agents.agent_config import AgentConfig
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 
 
 def own_code(config: AgentConfig) -> tuple[str, ...]:
@@ -29,5 +29,5 @@ def _named(config: AgentConfig) -> Iterator[str]:
     if graph is not None and ":" in graph.use:
         yield f"the graph {graph.use}"
     if config.links:
-        for fault in Setup.of_text(config.links).netem.links:
+        for fault in EmulationConfig.of_tree(config.links).netem.links:
             yield from (f"the link fault {plugin.use}" for plugin in fault.own if ":" in plugin.use)

@@ -11,9 +11,9 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from agents.own_nameplate import check_nameplate
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_reports import LinkStand, decode_stands
+from scenarios.emulation.link_reports import LinkStatus, decode_statuses
 from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus
@@ -206,7 +206,7 @@ class LinkCommandResult:
         return bool(self.acknowledged or self.silent or self.absent or self.refused)
 
 
-def links_of_run(client: RunClient) -> tuple[Setup, AgentConfig]:
+def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
     """Return the emulated links of a run, and the configuration of one of its agents.
 
     Raises
@@ -216,13 +216,13 @@ def links_of_run(client: RunClient) -> tuple[Setup, AgentConfig]:
     """
     for config in configurations(client).values():
         if config.links:
-            return Setup.of_text(config.links), config
+            return EmulationConfig.of_tree(config.links), config
     raise NobodyError(
         f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
     )
 
 
-def check_link_command(command: LinkCommand, setup: Setup | None) -> None:
+def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
     """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
     problems: Iterable[Problem] = command.wrong_values() if setup is None else command.mistakes(setup.microgrids)
     options = [(path.partition(".")[0], text) for path, text in problems]
@@ -246,14 +246,14 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     )
 
 
-def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStand], tuple[str, ...]]:
+def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
     reply, answers = _request_links(client, "links", "")
-    found: dict[tuple[str, str], LinkStand] = {}
+    found: dict[tuple[str, str], LinkStatus] = {}
     for name, answer in answers.items():
         if answer.ok:
             try:
-                of_sender: dict[str, LinkStand] = decode_stands(answer.data)
+                of_sender: dict[str, LinkStatus] = decode_statuses(answer.data)
             except msgspec.DecodeError:  # counts as no answer
                 continue
             found |= {(src, name): state for src, state in of_sender.items()}

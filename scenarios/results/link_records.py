@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace, Outcome, combined
-from scenarios.emulation.link_reports import book_of
+from scenarios.emulation.link_reports import data_of
 from scenarios.results.run_files import write_whole
 from wire.messages import LinkReport
 
@@ -46,15 +46,15 @@ class LinkRecord:
     def __call__(self, report: LinkReport) -> None:
         """Take one part of a receiver's book."""
         try:
-            book = book_of(report)
+            data = data_of(report)
         except msgspec.DecodeError:
             self.garbled += 1
             return
-        self._keep(book.traces)
-        self.failures += book.failures
-        self.counts.update({(src, report.sender): counts for src, counts in book.counts.items()})
-        if book.sha256:
-            self._sha256[report.sender] = book.sha256
+        self._keep(data.traces)
+        self.failures += data.failures
+        self.counts.update({(src, report.sender): counts for src, counts in data.counts.items()})
+        if data.sha256:
+            self._sha256[report.sender] = data.sha256
 
     @property
     def traces(self) -> list[LinkTrace]:

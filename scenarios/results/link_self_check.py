@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from netem.check.verify import Report, verify
 from netem.spec.pattern import Link
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_records import LinkRecord
 from wire.messages import PLANT
 
 
-def self_check(record: LinkRecord, setup: Setup) -> Report:
+def self_check(record: LinkRecord, setup: EmulationConfig) -> Report:
     """Test every link of a case over which anything was sent; see `netem.check.verify`.
 
     Parameters
     ----------
     record : LinkRecord
         The verdicts and counts of all links.
-    setup : Setup
+    setup : EmulationConfig
         The faults that the case configures.
     """
     names = (*setup.microgrids, PLANT)

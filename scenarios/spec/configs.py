@@ -48,7 +48,7 @@ def configs(
     graph, own_graph = graph_of(rule)
     inverters, present = inverters_of(scenario, feeder), with_agent(scenario, feeder, case)
     netem = netem_of(scenario, case)
-    links = "" if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_text()
+    links = {} if is_calm(netem) else setup_of(netem, scenario, feeder, real_nodes=real_nodes).to_tree()
     rates = {node.name: node.skew.factor for node in netem.nodes if node.skew is not None}
     control = Control(
         secondary=rule.secondary,

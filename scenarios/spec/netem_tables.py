@@ -14,7 +14,7 @@ from netem.spec.node_fault import NodeFault
 from netem.spec.trace_file import with_traces
 from plant.equipment import Feeder
 from plant.plant_config import Move
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.plugins import placed_plugin
 from scenarios.spec.scenario_errors import Mistakes
@@ -33,12 +33,12 @@ def netem_of(scenario: Scenario, case: str) -> Netem:
     )
 
 
-def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> Setup:
+def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
     """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
     if any(partition.by == "island" for partition in netem.partitions):
         netem = netem.over(_islands_over_time(scenario, feeder))
     microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
-    return Setup(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
+    return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
 
 
 def deaths_of(netem: Netem) -> tuple[Move, ...]:

@@ -19,7 +19,7 @@ from netem.spec.change import replayed
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from netem.spec.pattern import Link
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from wire.plugin import Plugin, problems
 from wire.registry import PluginError
@@ -213,9 +213,9 @@ def test_a_run_with_one_can_be_replayed(folder: str) -> None:
 def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
     """A live order with a fault of somebody's own is no order; in the setup of a run it travels unharmed."""
     entry = fault(folder, "Jam")
-    setup = Setup(netem=Netem(links=(entry,)), microgrids={"inv1": "MG1"})
+    setup = EmulationConfig(netem=Netem(links=(entry,)), microgrids={"inv1": "MG1"})
 
-    assert Setup.of_text(setup.to_text()) == setup
+    assert EmulationConfig.of_tree(setup.to_tree()) == setup
     with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
         LinkCommand.of_text(LinkCommand(fault=entry).to_text())
 

@@ -19,7 +19,7 @@ from netem.spec.netem import Netem
 from netem.spec.node_fault import NodeFault
 from netem.spec.partition import Partition
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.results.link_records import LinkRecord
 from scenarios.spec import load_scenario
@@ -34,9 +34,9 @@ MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1", "inv4": "mg2"}
 T_C = 0.02
 
 
-def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition, ...]) -> Setup:
+def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition, ...]) -> EmulationConfig:
     """What processes of the toy run are told."""
-    return Setup(netem=Netem(seed=5, nodes=nodes, **netem), microgrids=MICROGRIDS, real_nodes=True)  # type: ignore[arg-type]
+    return EmulationConfig(netem=Netem(seed=5, nodes=nodes, **netem), microgrids=MICROGRIDS, real_nodes=True)  # type: ignore[arg-type]
 
 
 def verdicts(trace: LinkTrace) -> list[tuple[float, Outcome]]:
@@ -51,12 +51,12 @@ def fates(trace: LinkTrace) -> dict[int, tuple[float, Outcome]]:
     return dict(zip(trace.seq, verdicts(trace), strict=True))
 
 
-def simulated(told: Setup, end: float) -> dict[tuple[str, str], LinkTrace]:
+def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTrace]:
     """Verdicts of the toy run in simulated time."""
     links = LinkRecord()
     plant, agents = toy_configs(4, end=end)
-    plant = replace(plant, links=told.to_text())
-    agents = tuple(replace(agent, links=told.to_text()) for agent in agents)
+    plant = replace(plant, links=told.to_tree())
+    agents = tuple(replace(agent, links=told.to_tree()) for agent in agents)
     outcome = run_inprocess(plant, agents, lambda telemetry: None, on_links=links, plant=ToyPlant(plant))
     assert outcome.broke == ""
     return links.by_link()
@@ -88,7 +88,7 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
     And the schedule that replays them gives every message of the same number the same fate in simulated time.
     """
     told = setup()
-    with Town(4, tmp_path, links=told.to_text()).all() as town:
+    with Town(4, tmp_path, links=told.to_tree()).all() as town:
         orders = [
             LinkCommand(fault=Fault(on="inv1 -> inv2", loss=0.3, delay=Normal(mean_s=0.03, std_s=0.01))),
             LinkCommand(fault=Fault(on="inv3 <-> inv4", cut=True)),
@@ -149,7 +149,7 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
     parted = Partition(groups=(("inv2",), ("inv3", "inv4")), from_s=0.5, to_s=0.9)
     told = setup(links=faults, partitions=(parted,), nodes=nodes)
     plant, agents = toy_configs(4, end=3.0)
-    wall = {"clock": "wall", "links": told.to_text()}
+    wall = {"clock": "wall", "links": told.to_tree()}
     run, links = FleetRun(replace(plant, **wall), [replace(agent, **wall) for agent in agents], tmp_path), LinkRecord()
     outcome = run(on_links=links)
     calm = simulated(setup(links=faults), 3.0)

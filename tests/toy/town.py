@@ -51,8 +51,8 @@ class Town:
         Inverters that are off at the start.
     also : tuple[str, ...], optional
         Endpoints that agents connect to beside the plant's.
-    links : str, optional
-        What the processes are told of emulated links.
+    links : dict[str, Any], optional
+        Emulated links, as in the configurations.
     configs : tuple, optional
         Configurations of the plant and of all agents, if they are not the toy's.
     plant_command : Sequence[str], optional
@@ -69,7 +69,7 @@ class Town:
         run: str = "toy",
         spares: tuple[str, ...] = (),
         also: tuple[str, ...] = (),
-        links: str = "",
+        links: dict[str, Any] | None = None,
         configs: tuple[PlantConfig, tuple[AgentConfig, ...]] | None = None,
         plant_command: Sequence[str] = TOY,
         **changes: Any,

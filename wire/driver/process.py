@@ -11,9 +11,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -44,19 +44,19 @@ class ConfigurationError(ValueError):
     """A configuration that cannot work; the message says what would be right."""
 
 
-MakeLinks = Callable[[str, str], Links | None]
-"""Makes the emulated links to somebody, from a name and what the configuration says of links."""
+MakeLinks = Callable[[str, Mapping[str, Any]], Links | None]
+"""Makes the emulated links to a node, from its name and the tree `links` of its configuration."""
 
 
-def no_links(name: str, text: str) -> None:
-    """Links that do nothing.
+def no_links(name: str, tree: Mapping[str, Any]) -> None:
+    """Return None: no links are emulated.
 
     Raises
     ------
     ConfigurationError
-        If the configuration asks for more.
+        If the configuration has emulated links.
     """
-    if text:
+    if tree:
         raise ConfigurationError(f"{name}: links are to be emulated; start it by scenarios.emulation instead")
 
 

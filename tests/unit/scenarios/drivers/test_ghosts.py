@@ -11,17 +11,17 @@ from netem.spec.netem import Netem
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulated_links import links_of
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.codec import encode
 from wire.keys import Keys
 from wire.messages import State
 
-LATE = Setup(
+LATE = EmulationConfig(
     netem=Netem(links=(Fault(on="inv2 -> plant", delay=0.3),)),
     microgrids={f"inv{i}": "mg1" for i in range(1, 4)},
-).to_text()
+).to_tree()
 """States of inv2 take 0.3 s to the plant."""
 
 KEYS = Keys("toy")

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
@@ -20,7 +20,7 @@ Rows = list[tuple[float, ...]]
 def rows_of(fault: dict[str, Any], moves: Moves = ()) -> Rows:
     """Rows of a run of three agents in which the measurements of inv2 have a fault."""
     netem = Netem(links=(Fault(on="plant -> inv2", **fault),))
-    links = Setup(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_text()
+    links = EmulationConfig(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_tree()
     plant, agents = toy_configs(3, end=2.0, moves=moves)
     agents = tuple(replace(agent, links=links) for agent in agents)
     rows: Rows = []
@@ -74,7 +74,7 @@ def test_the_neighbours_of_a_standing_agent_do_not_use_what_it_says_for_the_lock
     """They fare as if it said nothing: as if its states were cut, too."""
     standing = rows_of({"cut": True})
     netem = Netem(links=(Fault(on="plant -> inv2", cut=True), Fault(on="inv2 -> {inv1, inv3}", cut=True)))
-    links = Setup(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_text()
+    links = EmulationConfig(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_tree()
     plant, agents = toy_configs(3, end=2.0)
     silent: Rows = []
     muted = tuple(replace(agent, links=links) for agent in agents)

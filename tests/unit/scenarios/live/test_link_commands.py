@@ -24,7 +24,7 @@ from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers import fault_injector
 from scenarios.drivers.fault_injector import FaultInjector
 from scenarios.emulation.emulated_links import EmulatedLinks
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.emulation.link_reports import decode_statuses
 from scenarios.live.link_log import replay_of
@@ -40,7 +40,7 @@ from wire.codec import decode
 from wire.links import CommandEffect
 from wire.messages import LinkAnswer, LinkOrder, Measurement, State
 
-SETUP = Setup(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
+SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
 CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
 
 
@@ -325,7 +325,7 @@ def test_process_faults_come_in_turn_and_no_process_stays_paused(monkeypatch: py
             sent.append((clock[0] - 100.0, self.name, number.name))
 
     children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
-    injector = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_text(), speed=2.0)
+    injector = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_tree(), speed=2.0)
     injector.inject(children)
     injector.note_time(0.0, 100.0)
     for _ in range(5):

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from netem.ledger import LinkCounts, LinkTrace
-from scenarios.emulation.link_reports import LinkBook, encode_book
+from scenarios.emulation.link_reports import LinkReportData, encode_data
 from scenarios.live import run_client as client
 from scenarios.live.run_address import address_of
 from scenarios.live.run_client import RunClient
@@ -154,8 +154,10 @@ def test_a_book_of_links_that_cannot_be_is_counted_and_not_recorded(body: object
 def test_a_sound_book_is_recorded() -> None:
     """With all that it says."""
     record = LinkRecord()
-    book = LinkBook(traces=(LinkTrace("inv2", "inv1", (1, 2), (0.0, 0.02), ("cut", 0.1)),), counts={"inv2": COUNTS})
-    record(LinkReport(sender="inv1", incarnation=1, seq=0, t=0.0, data=encode_book(book)))
+    book = LinkReportData(
+        traces=(LinkTrace("inv2", "inv1", (1, 2), (0.0, 0.02), ("cut", 0.1)),), counts={"inv2": COUNTS}
+    )
+    record(LinkReport(sender="inv1", incarnation=1, seq=0, t=0.0, data=encode_data(book)))
 
     assert record.garbled == 0
     assert record.counts == {("inv2", "inv1"): COUNTS}

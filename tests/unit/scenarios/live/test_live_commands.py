@@ -135,7 +135,7 @@ def test_the_plant_hands_every_agent_what_it_needs() -> None:
     """Each inverter, spare ones too, has a configuration of this run; the plant waits for those that are no spares."""
     wishes = LiveOptions(run="lab", case="III", speed=2.0, wait=5.0, duration=1.0)
     plant, agents = configure(*load_scenario("islanding"), wishes, "tcp/127.0.0.1:7447")
-    handed = {name: msgspec.json.decode(text, type=AgentConfig) for name, text in plant.handout.items()}
+    handed = {name: msgspec.convert(tree, AgentConfig) for name, tree in plant.agent_configs.items()}
 
     assert plant.agents == tuple(f"inv{i}" for i in range(1, 10))
     assert plant.settings.spares == ("inv10",)

@@ -10,16 +10,18 @@ from msgspec.structs import replace
 from agents.agent_config import Control, LawChoice
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from scenarios.emulation.emulation_config import Setup
+from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live import live_processes as hand
 from scenarios.live.own_code import own_code
 from scenarios.live.run_address import RunAddress, UsageError
 from tests.toy.toy_configs import agent_config
 from wire.plugin import Plugin
 
-SETUP = Setup(netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"})
+SETUP = EmulationConfig(
+    netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"}
+)
 CONTROL = Control(secondary="all", graph="mine:star", own_graph=Plugin(use="mine:star"), law=LawChoice(use="mine:Mine"))
-CONFIG = replace(agent_config("inv1"), control=CONTROL, links=SETUP.to_text())
+CONFIG = replace(agent_config("inv1"), control=CONTROL, links=SETUP.to_tree())
 
 
 def test_what_is_not_gridpeers_own_is_named() -> None:
@@ -27,7 +29,7 @@ def test_what_is_not_gridpeers_own_is_named() -> None:
     calm = replace(CONTROL, own_graph=None, law=LawChoice(use="dapi"))
 
     assert own_code(CONFIG) == ("the law mine:Mine", "the graph mine:star", "the link fault mine:Jammer")
-    assert own_code(replace(CONFIG, control=calm, links="")) == ()
+    assert own_code(replace(CONFIG, control=calm, links={})) == ()
 
 
 @pytest.mark.parametrize(("endpoint", "trusts", "runs"), [

@@ -12,7 +12,7 @@ from netem.models.duplicate import Duplicate
 from netem.receiver import Receiver
 from netem.spec.fault import Fault
 from netem.spec.netem import Netem
-from scenarios.emulation.link_reports import parts
+from scenarios.emulation.link_reports import report_data
 from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import COLUMNS, LinkRecord
 from wire.messages import LinkReport
@@ -25,7 +25,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     for k in range(60):
         receiver.offer("inv1", k, 0.02 * k, 0.02 * k, bytes(100))
     record = LinkRecord()
-    for data in parts(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+    for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
         record(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
     record.write(tmp_path / "links.csv")
 
@@ -70,7 +70,7 @@ def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path)
         for k in range(first, first + 100):
             receiver.offer("inv1", k, 0.02 * k, 0.02 * k, b"state")
             receiver.due(0.02 * k)
-        for data in parts(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+        for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
             on_disk(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
             if first < 5_000:
                 in_memory(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))

@@ -26,7 +26,9 @@ def ran(folder: Path, *options: str) -> tuple[str, dict[str, object]]:
     words = command("run", "lossy.toml", "--driver", "inprocess", "--out", "here", *options)
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
-    return (folder / "here" / "report.txt").read_text(), json.loads((folder / "here" / "lossy" / "links.json").read_text())
+    return (folder / "here" / "report.txt").read_text(), json.loads(
+        (folder / "here" / "lossy" / "links.json").read_text()
+    )
 
 
 def test_the_self_check_is_made_when_it_is_asked_for(tmp_path: Path) -> None:
@@ -42,7 +44,10 @@ def test_the_self_check_is_made_when_it_is_asked_for(tmp_path: Path) -> None:
 def test_a_run_without_the_option_says_and_imports_nothing_of_it(tmp_path: Path) -> None:
     """Neither report nor links.json mentions a test, and scipy.stats, which takes half a second, is not imported."""
     (tmp_path / "lossy.toml").write_text(LOSSY)
-    code = "import sys, gridpeers as gp; gp.load('lossy.toml').run('lossy', folder='here'); print('scipy.stats' in sys.modules)"
+    code = (
+        "import sys, gridpeers as gp; gp.load('lossy.toml').run('lossy', folder='here');"
+        "print('scipy.stats' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=100)
 
     assert done.stdout == "False\n", done.stderr
