@@ -43,13 +43,13 @@ class Range:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"must be a number, got {shown}"
         shown = f"{value:g}"
-        low, high = self.low, self.high
         if not math.isfinite(value):
             return f"must be a finite number, got {shown}"
-        if low <= value <= high:
+        if self.low <= value <= self.high:
             return ""
-        bounds = f"from {low:g} to {high:g}" if math.isfinite(low + high) else f"at least {low:g}"
-        bounds = f"at most {high:g}" if math.isinf(low) else bounds
+        low, high = (str(bound) if isinstance(bound, int) else f"{bound:g}" for bound in (self.low, self.high))
+        bounds = f"from {low} to {high}" if math.isfinite(self.low + self.high) else f"at least {low}"
+        bounds = f"at most {high}" if math.isinf(self.low) else bounds
         return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
 
 

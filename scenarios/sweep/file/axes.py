@@ -6,18 +6,46 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, TypeGuard
+from typing import Annotated, Any, Literal, TypeGuard
+
+import msgspec
 
 from scenarios.spec.scenario_errors import Mistakes
 from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
 from scenarios.sweep.file.paths import flatten
 from scenarios.sweep.file.sweep_model import GraphAxis
-from wire.suggestion import suggestion
+from wire.plausible import Range
+from wire.table_reading import read_table
+from wire.table_schema import Problem, fields_of, problems_of
 
 MOST_POINTS = 1_000_000
 """Most values of one range: more are a slip, and would fill the memory before anybody could be told."""
 
-_RANGE = ("from", "to", "count", "spacing")
+
+class Spread(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A range of values in place of their list."""
+
+    low: float = msgspec.field(name="from")
+    """First value."""
+    high: float = msgspec.field(name="to")
+    """Last value."""
+    count: Annotated[int, Range(2, MOST_POINTS)]
+    """How many values."""
+    spacing: Literal["lin", "log"] = "lin"
+    """Whether their differences or their ratios are equal."""
+
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        low, high = self.low, self.high
+        if low == high:
+            return [Problem("", f"a range goes from one number to another, got {low:g} twice")]
+        if self.spacing == "log" and min(low, high) <= 0:
+            text = f"spacing log needs two numbers above 0, got {low:g} and {high:g}; or use spacing lin"
+            return [Problem("", text)]
+        return []
+
+
+_RANGE = tuple(field.key for field in fields_of(Spread))
 
 
 @dataclass(frozen=True)
@@ -141,24 +169,14 @@ def _is_range(value: Any) -> bool:
 
 
 def _spread(value: Mapping[str, Any], at: str, mistakes: Mistakes) -> list[float]:
-    """Values of a range, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
-    for key in value:
-        if key not in _RANGE:
-            mistakes.add(at, f'unknown key "{key}"; {suggestion(key, _RANGE, "keys of a range")}')
-    low, high, count = value.get("from"), value.get("to"), value.get("count")
-    spacing = value.get("spacing", "lin")
-    if not (is_number(low) and is_number(high)):
-        mistakes.add(at, f"a range needs two numbers, got from = {low!r}, to = {high!r}")
-    elif not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST_POINTS:
-        mistakes.add(at, f"a range needs count, a whole number from 2 to {MOST_POINTS}, got {count!r}")
-    elif spacing not in ("lin", "log"):
-        mistakes.add(at, f"there is no spacing {spacing!r}; {suggestion(str(spacing), ('lin', 'log'), 'spacings')}")
-    elif low == high:
-        mistakes.add(at, f"a range goes from one number to another, got {low:g} twice")
-    elif spacing == "log" and min(low, high) <= 0:
-        mistakes.add(at, f"spacing log needs two numbers above 0, got {low:g} and {high:g}; or use spacing lin")
-    else:
-        fractions = [i / (count - 1) for i in range(count)]
-        raw = (low * (high / low) ** x if spacing == "log" else low + (high - low) * x for x in fractions)
-        return [float(f"{x:.12g}") for x in raw]
-    return []
+    """Return the values of a range, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
+    spread, problems = read_table(Spread, value)
+    problems = problems or problems_of(spread)
+    for path, text in problems:
+        mistakes.add(f"{at}.{path}" if path else at, text)
+    if problems:
+        return []
+    low, high = spread.low, spread.high
+    fractions = [i / (spread.count - 1) for i in range(spread.count)]
+    log = spread.spacing == "log"
+    return [float(f"{low * (high / low) ** x if log else low + (high - low) * x:.12g}") for x in fractions]
