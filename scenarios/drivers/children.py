@@ -1,4 +1,4 @@
-"""Child processes: started with a configuration on standard input, watched, and always ended.
+"""Child processes: start them with a configuration on standard input, watch them, and always end them.
 
 Each child is its own process group, so Ctrl-C reaches the parent only, which then ends them in order. If the parent
 dies without a chance to do that, their standard input ends, and they leave (`wire.driver.process`).
@@ -14,17 +14,16 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 
 import msgspec
 
 from wire.driver.process import LEASH
 
 LAST_LINES = 12
-"""Lines of a log that are shown when its process died."""
+"""Last lines of a log in the report on a process that died."""
 
 GRACE = 2.0
-"""Time (s) that children have to leave once they are asked to."""
+"""Time (s) that processes have to leave after SIGTERM."""
 
 
 class Child:
@@ -94,7 +93,7 @@ class Child:
         self._process.send_signal(number)
 
     def join(self, until: float) -> bool:
-        """Wait for its end until a time (s, monotonic); whether it has ended."""
+        """Wait for its end until a time (s, monotonic); return whether it has ended."""
         self._watcher.join(max(0.0, until - monotonic()))
         return not self._watcher.is_alive()
 
@@ -106,7 +105,7 @@ class Child:
                     pipe.close()
 
     def report(self, when: str) -> str:
-        """Sentence on how it ended, its last lines, and where the whole log lies."""
+        """Return a sentence on how it ended, its last lines, and the path of the whole log."""
         status = self.status
         if status is None:
             how = "still runs"
@@ -120,23 +119,13 @@ class Child:
 
 
 class Children:
-    """All children of a run; leaving the context ends every one of them."""
+    """All processes of a run; `end` ends every one of them."""
 
     def __init__(self) -> None:
         self._children: list[Child] = []
 
-    def __enter__(self) -> Children:
-        """Nothing to do yet."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        """End all, whatever the reason."""
-        self.end()
-
     def __getitem__(self, name: str) -> Child:
-        """Give the latest child of a name."""
+        """Return the latest child of a name."""
         for child in reversed(self._children):
             if child.name == name:
                 return child
@@ -146,15 +135,15 @@ class Children:
         return iter(self._children)
 
     def lives(self, name: str) -> tuple[Child, ...]:
-        """All children that were started under a name, the latest last."""
+        """Return all children of a name, the latest last."""
         return tuple(child for child in self._children if child.name == name)
 
     def add(self, child: Child) -> None:
-        """Take charge of a child; former ones of its name stay in charge too, until all are ended."""
+        """Add a child; former ones of its name stay too, until all are ended."""
         self._children.append(child)
 
     def running(self) -> list[Child]:
-        """Those that have not ended."""
+        """Return those that have not ended."""
         return [child for child in self._children if child.status is None]
 
     def wait(self, seconds: float) -> None:

@@ -12,8 +12,9 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
-from scenarios.drivers.children import Child, Children
+from scenarios.drivers.children import Child
 from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.supervisor import Supervisor
 from scenarios.results.link_records import LinkRecord
 from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
@@ -76,7 +77,6 @@ class Town:
     ) -> None:
         plant, agents = toy_configs(n, run=run) if configs is None else configs
         run, links = plant.run, links or plant.links
-        self._plant_command = list(plant_command)
         self.endpoint = rendezvous(())
         self.plant_config = replace(
             plant,
@@ -95,8 +95,10 @@ class Town:
         }
         self.keys = Keys(run)
         self.folder = folder
-        self.children = Children()
-        self.pids: list[int] = []
+        self.supervisor = Supervisor(
+            self.plant_config, self.agent_configs.values(), folder, self._ended, plant_command=plant_command
+        )
+        self.children = self.supervisor.children
         self.status: dict[str, AgentStatus] = {}
         self.states: dict[str, State] = {}
         self.events: list[PlantEvent] = []
@@ -123,30 +125,20 @@ class Town:
     ) -> None:
         self.session.close()
         self.children.end()
-        assert [pid for pid in self.pids if exists(pid)] == []
+        assert [child.pid for child in self.children if exists(child.pid)] == []
 
     def start(self, *names: str) -> Town:
         """Start the plant ("plant") or agents; a name that has run before is started anew."""
-        for name in names:
-            is_plant = name == "plant"
-            config = self.plant_config if is_plant else self.agent_configs[name]
-            command = (
-                self._plant_command
-                if is_plant
-                else ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
-            )
-            self.add(name, command, config)
+        for child in self.children:
+            if child.name in names:
+                child.release()
+        self.supervisor.start(*names)
         return self
 
     def add(self, name: str, command: list[str], config: Any) -> Child:
-        """Start one process, whose log is named after it and its turn."""
-        for former in self.children:
-            if former.name == name:
-                former.release()
-        log = self.folder / f"{name}-{len(self.pids)}.log"
-        child = Child(name, command, config, log, self._ended)
+        """Start one process with a configuration of its own, whose log is named after it."""
+        child = Child(name, command, config, self.folder / f"{name}-own.log", self._ended)
         self.children.add(child)
-        self.pids.append(child.pid)
         return child
 
     def all(self) -> Town:
