@@ -62,10 +62,10 @@ def t_Q(window: gp.WindowData) -> float:
 
 METRICS = ["t_f_s", "t_share_s", t_Q, "f_error_Hz", "MPSI", "MQSI"]
 
-Row = Mapping[Any, Any]
+RunColumns = Mapping[Any, Any]
 
 
-def swept(cases: Mapping[str, Mapping[str, Any]], end_s: float = 7.0, **plant: float) -> dict[str, Row]:
+def swept(cases: Mapping[str, Mapping[str, Any]], end_s: float = 7.0, **plant: float) -> dict[str, RunColumns]:
     """Run islanding with these cases, and these keys of `[plant.gfl]`; a row for each case, by its title."""
     old = dict.fromkeys([f"case.{name}" for name in gp.load("islanding").cases])
     new = {f"case.c{i}": {"secondary": "all", **case, "title": title} for i, (title, case) in enumerate(cases.items())}
@@ -75,7 +75,7 @@ def swept(cases: Mapping[str, Mapping[str, Any]], end_s: float = 7.0, **plant: f
     return {scenario.cases[row["case"]].title: row for row in rows}
 
 
-def shown(row: Row, event: str, names: tuple[str, ...]) -> str:
+def shown(row: RunColumns, event: str, names: tuple[str, ...]) -> str:
     """Return the values of one event of a run."""
     values = [row[f"{event}.{name}"] for name in names]
     return " / ".join("never" if np.isnan(x) else f"{x:.3f}" for x in values)

@@ -41,7 +41,7 @@ BEYOND = 1e3
 
 TITLES = ("TCP: all come, some late", "UDP: what is lost never comes")
 
-Times = list[float]
+MessageTimes = list[float]
 
 
 def lose(loss: float) -> None:
@@ -56,7 +56,7 @@ def lose(loss: float) -> None:
     subprocess.run(["tc", "filter", "add", "dev", "lo", "ingress", *drop], check=True)
 
 
-def on_lossy_loopback(loss: float, count: int) -> list[Times]:
+def on_lossy_loopback(loss: float, count: int) -> list[MessageTimes]:
     """Return the times (s) over TCP and over UDP on this namespace's loopback, which loses packets meanwhile."""
     with Pair(free_endpoint("tcp")) as stream, Pair(free_endpoint("udp")) as datagrams:
         for pair in (stream, datagrams):
@@ -66,7 +66,7 @@ def on_lossy_loopback(loss: float, count: int) -> list[Times]:
         return measure([stream, datagrams], count, TICK, lambda: subprocess.run(heal, check=True))
 
 
-def by_kernel(loss: float, count: int) -> list[Times]:
+def by_kernel(loss: float, count: int) -> list[MessageTimes]:
     """Return the times (s) as `on_lossy_loopback` measures them, in a network namespace of their own; needs root."""
     name = f"gpsockets{os.getpid()}"
     subprocess.run(["ip", "netns", "add", name], check=True)
@@ -79,7 +79,7 @@ def by_kernel(loss: float, count: int) -> list[Times]:
     return [[LOST if time is None else time for time in times] for times in json.loads(done.stdout)]
 
 
-def by_relay(loss: float, count: int, seed: int) -> list[Times]:
+def by_relay(loss: float, count: int, seed: int) -> list[MessageTimes]:
     """Return the times (s) over TCP and over UDP through relays that lose."""
     tcp, udp = free_endpoint("tcp"), free_endpoint("udp")
     with (
@@ -94,7 +94,7 @@ def by_relay(loss: float, count: int, seed: int) -> list[Times]:
         return measure([stream, datagrams], count, TICK, lambda: [relay.do("loss 0") for relay in (first, second)])
 
 
-def describe(label: str, times: Times) -> str:
+def describe(label: str, times: MessageTimes) -> str:
     """Return one line of numbers: the lost are not among those whose times are told."""
     came = np.array([time for time in times if time < LOST]) * 1e3
     p50, p90, p99 = np.percentile(came, [50, 90, 99])
@@ -105,7 +105,7 @@ def describe(label: str, times: Times) -> str:
     )
 
 
-def draw(results: dict[str, list[Times]], path: Path) -> None:
+def draw(results: dict[str, list[MessageTimes]], path: Path) -> None:
     """Share of messages that are not there yet, over the time since they were sent."""
     page: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False}
     with mpl.rc_context(page):
@@ -141,7 +141,7 @@ def main() -> None:
         took = on_lossy_loopback(options.inside, options.messages)
         print(json.dumps([[None if time == LOST else time for time in one] for one in took]))
         return
-    results: dict[str, list[Times]] = {}
+    results: dict[str, list[MessageTimes]] = {}
     print(machine())
     try:
         results["no loss"] = by_kernel(0.0, options.messages)

@@ -29,7 +29,7 @@ from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.response import PlantModel, response
 from scenarios.results.history import Floats
 
-Link = tuple[str, str]
+LinkEnds = tuple[str, str]
 """(src, dst)."""
 
 AT_REST = 1e-9
@@ -40,7 +40,7 @@ AT_REST = 1e-9
 class Ticks:
     """Delays in control periods, and losses; a number holds for all, a mapping for whom it names (0 for the rest)."""
 
-    link: int | Mapping[Link, int] = 0
+    link: int | Mapping[LinkEnds, int] = 0
     """Of neighbours' states beyond the one period they always take, by (src, dst)."""
     measurement: int | Mapping[str, int] = 0
     """Plant to agent, by inverter."""
@@ -48,7 +48,7 @@ class Ticks:
     """Agent to plant, by inverter."""
     own: int = 0
     """Of the own value where it is compared with the neighbours'; a correct agent has 0."""
-    loss: float | Mapping[Link, float] = 0.0
+    loss: float | Mapping[LinkEnds, float] = 0.0
     """Probability that a state is lost, by (src, dst); the last one heard is held."""
 
 

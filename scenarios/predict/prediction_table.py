@@ -26,7 +26,7 @@ from scenarios.predict.vars import Sensitivity, var_delay_limit, var_modes
 WIDTH = 100
 """Columns."""
 
-Row = tuple[str, str, str, str]
+TextRow = tuple[str, str, str, str]
 """Quantity, by the continuous law, by ours in discrete time, what it means."""
 
 
@@ -75,7 +75,7 @@ def _words(fleet: InverterGroup, found: Modes) -> str:
     return text.rstrip()
 
 
-def _rows(fleet: InverterGroup, found: Modes) -> list[Row]:
+def _rows(fleet: InverterGroup, found: Modes) -> list[TextRow]:
     loop = Loop(fleet=fleet)
     slowest = settling(-math.log(loop.spectral_radius) / fleet.T_c) if loop.stable else math.inf
     kinds: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
@@ -163,7 +163,7 @@ def _limit(seconds: float) -> str:
     return "unstable" if math.isnan(seconds) else _s(seconds, "any")
 
 
-def _aligned(rows: Sequence[Row]) -> list[str]:
+def _aligned(rows: Sequence[TextRow]) -> list[str]:
     return [f"  {name:15}{left:>12}{right:>12}   {words}".rstrip() for name, left, right, words in rows]
 
 

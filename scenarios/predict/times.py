@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.predict.closed_form import groups
 from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.linear_model import Link, Loop, Path, Ticks
+from scenarios.predict.linear_model import LinkEnds, Loop, Path, Ticks
 from scenarios.predict.response import PlantModel
 from scenarios.results.history import Flags, Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND
@@ -65,10 +65,10 @@ class Times:
 def ticks_of(
     fleet: InverterGroup,
     *,
-    link_delay_s: float | Mapping[Link, float] = 0.0,
+    link_delay_s: float | Mapping[LinkEnds, float] = 0.0,
     measurement_delay_s: float | Mapping[str, float] = 0.0,
     setpoint_delay_s: float | Mapping[str, float] = 0.0,
-    loss: float | Mapping[Link, float] = 0.0,
+    loss: float | Mapping[LinkEnds, float] = 0.0,
 ) -> Ticks:
     """Return the delays in seconds as control periods of a fleet.
 
@@ -101,10 +101,10 @@ def ticks_of(
 def predicted_times(
     case: InverterGroup,
     *,
-    link_delay_s: float | Mapping[Link, float] = 0.0,
+    link_delay_s: float | Mapping[LinkEnds, float] = 0.0,
     measurement_delay_s: float | Mapping[str, float] = 0.0,
     setpoint_delay_s: float | Mapping[str, float] = 0.0,
-    loss: float | Mapping[Link, float] = 0.0,
+    loss: float | Mapping[LinkEnds, float] = 0.0,
     load: LoadStep | None = None,
     plant: PlantModel = "lagged",
 ) -> Times:

@@ -15,7 +15,7 @@ from scenarios.results.history import Floats, History, Plates
 from scenarios.spec import Scenario
 from scenarios.spec.agent_schedule import inverters_of
 
-Islands = dict[str, tuple[str, ...]]
+IslandMembers = dict[str, tuple[str, ...]]
 """Inverters of each island; an island is known by its first inverter."""
 
 
@@ -26,14 +26,14 @@ class IslandInterval(NamedTuple):
     """From the event that made them (s)."""
     end: float
     """To the next event, or for good (s)."""
-    islands: Islands
+    islands: IslandMembers
 
 
 RowMeasure = Callable[[History, Plates], Floats]
 """A measure of each row."""
 
 
-def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, Islands]:
+def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, IslandMembers]:
     """Return the islands with inverters in them after each event, by its label.
 
     Switches alone decide: an inverter that has left is still counted where it stands.

@@ -14,7 +14,7 @@ from scenarios.sweep.sweep_folder import SweepFolder
 from scenarios.sweep.sweep_table import table_of, write_table
 from scenarios.sweep.workers import on_dask, on_this_machine
 
-Tell = Callable[[int], None]
+TellRuns = Callable[[int], None]
 """Told how many runs are done, those from before included."""
 
 
@@ -34,7 +34,7 @@ class Summary:
     """The figures."""
 
 
-def study(plan: Plan, folder: SweepFolder, tell: Tell, *, jobs: int, dask: str = "") -> Summary:
+def study(plan: Plan, folder: SweepFolder, tell: TellRuns, *, jobs: int, dask: str = "") -> Summary:
     """Do what is left of a sweep and write its results.
 
     Parameters
@@ -61,7 +61,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Tell, *, jobs: int, dask: str =
         raise
 
 
-def _study(plan: Plan, folder: SweepFolder, tell: Tell, jobs: int, dask: str) -> Summary:
+def _study(plan: Plan, folder: SweepFolder, tell: TellRuns, jobs: int, dask: str) -> Summary:
     before = len(folder.done)
     tell(before)
     left = [(number, run) for number, run in enumerate(plan.runs) if number not in folder.done]

@@ -110,7 +110,7 @@ def without(fleet: InverterGroup, links: set[tuple[str, str]]) -> InverterGroup:
     return replace(fleet, A=A)
 
 
-Row = Mapping[str, Any]
+RunColumns = Mapping[str, Any]
 """Columns of one run."""
 
 _ALL: Mapping[str, Any] = MappingProxyType({})
@@ -128,7 +128,7 @@ class SweepData:
     (array([0. , 0.1, 0.2]), array([ 1.,  2., inf]))
     """
 
-    rows: Sequence[Row]
+    rows: Sequence[RunColumns]
     """All runs, in the order of the sweep."""
     base: Spec
     """The scenario that was varied."""
@@ -136,7 +136,7 @@ class SweepData:
     """Label of the event that is measured."""
     _fleets: dict[str, InverterGroup] = field(default_factory=dict)
 
-    def where(self, equal: Mapping[str, Any] = _ALL) -> Iterator[Row]:
+    def where(self, equal: Mapping[str, Any] = _ALL) -> Iterator[RunColumns]:
         """Return the rows whose columns have these values."""
         return (row for row in self.rows if all(row[name] == value for name, value in equal.items()))
 
@@ -144,7 +144,7 @@ class SweepData:
         """Return the different values of a column, sorted."""
         return sorted({row[column] for row in self.where(equal)})
 
-    def measure(self, row: Row, index: str) -> float:
+    def measure(self, row: RunColumns, index: str) -> float:
         """Return an index of a row: infinite for a time that never came, not a number where a run broke."""
         value = row[f"{self.window}.{index}"]
         if value is not None:

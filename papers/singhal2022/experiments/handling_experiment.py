@@ -10,7 +10,7 @@ import numpy as np
 
 from gridpeers.theory import predicted_times
 from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.experiment_data import Row, SweepData
+from papers.singhal2022.experiments.experiment_data import RunColumns, SweepData
 from papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
@@ -98,7 +98,7 @@ def words(condition: Condition) -> str:
     return f"late by {late:g} s" if late else f"loss {100 * lost:g} %" if lost else "good links"
 
 
-def _condition(row: Row) -> Condition:
+def _condition(row: RunColumns) -> Condition:
     entries = json.loads(row["link"])
     return (entries[0].get("delay", 0.0), entries[0].get("loss", 0.0)) if entries else (0.0, 0.0)
 

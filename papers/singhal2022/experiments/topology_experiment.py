@@ -11,7 +11,7 @@ from gridpeers.measures import Floats
 from gridpeers.random_graphs import Control, adjacency
 from gridpeers.theory import InverterGroup, predicted_times
 from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.experiment_data import Row, SweepData
+from papers.singhal2022.experiments.experiment_data import RunColumns, SweepData
 from papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, ExperimentTable, Look, Page, Panel
 
 DELAY, LINKS = "link[0].delay", "graph.links"
@@ -71,15 +71,15 @@ def _table(swept: SweepData, said: Mapping[int, tuple[float, float]]) -> Experim
     return ExperimentTable(columns=columns, rows=rows)
 
 
-def _of(swept: SweepData, rows: Sequence[Row], index: str) -> Floats:
+def _of(swept: SweepData, rows: Sequence[RunColumns], index: str) -> Floats:
     return np.array([swept.measure(row, index) for row in rows])
 
 
-def _medians(said: Mapping[int, tuple[float, float]], rows: Sequence[Row], at: Floats, number: int) -> Floats:
+def _medians(said: Mapping[int, tuple[float, float]], rows: Sequence[RunColumns], at: Floats, number: int) -> Floats:
     return np.array([np.median([said[row["sample"]][number] for row in rows if row[LINKS] == x]) for x in at])
 
 
-def _said(swept: SweepData, row: Row) -> tuple[float, float]:
+def _said(swept: SweepData, row: RunColumns) -> tuple[float, float]:
     """Return the predicted times of one random graph."""
     return of_times(predicted_times(fleet_on(swept, row["graph.edges"]), link_delay_s=row[DELAY], load=swept.load))
 
