@@ -1,1 +1,1 @@
-"""The drivers: one process, or one process per inverter over Zenoh, and what they hand over."""
+"""The drivers of a run: in one process, or with one process per inverter over Zenoh."""

@@ -12,7 +12,7 @@ class PortError(ValueError):
 
 
 def endpoint(port: int) -> str:
-    """Zenoh endpoint at a port of this machine; at port 0 the fleet takes a free one.
+    """Return the Zenoh endpoint at a port of this machine; for port 0 the driver takes a free one.
 
     Examples
     --------
@@ -23,7 +23,7 @@ def endpoint(port: int) -> str:
 
 
 def probe(host: str, port: int) -> int:
-    """Listen for a moment at a port of this machine, as the plant will; the port, a free one for 0.
+    """Listen for a moment at a port of this machine, as the plant will, and return the port; a free one for 0.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the processes of a run meet: an endpoint that is free, and stays so until the plant listens there."""
+"""Choose the rendezvous of a run: an endpoint that is free, and stays so until the plant listens there."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TRIES = 100
 
 
 def rendezvous(listen: tuple[str, ...] = ()) -> str:
-    """Endpoint of the rendezvous: the given one, if it is free, or a free one of this host.
+    """Return the endpoint of the rendezvous: the given one, if it is free, or a free one of this host.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A recorder's end of a run without its session: which messages it believes, and in which order. Pure."""
+"""Accept the plant's messages for a recorder, in order, without a session. Pure."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Runs in wall-clock time by hand: a plant here, agents there, and commands that look at them and change them."""
+"""Live runs: plant and agents in terminals of their own, and commands that watch and change them."""

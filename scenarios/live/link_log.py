@@ -1,4 +1,4 @@
-"""What emulated links did and were ordered in a run by hand: its record, and the scenario that replays it."""
+"""Record of the emulated links of a live run and of commands to them, and the scenario that replays it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from wire.messages import LinkOrder, LinkReport
 
 
 class LinkLog:
-    """Takes what the plant tells of links.
+    """Record link reports and link commands of a run.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class LinkLog:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What was ordered, in its order."""
+        """Changes by commands, in their order."""
         return tuple(change for _, change in sorted(self._orders.items()))
 
     @property
@@ -66,7 +66,7 @@ class LinkLog:
         return self._record.sha256 if any(book.sent for book in self._record.counts.values()) else ""
 
     def __call__(self, message: LinkReport | LinkOrder) -> None:
-        """Take a report of what links did, or an order to them."""
+        """Take a report of links, or a command to them."""
         if isinstance(message, LinkReport):
             if self._folder is not None:
                 self._record(message)
@@ -75,15 +75,15 @@ class LinkLog:
         self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:
-        """Write what is to be written, at the end of a run that came to t (s); what a person should know."""
+        """Write all files at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
-        told: list[str] = []
+        lines: list[str] = []
         if self._folder is not None and self.links_sha256:
-            told += LinkAccounts(self._record).write(self._folder)
+            lines += LinkAccounts(self._record).write(self._folder)
         file = self._replay or (self._by_the_way if self._orders else None)
         if file is not None:
-            told.append(f"the links as they were: gridpeers run {shown(file)}")
-        return told
+            lines.append(f"the links as they were: gridpeers run {shown(file)}")
+        return lines
 
     def _write_replay(self, t: float) -> None:
         files = [self._replay, self._by_the_way if self._orders else None]
@@ -97,7 +97,7 @@ class LinkLog:
 
 
 def replay_of(scenario: Scenario, feeder: Feeder, changes: Sequence[Change], t: float) -> Scenario:
-    """The scenario whose links do by schedule what they were ordered to do; of agents that it does not know, nothing.
+    """Return the scenario whose links change by schedule as they did by command; it leaves out agents that it lacks.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a run by hand leaves what it leaves: a run folder if one was asked for, else only logs while it lasts."""
+"""Folders of a live run: a run folder on request, else a temporary one for its logs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BY_HAND = "by hand"
 
 
 class Folders:
-    """Folders of a run by hand.
+    """Folders of a live run.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class Folders:
         self.logs, self.record, self.whole = logs, record, whole
 
     def complete(self) -> None:
-        """Have status.txt say that all is there."""
+        """Write to status.txt that the folder is complete."""
         if self.whole is not None:
             set_status(self.whole, "complete")
 
     def broken(self, why: str) -> None:
-        """Have status.txt say why not."""
+        """Write to status.txt why the folder is not complete."""
         if self.whole is not None:
             set_broken(self.whole, why)
 

@@ -1,4 +1,4 @@
-"""What an agent would import or run because a plant on another host says so."""
+"""Find code that an agent would import or run because a plant on another host names it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run by hand is: its name, and the Zenoh endpoints where its processes meet."""
+"""Address of a live run: its name, and the Zenoh endpoints where its processes meet."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def listenable(option: str, text: str) -> str:
 
 
 def _way_out(host: str, error: OSError) -> str:
-    """What to do when an address cannot be listened on."""
+    """Return what to do when an address cannot be listened on."""
     if isinstance(error, socket.gaierror):
         return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
     if error.errno == errno.EADDRINUSE:

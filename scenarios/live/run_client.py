@@ -1,4 +1,4 @@
-"""A command's client to a run: it connects, sees who is there, asks, listens and goes. No run depends on it."""
+"""Client of a command to a run: it connects, finds the processes, requests and listens. No run depends on it."""
 
 from __future__ import annotations
 

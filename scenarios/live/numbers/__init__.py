@@ -1,1 +1,1 @@
-"""The numbers of a run by hand, beside its history: how far it is its scenario's, and what it measures up to there."""
+"""Compare a wall-clock run with its scenario, and report the numbers of a live run."""

@@ -1,4 +1,4 @@
-"""Where a run by hand departs from its scenario: what people did or left undone, and when it ended. Pure."""
+"""Compare a wall-clock run with its scenario: find what people did or left undone, and when it ended. Pure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from wire.messages import PlantEvent
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """A run by hand beside its scenario."""
+    """A wall-clock run compared with its scenario."""
 
     ended: float
     """When it ended (s)."""
@@ -46,12 +46,12 @@ class Compared:
     """Windows without numbers, as rows are missing at their end, where they are measured."""
 
     def lines(self, end: float = inf) -> list[str]:
-        """Departures before a time (s), a line each."""
+        """Return the departures before a time (s), one line each."""
         return [line_of(event).strip() for event in self.departures if event.t < end]
 
 
 class _Due(NamedTuple):
-    """What people, or the driver, are to have an agent do."""
+    """What an agent has to do, by the hand of people or of the driver."""
 
     verb: str
     """As the plant tells it: "left", "joined" or "died"."""
@@ -72,7 +72,7 @@ def compare(
     ended: float,
     missing: Sequence[tuple[float, float]] = (),
 ) -> Compared:
-    """See how far a run by hand is what its scenario says.
+    """Compare a run with its scenario.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def compare(
 
 
 def _switched(scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterable[PlantEvent]:
-    """Switches that somebody operated; who opens what is open already changes nothing."""
+    """Yield switches that somebody operated; opening an open switch changes nothing."""
     network = Network(feeder)
     planned = [
         (event.t_s, network.switch_name(name)) for event in scenario.events for name in (*event.open, *event.close)
@@ -140,7 +140,7 @@ def _switched(scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent]) 
 def _moved(
     scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent], every: Sequence[Window], ended: float
 ) -> Iterable[PlantEvent]:
-    """Agents that came, went or died though the scenario does not say so, and those that should have and did not."""
+    """Yield agents that joined, left or died against the scenario, and those that should have and did not."""
     due = [*_due(scenario, every)]
     expected = ExpectedSilence(scenario, feeder)
     first = {row.name for row in feeder.inverters}

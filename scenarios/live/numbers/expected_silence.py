@@ -1,4 +1,4 @@
-"""Which spells of silence a scenario brings about itself, by its faults of links and nodes. Pure."""
+"""Recognise silences that faults of links and nodes in the scenario cause. Pure."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
 
 
 class ExpectedSilence:
-    """Whether a scenario lets happen what the plant told of silence (`plant.realtime.silence_detector`).
+    """Recognise events of silence (`plant.realtime.silence_detector`) that the scenario itself causes.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class ExpectedSilence:
         self._netem, self._microgrids = setup.netem, setup.microgrids
 
     def __call__(self, event: PlantEvent) -> bool:
-        """Whether an event is the end of a silence, or the beginning of one that a fault of the scenario makes."""
+        """Return whether an event ends a silence, or begins one that a fault of the scenario causes."""
         if _AGAIN.match(event.text):
             return True
         name, t = event.subject, event.t

@@ -1,4 +1,4 @@
-"""What the figures of a run by hand share: the whole run, with all that people did in it."""
+"""Data for the figures of a live run: the whole run, with everything that people did in it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scenarios.spec import Scenario
 from wire.messages import PlantEvent
 
 PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
-"""Words of the plant, as figures have them."""
+"""Verbs of the plant's events, and the same in figures."""
 
 
 def drawing_by_hand(
@@ -48,7 +48,7 @@ def drawing_by_hand(
 
 
 def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
-    """Marks of what people did, and of what befell agents; one for all of a moment."""
+    """Yield marks of departures from the scenario; those of one moment share a mark."""
     by_time: dict[float, list[PlantEvent]] = {}
     for event in departures:
         if event.t > 0.0:
@@ -59,7 +59,7 @@ def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
 
 
 def _in_short(event: PlantEvent) -> str:
-    """What somebody did, in two words; "" where that takes more."""
+    """Return a departure in two words; "" if that takes more."""
     if event.kind == "link":
         return "links"
     match = re.match(r"(?:switch )?(\S+)(?: \(.*\))? (opened|closed|joined|left|died)\b", event.text)

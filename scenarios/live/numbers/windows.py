@@ -1,4 +1,4 @@
-"""Windows of measurement of a run by hand: of its scenario's events, and of switches that people operated. Pure."""
+"""Windows of measurement of a live run: of its scenario's events, and of switches that people operated. Pure."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ NEAR = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class LiveWindows:
-    """The windows that were opened, each in the order of time, and those that never were."""
+    """The windows of a live run, each kind in the order of time."""
 
     measured: tuple[Window, ...]
-    """What there are numbers of: each lasts to the next event, whoever made it."""
+    """Windows with numbers: each lasts to the next event, of the scenario or by hand."""
     too_short: tuple[Window, ...]
-    """Windows that the next event ended before there was anything steady to measure."""
+    """Windows that the next event ended before the values could be steady."""
     not_reached: tuple[Window, ...]
-    """Windows of the scenario, as it means them, to whose end the run did not come."""
+    """Windows of the scenario whose end the run did not reach."""
 
 
 def events_by_hand(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
-    """Events as a scenario has them of what the plant told of switches; what fell into one step is one event.
+    """Return the operations of switches as events of a scenario; operations in one step are one event.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def events_by_hand(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
 def opened(
     scenario: Scenario, came: Sequence[tuple[str, float]], by_hand: Sequence[Event], ended: float
 ) -> LiveWindows:
-    """Windows of a run by hand.
+    """Return the windows of a live run.
 
     An event by hand opens a window as the scenario's do, and ends the one before it. Its own lasts to the next event or
     to the end of the run, whatever the scenario says of its end. What was operated at the moment of an event of the

@@ -1,4 +1,4 @@
-"""A look at a run, as text for `gridpeers status` and as a table for `gridpeers watch`."""
+"""Render a snapshot of a run: text for `gridpeers status`, a table for `gridpeers watch`."""
 
 from __future__ import annotations
 
@@ -61,63 +61,63 @@ _COLUMNS = (
 are those between whom and it an emulated fault holds."""
 
 
-def _columns(look: Snapshot) -> tuple[_Column, ...]:
+def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
     """The columns that there is something to show in."""
-    calm = not any(line.impaired for line in look.lines)
+    calm = not any(line.impaired for line in snapshot.lines)
     return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
-def head(look: Snapshot) -> str:
+def head(snapshot: Snapshot) -> str:
     """One line on the whole run."""
-    t = "has not begun" if look.t is None else f"t = {look.t:.2f} s"
-    islands = list(dict.fromkeys(line.island for line in look.lines if line.island))
-    parts = [f"run {look.run}", t, look.pace, f"islands: {', '.join(islands)}" if islands else ""]
-    parts.append(f"impaired to the plant: {short(look.impaired)}" if look.impaired else "")
+    t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
+    islands = list(dict.fromkeys(line.island for line in snapshot.lines if line.island))
+    parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
+    parts.append(f"impaired to the plant: {short(snapshot.impaired)}" if snapshot.impaired else "")
     return "   ".join(part for part in parts if part)
 
 
-def plain(look: Snapshot) -> str:
+def plain(snapshot: Snapshot) -> str:
     """Text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut.
 
     Parameters
     ----------
-    look : Snapshot
+    snapshot : Snapshot
         What to show.
     """
-    columns = _columns(look)
+    columns = _columns(snapshot)
     titles = [f"{column.head} {column.unit}".strip() for column in columns]
-    rows = [titles, *([column.text(line) for column in columns] for line in look.lines)]
+    rows = [titles, *([column.text(line) for column in columns] for line in snapshot.lines)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(columns))]
-    text = [head(look)]
-    for row in rows if look.lines else []:
+    text = [head(snapshot)]
+    for row in rows if snapshot.lines else []:
         cells = [
             cell.rjust(width) if column.right else cell.ljust(width)
             for cell, width, column in zip(row, widths, columns, strict=True)
         ]
         text.append("  ".join(cells).rstrip())
-    text += look.events[-EVENTS:]
+    text += snapshot.events[-EVENTS:]
     return "\n".join(text) + "\n"
 
 
-def table(look: Snapshot, keys: str = "q: quit") -> Group:
+def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
     """Table for `gridpeers watch`.
 
     Parameters
     ----------
-    look : Snapshot
+    snapshot : Snapshot
         What to show.
     keys : str, optional
         What can be typed.
     """
     grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    columns = _columns(look)
+    columns = _columns(snapshot)
     for column in columns:
         title = f"{column.head}\n{column.unit}" if column.head else ""
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
-    for line in look.lines:
+    for line in snapshot.lines:
         grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in columns))
-    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in look.events[-EVENTS:]]
-    return Group(Text(head(look), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
+    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
+    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
 
 
 def _style(column: _Column, line: Line) -> str:
