@@ -5,6 +5,8 @@ A range is wide: it holds every value that a distribution feeder may have, and n
 
 from __future__ import annotations
 
+import math
+
 from wire.plausible import Plausible
 
 NOMINAL_FREQUENCY = Plausible("a nominal frequency", 16.0, 400.0)
@@ -38,6 +40,8 @@ def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
     >>> power_of("a load", 2400.0, 2000.0, 1)
     Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0, above_zero=False, hint='')
     """
+    if math.isnan(V_nom):  # the bus has its own error
+        return Plausible(what, -math.inf, math.inf)
     high = phases * V_nom * current / 1e3
     where = f"{what} {'on a phase of' if phases == 1 else 'at'} {V_nom * 3.0**0.5 / 1e3:.3g} kV"
     return Plausible(where, -high, high)

@@ -12,11 +12,12 @@ FILES = sorted(Path(__file__).parent.glob("*.toml"))
 
 
 def messages(file: Path) -> list[str]:
-    """Return all messages about a file."""
+    """Return all messages about a file, wherever the clone is."""
     try:
         (read_sweep if file.name.startswith("sweep") else load_scenario)(file)
     except ScenarioError as error:
-        return [line for mistake in error.mistakes for line in mistake.splitlines()]
+        folder = str(file.parent)
+        return [line.replace(folder, "FOLDER") for mistake in error.mistakes for line in mistake.splitlines()]
     return []
 
 

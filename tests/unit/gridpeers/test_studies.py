@@ -46,13 +46,13 @@ def test_a_sweep_may_ask_for_a_metric_that_the_scenario_has(
     scenario: gp.Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is measured once, whoever names it."""
-    (tmp_path / "my_metrics.py").write_text("def f_min_Hz(window):\n    return window.f.min()\n")
+    (tmp_path / "my_metrics.py").write_text("def lowest_f_Hz(window):\n    return window.f.min()\n")
     monkeypatch.syspath_prepend(tmp_path)
-    own = "my_metrics:f_min_Hz"
+    own = "my_metrics:lowest_f_Hz"
 
     table = gp.sweep(scenario.replace({"metrics": [own]}), {"seed": [1]}, cases=["I"], metrics=["MPSI", own], jobs=1)
 
-    assert table.columns.tolist()[3:] == ["why", "metric_warnings", "islanding.MPSI", "islanding.f_min_Hz"]
+    assert table.columns.tolist()[3:] == ["why", "metric_warnings", "islanding.MPSI", "islanding.lowest_f_Hz"]
 
 
 def test_a_sweep_over_processes_has_the_rows_of_one_process(scenario: gp.Scenario) -> None:
