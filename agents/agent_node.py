@@ -21,9 +21,6 @@ from wire.messages import PLANT, LinkReport, Measurement, Nameplate, State, Stop
 from wire.node import Route
 from wire.plant_follower import PlantFollower
 
-REPORT_TICKS = 100
-"""What emulated links did is sent every so many ticks."""
-
 
 class AgentNode(PlantFollower):
     """One agent in a run.
@@ -56,7 +53,7 @@ class AgentNode(PlantFollower):
         self._config, self._instance, self._links = config, instance, links
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
-        """What it heard last."""
+        """The last measurement and the last states that it heard."""
         self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
         self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
 
@@ -76,11 +73,6 @@ class AgentNode(PlantFollower):
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
         return tuple(self._routes)
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
 
     @property
     def finished(self) -> bool:

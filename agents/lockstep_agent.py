@@ -24,12 +24,12 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.agent_config import AgentConfig
-from agents.agent_node import REPORT_TICKS, AgentNode
+from agents.agent_node import AgentNode
 from agents.laws.law import Law
 from agents.topology import is_pairwise
 from wire.clock import time_of
 from wire.codec import RejectedError, encode
-from wire.links import Links
+from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.node import Route
 from wire.tick_barrier import Awaited, TickBarrier
@@ -65,6 +65,8 @@ class LockstepAgent(AgentNode):
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None
         """The last roster that this process is on."""
+        self._processes: dict[str, str] = {}
+        """The process of each name on it."""
         self._ready = False
         """Whether all is known that this roster needs. It stays so if somebody dies: the next roster tells."""
         self._proofs: dict[tuple[str, str], bool] = {}
@@ -78,7 +80,7 @@ class LockstepAgent(AgentNode):
         self._neighbours: tuple[str, ...] = ()
         """In-neighbours on the roster of the last tick."""
         self._neighbours_of: tuple[str, ...] = ()
-        """That roster."""
+        """Roster of the last tick."""
         self._ending = ""
         """Why it is about to close."""
         self._reported = False
@@ -197,7 +199,7 @@ class LockstepAgent(AgentNode):
         instances = dict(zip(message.roster, message.instances, strict=True))
         if instances.get(self._name) != self._instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")
-        self._roster, self._ready = message, False
+        self._roster, self._processes, self._ready = message, instances, False
         for name, instance in instances.items():
             self.members.prefer(name, instance)
             if name in self.members.nameplates:
@@ -210,23 +212,19 @@ class LockstepAgent(AgentNode):
         self._listen_to(name)
         self._ask(name, instance)
 
-    def _members_of_roster(self) -> dict[str, str]:
-        """Names on the roster, and their processes."""
-        return {} if self._roster is None else dict(zip(self._roster.roster, self._roster.instances, strict=True))
-
     def _unmet(self) -> list[str]:
         """Members of the roster whose nameplate is missing."""
         met = self.members.nameplates
         return [
             name
-            for name, instance in self._members_of_roster().items()
+            for name, instance in self._processes.items()
             if name != self._name and (name not in met or self.members.instance(name) != instance)
         ]
 
     def _unproven(self) -> list[str]:
         """In-neighbours on the roster that have not proven that they hear the subscription to them."""
-        instances = self._members_of_roster()
-        return [name for name in self._agent.in_neighbours(instances) if not self._proofs.get((name, instances[name]))]
+        neighbours = self._agent.in_neighbours(self._processes)
+        return [name for name in neighbours if not self._proofs.get((name, self._processes[name]))]
 
     def _get_ready(self, now: float) -> None:
         """Ask for proof of whom this roster makes in-neighbours; say so once nothing is missing any more."""
@@ -311,11 +309,10 @@ class LockstepAgent(AgentNode):
             self._neighbours = self._agent.in_neighbours(grant.roster)
         early, self._early = self._early, {}
         self._grant, self._tick = None, grant.seq + 1
-        instances = self._members_of_roster()
         awaited = {
             name: f"State({grant.seq})"
             for name in self._neighbours
-            if name not in early and self.members.instance(name) == instances.get(name)
+            if name not in early and self.members.instance(name) == self._processes.get(name)
         }
         self._barrier.wait_for({PLANT: f"Measurement({self._tick})", **awaited}, now)
         for state, payload in early.values():

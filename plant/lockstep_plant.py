@@ -20,10 +20,10 @@ from typing import Literal
 
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
-from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
+from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.telemetry_reporter import measurement_of
 from wire.codec import RejectedError, encode
-from wire.links import Links, is_usable
+from wire.links import REPORT_TICKS, Links, is_usable
 from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, PlantEvent, Prepare, Ready, State
 from wire.node import Route
 from wire.tick_barrier import Awaited, TickBarrier
@@ -317,7 +317,7 @@ class LockstepPlant(PlantNode):
             self._close("end of the scenario", now)
         elif self.tick % TELEMETRY_TICKS == 0:
             self._report(final=False)
-            if self.tick % LINK_TICKS == 0:
+            if self.tick % REPORT_TICKS == 0:
                 self._report_links()
 
     # ---------------------------------------------------------------- telemetry and the end

@@ -25,9 +25,6 @@ from wire.printable import printable
 CLOSING = 2.0
 """Longest wait for the others to close (s)."""
 
-LINK_TICKS = 100
-"""What emulated links to the plant did is sent every so many ticks."""
-
 STAYS = "its inverter stays on primary droop at its last set-points"
 """What becomes of the inverter of an agent that dies."""
 
@@ -74,11 +71,6 @@ class PlantNode(Node):
     def token(self) -> str:
         """Key of the plant's liveliness token."""
         return self.keys.alive_plant(self.config.incarnation)
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
 
     @property
     def t(self) -> float:

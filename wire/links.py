@@ -9,6 +9,9 @@ from wire.admission import Admission
 from wire.codec import RejectedError, RejectedMessages, decode
 from wire.messages import AnyMessage, Measurement, State
 
+REPORT_TICKS = 100
+"""Ticks between two reports of a receiver on what the links into it did."""
+
 
 class Arrival(Protocol):
     """A message that a link has let through."""

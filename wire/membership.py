@@ -84,10 +84,6 @@ class Membership:
         """Process that counts for a name; empty if there is none."""
         return next(iter(self._instances.get(name, ())), "")
 
-    def names(self) -> list[str]:
-        """Return the names that some process claims, in the order in which they appeared."""
-        return list(self._instances)
-
     def meet(self, instance: str, nameplate: Nameplate) -> bool:
         """Take the answer of a process; whether it is the first one of a process that counts.
 

@@ -33,6 +33,9 @@ from wire.messages import AnyMessage, Message, Nameplate
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of one of its route's types, its bytes, and the time; RejectedError if it is not for here and now."""
 
+CLOCK_ALONE = 1 << 30
+"""Messages needed by a node that its clock wakes: they wait for its next tick; only tokens and words wake it before."""
+
 ANYBODY = ""
 """Sender of a route on which whoever is there may speak."""
 
@@ -101,6 +104,11 @@ class Node:
         except Exception as error:
             # The last line of defence: an error of ours, which some message has found, is that message's end alone.
             self.rejects.failed(key, error)
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+        return self.keys.any_alive
 
     # ---------------------------------------------------------------- nameplates
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
-from agents.agent_node import REPORT_TICKS, AgentNode
+from agents.agent_node import AgentNode
 from agents.laws.law import Law
 from agents.realtime.agent_statistics import AgentStatistics, Phase
 from agents.realtime.link_command_receiver import LinkCommandReceiver
@@ -28,9 +28,9 @@ from agents.realtime.session_health import SessionHealth
 from agents.realtime.tick_timer import TickTimer
 from wire.admission import FASTER
 from wire.codec import encode
-from wire.links import Links
+from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
-from wire.node import Route
+from wire.node import CLOCK_ALONE, Route
 from wire.timer import Timer
 
 STATUS_PERIOD = 0.5
@@ -39,9 +39,6 @@ STATUS_PERIOD = 0.5
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
 take what was sent last with it."""
-
-WANTED = 1 << 30
-"""Messages wait for the next tick; only tokens and words wake the agent before."""
 
 
 class RealtimeAgent(AgentNode):
@@ -95,7 +92,7 @@ class RealtimeAgent(AgentNode):
         self._routes = dict(self._first_routes)
         self._plants.clear()
         self.admission.release(PLANT)
-        for name in self.members.names():
+        for name in self.members.nameplates:
             self._agent.forget(name)
         self.members.clear()
         self.states.clear()
@@ -125,7 +122,7 @@ class RealtimeAgent(AgentNode):
     @property
     def messages_needed(self) -> int:
         """Number of messages to be woken for: messages wait for the tick."""
-        return WANTED
+        return CLOCK_ALONE
 
     @property
     def deadline(self) -> float:

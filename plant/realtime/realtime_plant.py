@@ -20,7 +20,7 @@ from typing import Literal
 
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
-from plant.plant_node import CLOSING, LINK_TICKS, STAYS, PlantNode
+from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.realtime.kept_telemetry import KeptTelemetry
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.pacer import RealTimePacer
@@ -29,7 +29,7 @@ from plant.realtime.silence_detector import SilenceDetector
 from plant.telemetry_reporter import measurement_of
 from wire.admission import FASTER
 from wire.codec import encode
-from wire.links import Links, is_usable
+from wire.links import REPORT_TICKS, Links, is_usable
 from wire.messages import (
     PLANT,
     AgentStatus,
@@ -42,7 +42,7 @@ from wire.messages import (
     State,
     Waiting,
 )
-from wire.node import ANYBODY, Route
+from wire.node import ANYBODY, CLOCK_ALONE, Route
 from wire.rate_limit import RateLimit
 from wire.timer import Timer
 
@@ -68,9 +68,6 @@ WAITING = 0.5
 
 REFUSALS = 20
 """Refused processes that are logged: anybody may hold tokens."""
-
-WANTED = 1 << 30
-"""While it runs, messages wait for the next step; only tokens and words wake the plant before."""
 
 
 class RealtimePlant(PlantNode):
@@ -140,7 +137,7 @@ class RealtimePlant(PlantNode):
     @property
     def messages_needed(self) -> int:
         """Number of messages to be woken for."""
-        return WANTED if self.phase == "running" else 1
+        return CLOCK_ALONE if self.phase == "running" else 1
 
     @property
     def deadline(self) -> float:
@@ -412,7 +409,7 @@ class RealtimePlant(PlantNode):
         self._reporter.collect()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
             self._report(final=False)
-        if self.tick % LINK_TICKS == 0:
+        if self.tick % REPORT_TICKS == 0:
             self._report_links()
         return True
 

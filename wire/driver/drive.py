@@ -84,10 +84,6 @@ class StoppedError(BaseException):
     """
 
 
-EVERYTHING = 1 << 30
-"""More messages than can be `wanted`: who wants so many is woken by its clock, by tokens and by words only."""
-
-
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
     """Do what a core asks for, in its order."""
     for action in actions:
