@@ -61,7 +61,7 @@ class Agent:
     >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
     ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="none", graph="none"), deadline=10.0,
     ...     connect=()))
-    >>> agent.tick(Measurement(sender="plant", incarnation=1, seq=0, t=0.0, to="inv1", P=3e5, Q=0.0, V=277.0, f=59.9,
+    >>> agent.tick(Measurement(sender="plant", epoch=1, seq=0, t=0.0, to="inv1", P=3e5, Q=0.0, V=277.0, f=59.9,
     ...     P_set=3e5, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))).P_set
     300000.0
     """
@@ -105,7 +105,7 @@ class Agent:
     def meet(self, nameplate: Nameplate) -> None:
         """Note who somebody is; what was heard of another life of it is forgotten."""
         known = self._known.get(nameplate.sender)
-        if known is not None and known.incarnation != nameplate.incarnation:
+        if known is not None and known.epoch != nameplate.epoch:
             self._drop(nameplate.sender)
         self._known[nameplate.sender] = nameplate
 
@@ -231,7 +231,7 @@ class Agent:
     def _state(self, measurement: Measurement, P_set: float, V_set: float) -> State:
         return State(
             sender=self.config.name,
-            incarnation=self.config.incarnation,
+            epoch=self.config.epoch,
             seq=measurement.seq,
             t=measurement.t,
             P_set=P_set,

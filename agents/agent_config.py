@@ -176,7 +176,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)
     """Where other agents can connect; port 0 is any free one."""
-    incarnation: int = 1
+    epoch: int = 1
     """Which life of this agent."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the plant, or real time."""

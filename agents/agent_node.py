@@ -54,7 +54,7 @@ class AgentNode(PlantFollower):
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
         """The last measurement and the last states that it heard."""
-        self._routes[self.keys.dismissal(config.name, instance)] = Route(PLANT, (Stop,), self._on_dismissal)
+        self._routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
         self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
 
     # ---------------------------------------------------------------- what the driver needs
@@ -129,7 +129,7 @@ class AgentNode(PlantFollower):
             raise RejectedError("unexpected", f"the measurement of {message.to}")
         self._on_measurement(message, payload, now)
 
-    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
+    def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
         raise NotImplementedError
 
     def _on_measurement(self, message: Measurement, payload: bytes, now: float) -> None:
@@ -162,7 +162,7 @@ class AgentNode(PlantFollower):
         for data in parts:
             report = LinkReport(
                 sender=self._name,
-                incarnation=self._config.incarnation,
+                epoch=self._config.epoch,
                 seq=0,
                 t=0.0,
                 data=data,

@@ -48,7 +48,7 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
     if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
-        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+        config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
     try:
         law = make_law(config.control)
     except ValueError as error:

@@ -161,7 +161,7 @@ class LockstepAgent(AgentNode):
             self._barrier.renew(now)
             self._get_ready(now)
 
-    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
+    def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
         if message.refused:
             self.failed = message.reason
         else:
@@ -242,7 +242,7 @@ class LockstepAgent(AgentNode):
         else:
             self._barrier.renew(now)
         t = time_of(self._tick or 0, self._config.T_c)
-        ready = Ready(sender=self._name, incarnation=self._config.incarnation, seq=self._roster.seq, t=t)
+        ready = Ready(sender=self._name, epoch=self._config.epoch, seq=self._roster.seq, t=t)
         self._publish(self.keys.ready(self._name), encode(ready))
 
     # ---------------------------------------------------------------- ticks

@@ -19,10 +19,10 @@ class NeighbourStates:
     The age of a state counts from its arrival; but one that was long on its way is as old as its time says:
 
     >>> states = NeighbourStates()
-    >>> states.keep(State(sender="inv2", incarnation=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0), at=10.0)
+    >>> states.keep(State(sender="inv2", epoch=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0), at=10.0)
     >>> states.age("inv2", at=10.25), states.age("inv3", at=10.25)
     (0.25, inf)
-    >>> states.keep(Measurement(sender="plant", incarnation=1, seq=100, t=2.0, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0,
+    >>> states.keep(Measurement(sender="plant", epoch=1, seq=100, t=2.0, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0,
     ...     P_set=0.0, V_set=277.0, grid_connected=False, island="inv1", roster=()), at=10.25)
     >>> states.t, states.age("inv2", at=10.25)
     (2.0, 1.5)

@@ -11,7 +11,7 @@ def nameplate_of(config: AgentConfig) -> Nameplate:
     """Make the nameplate of an agent from its configuration."""
     return Nameplate(
         sender=config.name,
-        incarnation=config.incarnation,
+        epoch=config.epoch,
         seq=0,
         t=0.0,
         kind=config.kind,

@@ -256,7 +256,7 @@ class Watched:
         """Operate a switch."""
         self._commands += 1
         command = Command(
-            sender=OBSERVER, incarnation=1, seq=self._commands, t=0.0, verb=verb, argument=name, reply_to=OBSERVER
+            sender=OBSERVER, epoch=1, seq=self._commands, t=0.0, verb=verb, argument=name, reply_to=OBSERVER
         )
         self.session.publish(self.keys.command, encode(command))
 

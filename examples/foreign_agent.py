@@ -72,7 +72,7 @@ class Agent:
     def __init__(self, config: dict, session: zenoh.Session) -> None:
         self.config, self.session, self.name = config, session, config["name"]
         self.wall, self.root = config["clock"] == "wall", f"gridpeers/{config['run']}/"
-        self.head = {"sender": self.name, "incarnation": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}
+        self.head = {"sender": self.name, "epoch": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}
         self.own = self.head | {"type": "Nameplate"}
         self.own |= {key: config[key] for key in ("kind", "microgrid", "P_rated", "V_nom", "f_nom", "m_p", "m_q")}
         self.inbox = queue.SimpleQueue()
@@ -83,7 +83,8 @@ class Agent:
         self.neighbours: list[str] = []  # simulated time: those on the roster of the last tick
         self.prepare = self.measurement = self.set_points = None  # not answered yet; not used yet; W and V
         self.island, self.sent, self.leaving, self.status, self.due, self.ticked = "", 0, False, -1, 0.0, 0.0
-        for key in ("control", f"measurement/{self.name}", f"order/{self.name}", f"dismissal/{me}", "state/*"):
+        mine = (f"measurement/{self.name}", f"link_request/{self.name}", f"stop_request/{me}")
+        for key in ("control", "state/*", *mine):
             session.declare_subscriber(self.root + key, self.enqueue, allowed_origin=zenoh.Locality.REMOTE)
         session.declare_queryable(key := f"{self.root}nameplate/{me}", lambda q: q.reply(key, pack(self.own)))
         session.liveliness().declare_subscriber(self.root + "alive/**", self.enqueue, history=True)
@@ -122,7 +123,7 @@ class Agent:
             raise ValueError("not finite")
         who, speaker = tuple(key[-2:]), self.plate(key[-1] if message["type"] == "State" else "plant")
         if key[0] == "alive" and item:
-            self.alive.setdefault(who, {"sender": "plant", "incarnation": int(who[1])} if who[0] == "plant" else None)
+            self.alive.setdefault(who, {"sender": "plant", "epoch": int(who[1])} if who[0] == "plant" else None)
             if key[1] == "agent" and not self.alive[who]:  # ask who it is; we have subscribed before
                 self.session.get(f"{self.root}nameplate/{who[0]}/{who[1]}", lambda r: r.ok and self.enqueue(r.ok))
         elif key[0] == "alive":
@@ -131,7 +132,7 @@ class Agent:
                 self.measurement, self.due, self.status = None, 0.0, -1 if self.wall else 3
         elif key[0] == "nameplate" and who in self.alive:
             self.alive[who] = message
-        elif key != ["leave"] and any(message[same] != speaker[same] for same in ("sender", "incarnation")):
+        elif key != ["leave"] and any(message[same] != speaker[same] for same in ("sender", "epoch")):
             raise ValueError("not of who speaks for this name")
         elif message["type"] == "State" and linked(self.config["control"], self.own, speaker):
             old = [heard for heard in self.states.get(key[1], []) if heard[0] == speaker][-1:]
@@ -149,9 +150,9 @@ class Agent:
             self.leaving, self.due = True, time.monotonic() + 1.0
         elif message["type"] == "Stop":
             self.status = (2 if self.wall else 3) if message.get("refused") else 0
-        elif message["type"] == "LinkOrder":
+        elif message["type"] == "LinkRequest":
             said = {"ok": False, "text": "no emulated links", "reply_to": message["reply_to"], "data": b""}
-            self.publish("obeyed", "LinkAnswer", message["seq"], message["t"], **said)
+            self.publish("link_acknowledgement", "LinkAcknowledgement", message["seq"], message["t"], **said)
         if self.prepare and all(self.alive.get(member) for member in self.members.items()):
             self.publish("ready", "Ready", self.prepare["seq"], self.prepare["t"])
             self.prepare = None

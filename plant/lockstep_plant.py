@@ -213,7 +213,7 @@ class LockstepPlant(PlantNode):
         self._barrier.wait_for(dict.fromkeys(self._roster, f"Ready({self._roster_number})"), now)
         prepare = Prepare(
             sender=PLANT,
-            incarnation=self.config.incarnation,
+            epoch=self.config.epoch,
             seq=self._roster_number,
             t=self.t,
             roster=self._roster,
@@ -245,7 +245,7 @@ class LockstepPlant(PlantNode):
         instance = self.members.instance(name)
         if instance:
             self.members.dismiss(name)
-            self.stop(self.keys.dismissal(name, instance), text)
+            self.stop(self.keys.stop_request(name, instance), text)
 
     def _note(self, name: str, text: str) -> None:
         self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=name, text=text))
@@ -288,12 +288,12 @@ class LockstepPlant(PlantNode):
 
     def _grant(self, now: float) -> None:
         """Send every agent its measurement, and with it the grant of this tick."""
-        t, tick, roster, incarnation = self.t, self.tick, self._roster, self.config.incarnation
+        t, tick, roster, epoch = self.t, self.tick, self._roster, self.config.epoch
         self.phase = "ticking"
         self._barrier.wait_for(dict.fromkeys(roster, f"State({tick})"), now)
         readings = self._plant.measure()
         for name in roster:
-            measurement = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=roster)
+            measurement = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t, roster=roster)
             self._publish(self._measurement_keys[name], encode(measurement))
         if tick == 0:
             self._report(final=False)

@@ -276,7 +276,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Endpoints the plant connects to, beside listening."""
     recorders: tuple[str, ...] = ()
     """Recorders of the telemetry that the plant waits for before tick 0."""
-    incarnation: int = 1
+    epoch: int = 1
     """Which life of this plant."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the agents, or real time."""

@@ -63,14 +63,14 @@ class PlantNode(Node):
         self._tokens: set[str] = set()
         """All tokens of agents and recorders that are there now, refused ones too."""
         self._schedule = Schedule(config, plant.inverters)
-        self._reporter = Reporter(config.incarnation, plant)
+        self._reporter = Reporter(config.epoch, plant)
         self._last_due = False
         """Whether the last telemetry is yet to be sent, though the run has ended."""
 
     @property
     def token(self) -> str:
         """Key of the plant's liveliness token."""
-        return self.keys.alive_plant(self.config.incarnation)
+        return self.keys.alive_plant(self.config.epoch)
 
     @property
     def t(self) -> float:
@@ -116,7 +116,7 @@ class PlantNode(Node):
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
         """Tell a process that it cannot take part."""
-        self.stop(self.keys.dismissal(name, instance), reason, refused=True)
+        self.stop(self.keys.stop_request(name, instance), reason, refused=True)
 
     def _recorder_came(self, name: str, now: float) -> None:
         raise NotImplementedError
@@ -136,10 +136,8 @@ class PlantNode(Node):
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
         """Tell one agent, or all, to close."""
-        incarnation = self.config.incarnation
-        stop = Stop(
-            sender=PLANT, incarnation=incarnation, seq=self.tick, t=self.t, reason=printable(reason), refused=refused
-        )
+        epoch = self.config.epoch
+        stop = Stop(sender=PLANT, epoch=epoch, seq=self.tick, t=self.t, reason=printable(reason), refused=refused)
         self._publish(key, encode(stop))
 
     def _note_state(self, state: State) -> None:
@@ -158,12 +156,12 @@ class PlantNode(Node):
         """Pass on what an agent's links did; it closes once it knows that its last report is here."""
         self._publish(self.keys.telemetry, payload)
         if report.final:
-            self.stop(self.keys.dismissal(report.sender, report.instance), "its report is here")
+            self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
     def _report_links(self, *, last: bool = False) -> None:
         """Send what the emulated links to the plant did since the last report."""
         for data in () if self._links is None else self._links.report(last=last):
-            report = LinkReport(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, data=data)
+            report = LinkReport(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, data=data)
             self._publish(self.keys.telemetry, encode(report))
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:

@@ -72,7 +72,7 @@ def run_plant(
     log = logging.getLogger("plant")
     wall = config.clock == "wall"
     if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
-        config = replace(config, incarnation=max(config.incarnation, time_ns() // 1_000_000))
+        config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
     session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
     try:
         on_word(LISTENING)

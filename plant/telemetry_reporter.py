@@ -18,7 +18,7 @@ _NUMBER_BYTES = 9
 
 
 def measurement_of(
-    name: str, reading: ReadingLike, *, incarnation: int, tick: int, t: float, roster: tuple[str, ...] = ()
+    name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] = ()
 ) -> Measurement:
     """Measurement of one inverter (t in s) from what its sensors read, within the range of any sensor.
 
@@ -27,7 +27,7 @@ def measurement_of(
     """
     return Measurement(
         sender=PLANT,
-        incarnation=incarnation,
+        epoch=epoch,
         seq=tick,
         t=t,
         to=name,
@@ -61,14 +61,14 @@ class Reporter:
 
     Parameters
     ----------
-    incarnation : int
+    epoch : int
         Which life of the plant.
     plant : PlantLike
         Where the rows come from.
     """
 
-    def __init__(self, incarnation: int, plant: PlantLike) -> None:
-        self._incarnation, self._plant = incarnation, plant
+    def __init__(self, epoch: int, plant: PlantLike) -> None:
+        self._epoch, self._plant = epoch, plant
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
         self._quiet: dict[float, int] = {}
@@ -116,7 +116,7 @@ class Reporter:
             part, rows = rows[:at_once], rows[at_once:]
             yield Telemetry(
                 sender=PLANT,
-                incarnation=self._incarnation,
+                epoch=self._epoch,
                 seq=self.seq,
                 t=t,
                 inverters=inverters,

@@ -4,7 +4,7 @@ Both sides ask this of every message, in both kinds of time: as it comes off the
 kept, once more as it is let through.
 
 - A *name* is spoken for under its own keys only.
-- An *epoch* (`incarnation` in messages) is the life of one process, which is known by its token. The plant's token
+- An *epoch* (`epoch` in messages) is the life of one process, which is known by its token. The plant's token
   carries it; an agent tells it in the nameplate that is asked of the one process that holds the token. It is learnt
   once. What comes in any other epoch is a ghost's. Two epochs are equal or not; which of them is greater does not
   matter, so no host's clock decides who is believed.
@@ -44,7 +44,7 @@ class Admission:
     Examples
     --------
     >>> from wire.messages import Ready
-    >>> admission, ready = Admission(), Ready(sender="inv1", incarnation=7, seq=0, t=0.0)
+    >>> admission, ready = Admission(), Ready(sender="inv1", epoch=7, seq=0, t=0.0)
     >>> admission.bind("inv1", 7)
     >>> admission.check(ready)
     >>> admission.bind("inv1", 3)
@@ -85,7 +85,7 @@ class Admission:
 
     def lives(self, message: AnyMessage) -> bool:
         """Whether a message is of the epoch in which its sender speaks now."""
-        return self._epochs.get(message.sender) == message.incarnation
+        return self._epochs.get(message.sender) == message.epoch
 
     def check(self, message: AnyMessage) -> None:
         """Make sure of that.
@@ -96,12 +96,12 @@ class Admission:
             If it is a ghost's, or nobody of this name is known (yet).
         """
         name = message.sender
-        if self._epochs.get(name) == message.incarnation:
+        if self._epochs.get(name) == message.epoch:
             return
-        what = f"{type(message).__name__}({message.seq}) of epoch {message.incarnation} of {name}"
+        what = f"{type(message).__name__}({message.seq}) of epoch {message.epoch} of {name}"
         if name in self._epochs:
             raise RejectedError("ghost", f"{what}, who lives in epoch {self._epochs[name]}")
-        if self._numbered.get(name) == message.incarnation:
+        if self._numbered.get(name) == message.epoch:
             raise RejectedError("ghost", f"{what}, who is gone")
         raise RejectedError("unexpected", f"{what}, of whom no process is known")
 

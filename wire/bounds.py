@@ -43,7 +43,7 @@ Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
 """What people call something in their tables: up to 200 printable characters."""
 
 Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
-"""A sentence for people, or an order that no core reads: up to 4000 printable characters on one line."""
+"""A sentence for people, or a link command, which no core reads: up to 4000 printable characters on one line."""
 
 Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
 """What somebody asked for: printable, and only as long as a message may be."""

@@ -79,7 +79,7 @@ def decode(payload: bytes) -> AnyMessage:
     Examples
     --------
     >>> from wire.messages import Ready
-    >>> decode(encode(Ready(sender="inv1", incarnation=1, seq=0, t=0.0))).sender
+    >>> decode(encode(Ready(sender="inv1", epoch=1, seq=0, t=0.0))).sender
     'inv1'
     """
     if len(payload) > LIMIT:

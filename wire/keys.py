@@ -99,13 +99,13 @@ class Keys:
         """What the emulated links into an agent did."""
         return f"{self._root}/report/{inverter}"
 
-    def order(self, inverter: str) -> str:
+    def link_request(self, inverter: str) -> str:
         """What emulated links into an agent shall do."""
-        return f"{self._root}/order/{inverter}"
+        return f"{self._root}/link_request/{inverter}"
 
-    def obeyed(self, inverter: str) -> str:
+    def link_acknowledgement(self, inverter: str) -> str:
         """Orders that the links into an agent have taken."""
-        return f"{self._root}/obeyed/{inverter}"
+        return f"{self._root}/link_acknowledgement/{inverter}"
 
     def status(self, inverter: str) -> str:
         """How the agent of an inverter fares."""
@@ -119,9 +119,9 @@ class Keys:
         """What became of somebody's commands."""
         return f"{self._root}/answer/{asker}"
 
-    def dismissal(self, inverter: str, instance: str) -> str:
+    def stop_request(self, inverter: str, instance: str) -> str:
         """Word to one instance that it cannot take part."""
-        return f"{self._root}/dismissal/{inverter}/{instance}"
+        return f"{self._root}/stop_request/{inverter}/{instance}"
 
     def nameplate(self, inverter: str, instance: str) -> str:
         """Who one instance is; answered on request."""
@@ -208,7 +208,7 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end"),
         row(
-            keys.dismissal(agent, instance), "publication", "Stop", "plant", "the one instance",
+            keys.stop_request(agent, instance), "publication", "Stop", "plant", "the one instance",
             "when its name is taken or is no inverter of the feeder; wall-clock: when somebody stops it",
         ),
         row(
@@ -225,7 +225,7 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: instead of state, at a tick at which the law does not tell the neighbours",
         ),
         row(
-            keys.telemetry, "publication", "Telemetry, LinkReport, LinkOrder", "plant", "recorders",
+            keys.telemetry, "publication", "Telemetry, LinkReport, LinkRequest", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
         ),
         row(
@@ -233,13 +233,14 @@ def describe() -> tuple[KeySpec, ...]:
             "in a run with emulated links: every 100 ticks, and when it ends",
         ),
         row(
-            keys.order(agent), "publication", "LinkOrder", "plant", "agent",
-            "wall-clock: when somebody gives an order to emulated links, and all of them to who comes later; again "
+            keys.link_request(agent), "publication", "LinkRequest", "plant", "agent",
+            "wall-clock: when somebody gives a link command, and all of them to who comes later; again "
             "every second, until it is answered",
         ),
         row(
-            keys.obeyed(agent), "publication", "LinkAnswer", "agent", "plant, who publishes it on the asker's key",
-            "wall-clock: one for every LinkOrder that came in its turn",
+            keys.link_acknowledgement(agent), "publication", "LinkAcknowledgement", "agent",
+            "plant, who publishes it on the asker's key",
+            "wall-clock: one for every LinkRequest that came in its turn",
         ),
         row(
             keys.leave(agent), "publication", "Leave", "agent", "plant",
@@ -258,7 +259,7 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: once the plant's token is there",
         ),
         row(
-            keys.answer("ASKER"), "publication", "Answer, LinkAnswer", "plant", "the command line that asked",
-            "wall-clock: one Answer for every command; to an order to links the LinkAnswer of everybody, too",
+            keys.answer("ASKER"), "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
+            "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too",
         ),
     )  # fmt: skip

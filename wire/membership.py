@@ -131,4 +131,4 @@ class Membership:
             self._admission.release(name)
         else:
             self.nameplates[name] = nameplate
-            self._admission.bind(name, nameplate.incarnation)
+            self._admission.bind(name, nameplate.epoch)

@@ -3,7 +3,7 @@
 The type of a field is its bounds (`wire.bounds`), and what a message says twice must agree (`__post_init__`). So
 whatever has been decoded is safe to compute with, to print and to put into a key.
 
-Every message carries its sender (`sender`), the epoch of that sender (`incarnation`: the life of one process; see
+Every message carries its sender (`sender`), the epoch of that sender (`epoch`: the life of one process; see
 `wire.admission`), a number (`seq`) and the run's time (`t`, s). In messages of the tick loop `seq` is the tick k and
 `t` is k T_c.
 """
@@ -60,7 +60,7 @@ class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True,
 
     sender: QuickName
     """Name of the inverter whose agent sent it, or `PLANT`."""
-    incarnation: Count
+    epoch: Count
     """Epoch of the sender: the life of one process. Two are equal or not; which is greater says nothing."""
     seq: Count
     """Tick number k in the tick loop, roster number while a roster is prepared."""
@@ -214,16 +214,16 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
             raise ValueError("instance: the last part must say whom to tell that it has come")
 
 
-class LinkOrder(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """What emulated links shall do to messages sent at `t` or later; number 0 asks how they stand (plant -> agent)."""
 
     text: Text
     """What a person ordered, for the agent's links."""
     reply_to: Name
-    """Who wants to know: last part of the key under which the plant passes the `LinkAnswer` on."""
+    """Who wants to know: last part of the key under which the plant passes the `LinkAcknowledgement` on."""
 
 
-class LinkAnswer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+class LinkAcknowledgement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """Links have taken the order of number `seq`, or stand as asked (agent -> plant -> command line)."""
 
     ok: bool
@@ -390,8 +390,8 @@ AnyMessage = (
     | Stop
     | Leave
     | LinkReport
-    | LinkOrder
-    | LinkAnswer
+    | LinkRequest
+    | LinkAcknowledgement
     | Command
     | Answer
     | AgentStatus
@@ -400,7 +400,7 @@ AnyMessage = (
 """Everything that can arrive."""
 
 MESSAGES = (
-    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, LinkOrder, LinkAnswer, Command,
-    Answer, AgentStatus, Telemetry,
+    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, LinkRequest, LinkAcknowledgement,
+    Command, Answer, AgentStatus, Telemetry,
 )  # fmt: skip
 """The types of `AnyMessage`, for documentation that is made from the code."""

@@ -46,7 +46,7 @@ class PlantFollower(Node):
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
         """Follow a plant that is there, if none is followed yet, and check the message."""
-        epoch = message.incarnation
+        epoch = message.epoch
         if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
             self.admission.bind(PLANT, epoch)
             self._follow(epoch)

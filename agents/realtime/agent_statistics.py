@@ -62,7 +62,7 @@ class AgentStatistics:
         lateness, self.lateness = self.lateness, 0.0
         return AgentStatus(
             sender=config.name,
-            incarnation=config.incarnation,
+            epoch=config.epoch,
             seq=self.sent,
             t=states.t,
             phase=phase,

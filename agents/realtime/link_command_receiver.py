@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wire.links import Links
-from wire.messages import LinkAnswer, LinkOrder
+from wire.messages import LinkAcknowledgement, LinkRequest
 from wire.printable import printable
 
 
@@ -17,14 +17,14 @@ class LinkCommandReceiver:
     ----------
     name : str
         The agent.
-    incarnation : int
+    epoch : int
         Its epoch.
     links : Links or None
         Its links; without any, commands are rejected.
     """
 
-    def __init__(self, name: str, incarnation: int, links: Links | None) -> None:
-        self._name, self._incarnation, self._links = name, incarnation, links
+    def __init__(self, name: str, epoch: int, links: Links | None) -> None:
+        self._name, self._epoch, self._links = name, epoch, links
         self._last = 0
         """Number of the last command that was taken."""
 
@@ -34,30 +34,30 @@ class LinkCommandReceiver:
         if self._links is not None:
             self._links.restart()
 
-    def take(self, order: LinkOrder, t: float) -> LinkAnswer | None:
+    def take(self, request: LinkRequest, t: float) -> LinkAcknowledgement | None:
         """Carry a command out, or tell the links' status at t (s of run time); None if an earlier one is missing."""
         if self._links is None:
-            return self._answer(order, ok=False, text="there are no emulated links to this agent")
-        if order.seq == 0:
-            return self._answer(order, ok=True, text="", data=self._links.status(t))
-        if order.seq > self._last + 1:
+            return self._answer(request, ok=False, text="there are no emulated links to this agent")
+        if request.seq == 0:
+            return self._answer(request, ok=True, text="", data=self._links.status(t))
+        if request.seq > self._last + 1:
             return None
-        if order.seq <= self._last:
-            return self._answer(order, ok=True, text="done before")
-        self._last = order.seq
+        if request.seq <= self._last:
+            return self._answer(request, ok=True, text="done before")
+        self._last = request.seq
         try:
-            return self._answer(order, ok=True, text=self._links.command(order.text, order.t).changed)
+            return self._answer(request, ok=True, text=self._links.command(request.text, request.t).changed)
         except ValueError as error:
-            return self._answer(order, ok=False, text=str(error))
+            return self._answer(request, ok=False, text=str(error))
 
-    def _answer(self, order: LinkOrder, *, ok: bool, text: str, data: bytes = b"") -> LinkAnswer:
-        return LinkAnswer(
+    def _answer(self, request: LinkRequest, *, ok: bool, text: str, data: bytes = b"") -> LinkAcknowledgement:
+        return LinkAcknowledgement(
             sender=self._name,
-            incarnation=self._incarnation,
-            seq=order.seq,
-            t=order.t,
+            epoch=self._epoch,
+            seq=request.seq,
+            t=request.t,
             ok=ok,
             text=printable(text),
-            reply_to=order.reply_to,
+            reply_to=request.reply_to,
             data=data,
         )

@@ -29,7 +29,7 @@ from agents.realtime.tick_timer import TickTimer
 from wire.admission import FASTER
 from wire.codec import encode
 from wire.links import REPORT_TICKS, Links
-from wire.messages import PLANT, AnyMessage, Leave, LinkOrder, Measurement, Nameplate, State, Stop, Waiting
+from wire.messages import PLANT, AnyMessage, Leave, LinkRequest, Measurement, Nameplate, State, Stop, Waiting
 from wire.node import CLOCK_ALONE, Route
 from wire.timer import Timer
 
@@ -61,7 +61,7 @@ class RealtimeAgent(AgentNode):
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
         super().__init__(config, instance, links, law, rate=FASTER / config.T_c)
         self._routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
-        self._routes[self.keys.order(config.name)] = Route(PLANT, (LinkOrder,), self._on_link_command)
+        self._routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
         self._first_routes = dict(self._routes)
         self.phase: Phase = "seeking"
         self.session_broken = False
@@ -70,7 +70,7 @@ class RealtimeAgent(AgentNode):
         """What it has done."""
         self._plant_epoch = 0
         """Epoch of the plant that was followed last; 0 before the first."""
-        self._link_commands = LinkCommandReceiver(config.name, config.incarnation, links)
+        self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
         # a clock that is to drift must drift
         self._timer = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
         self._status = Timer(STATUS_PERIOD, 0.0)
@@ -111,7 +111,7 @@ class RealtimeAgent(AgentNode):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         keys, name = self.keys, self._name
-        own = (keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.obeyed)
+        own = (keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement)
         return tuple(key(name) for key in own)
 
     @property
@@ -192,8 +192,8 @@ class RealtimeAgent(AgentNode):
         if self.finished or self._leaving:
             return
         self._report_links(final=True)
-        name, epoch = self._name, self._config.incarnation
-        message = Leave(sender=name, incarnation=epoch, seq=self.statistics.sent, t=self.states.t)
+        name, epoch = self._name, self._config.epoch
+        message = Leave(sender=name, epoch=epoch, seq=self.statistics.sent, t=self.states.t)
         self._publish(self.keys.leave(name), encode(message))
         if self._plants:
             self._leaving = reason
@@ -258,9 +258,9 @@ class RealtimeAgent(AgentNode):
             self._health.plant_seen(now)
             self._missing_agents = message.waits_for
         else:
-            self._on_dismissal(message, payload, now)
+            self._on_stop_request(message, payload, now)
 
-    def _on_dismissal(self, message: Stop, payload: bytes, now: float) -> None:
+    def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
         if message.refused:
             self.failed = message.reason
         elif self._leaving:
@@ -282,10 +282,10 @@ class RealtimeAgent(AgentNode):
             return  # the plant sends its commands to links before a measurement: till then no link is known
         self._hear(message, payload, now * self._config.speed)
 
-    def _on_link_command(self, message: LinkOrder, payload: bytes, now: float) -> None:
+    def _on_link_command(self, message: LinkRequest, payload: bytes, now: float) -> None:
         answer = self._link_commands.take(message, self._run_time)
         if answer is not None:
-            self._publish(self.keys.obeyed(self._name), encode(answer))
+            self._publish(self.keys.link_acknowledgement(self._name), encode(answer))
 
     # ---------------------------------------------------------------- ticks
 

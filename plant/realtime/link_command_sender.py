@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from wire.codec import encode
 from wire.keys import Keys
 from wire.links import Links
-from wire.messages import PLANT, LinkAnswer, LinkOrder
+from wire.messages import PLANT, LinkAcknowledgement, LinkRequest
 
 NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
 """Error when a run has no emulated links."""
@@ -21,7 +21,7 @@ class LinkCommandSender:
 
     Parameters
     ----------
-    incarnation : int
+    epoch : int
         The plant's epoch.
     keys : Keys
         The run's.
@@ -31,11 +31,9 @@ class LinkCommandSender:
         Publishes bytes under a key.
     """
 
-    def __init__(
-        self, incarnation: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]
-    ) -> None:
-        self._incarnation, self._keys, self._links, self._publish = incarnation, keys, links, publish
-        self._given: list[LinkOrder] = []
+    def __init__(self, epoch: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]) -> None:
+        self._epoch, self._keys, self._links, self._publish = epoch, keys, links, publish
+        self._given: list[LinkRequest] = []
         self._acknowledged: dict[str, int] = {}
         """Number of the last command that each agent has acknowledged."""
         self._sent: dict[str, tuple[int, float]] = {}
@@ -54,14 +52,14 @@ class LinkCommandSender:
             raise ValueError(NO_LINKS)
         return self._links
 
-    def give(self, text: str, t: float, reply_to: str) -> tuple[LinkOrder, str, tuple[str, ...]]:
+    def give(self, text: str, t: float, reply_to: str) -> tuple[LinkRequest, str, tuple[str, ...]]:
         """Have links carry out a person's command, for messages sent at t (s of run time) or later.
 
         It is in force for the plant's own links, and published for recorders; `send` sends it to the agents.
 
         Returns
         -------
-        tuple[LinkOrder, str, tuple[str, ...]]
+        tuple[LinkRequest, str, tuple[str, ...]]
             The command, what it does in words, and the receivers of the links that it changes.
 
         Raises
@@ -70,10 +68,10 @@ class LinkCommandSender:
             If it is no command to links, or the run has no emulated links.
         """
         said, receivers, _ = self.links.command(text, t)
-        order = self._order(len(self._given) + 1, text, t, reply_to)
-        self._given.append(order)
-        self._publish(self._keys.telemetry, encode(order))
-        return order, said, receivers
+        request = self._request(len(self._given) + 1, text, t, reply_to)
+        self._given.append(request)
+        self._publish(self._keys.telemetry, encode(request))
+        return request, said, receivers
 
     def send(self, names: Iterable[str], now: float) -> None:
         """Send to each agent the commands that are new, or that it has not acknowledged (s, driver's clock)."""
@@ -84,21 +82,21 @@ class LinkCommandSender:
             if acknowledged == last or (sent == last and not again):
                 continue
             self._sent[name] = last, now
-            for order in self._given[acknowledged if again else max(acknowledged, sent) :]:
-                self._publish(self._keys.order(name), encode(order))
+            for request in self._given[acknowledged if again else max(acknowledged, sent) :]:
+                self._publish(self._keys.link_request(name), encode(request))
 
     def ask(self, names: Iterable[str], t: float, reply_to: str) -> None:
         """Have these agents report the status of the links to them at t (s of run time), and report the plant's own."""
-        question = encode(self._order(0, "", t, reply_to))
+        question = encode(self._request(0, "", t, reply_to))
         for name in names:
-            self._publish(self._keys.order(name), question)
+            self._publish(self._keys.link_request(name), question)
         own = self.links.status(t)
-        incarnation = self._incarnation
+        epoch = self._epoch
         self._pass_on(
-            LinkAnswer(sender=PLANT, incarnation=incarnation, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)
+            LinkAcknowledgement(sender=PLANT, epoch=epoch, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)
         )
 
-    def answered(self, answer: LinkAnswer) -> None:
+    def answered(self, answer: LinkAcknowledgement) -> None:
         """Note what an agent answered, and pass it on to whoever gave the command."""
         name = answer.sender
         self._acknowledged[name] = max(self._acknowledged.get(name, 0), min(answer.seq, len(self._given)))
@@ -113,8 +111,8 @@ class LinkCommandSender:
         """Agents between whom and the plant a fault holds at t (s of run time)."""
         return () if self._links is None else self._links.impaired(t)
 
-    def _order(self, number: int, text: str, t: float, reply_to: str) -> LinkOrder:
-        return LinkOrder(sender=PLANT, incarnation=self._incarnation, seq=number, t=t, text=text, reply_to=reply_to)
+    def _request(self, number: int, text: str, t: float, reply_to: str) -> LinkRequest:
+        return LinkRequest(sender=PLANT, epoch=self._epoch, seq=number, t=t, text=text, reply_to=reply_to)
 
-    def _pass_on(self, answer: LinkAnswer) -> None:
+    def _pass_on(self, answer: LinkAcknowledgement) -> None:
         self._publish(self._keys.answer(answer.reply_to), encode(answer))

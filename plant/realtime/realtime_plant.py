@@ -35,7 +35,7 @@ from wire.messages import (
     AgentStatus,
     Command,
     Leave,
-    LinkAnswer,
+    LinkAcknowledgement,
     LinkReport,
     Nameplate,
     PlantEvent,
@@ -108,14 +108,14 @@ class RealtimePlant(PlantNode):
         """Recorders whose token went while the run went on, and has not come back."""
         self._stays = False
         """Whether the end is kept back only for recorders."""
-        self.link_commands = LinkCommandSender(config.incarnation, self.keys, links, self._publish)
+        self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
         keys = self.keys
         for name in plant.inverters:
             self._routes[keys.state(name)] = self._routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
             self._routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
             self._routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
             self._routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
-            self._routes[keys.obeyed(name)] = Route(name, (LinkAnswer,), self._on_link_answer)
+            self._routes[keys.link_acknowledgement(name)] = Route(name, (LinkAcknowledgement,), self._on_link_answer)
         self._routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
         self.subscriptions = tuple(self._routes)
         """Keys to subscribe to before the token is declared."""
@@ -126,7 +126,7 @@ class RealtimePlant(PlantNode):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         inverters = self.plant.inverters
-        each = (*map(self.keys.measurement, inverters), *map(self.keys.order, inverters))
+        each = (*map(self.keys.measurement, inverters), *map(self.keys.link_request, inverters))
         return self.keys.control, self.keys.telemetry, *each
 
     @property
@@ -228,7 +228,7 @@ class RealtimePlant(PlantNode):
         parts = self.keys.parts(key)
         if self.phase == "closing" and parts[:2] == ("alive", "agent"):
             self._tokens.add(key)
-            self.stop(self.keys.dismissal(*parts[2:]), self.outcome or "the run has ended")
+            self.stop(self.keys.stop_request(*parts[2:]), self.outcome or "the run has ended")
         else:
             super().appeared(key, now)
 
@@ -301,13 +301,13 @@ class RealtimePlant(PlantNode):
             self.admission.check(status)
             self._silence.reported(status)
 
-    def _on_link_answer(self, answer: LinkAnswer, payload: bytes, now: float) -> None:
+    def _on_link_answer(self, answer: LinkAcknowledgement, payload: bytes, now: float) -> None:
         self.link_commands.answered(answer)
 
     def _on_leave(self, leave: Leave, payload: bytes, now: float) -> None:
         name = leave.sender
         instance = self.members.instance(name)
-        self.stop(self.keys.dismissal(name, instance), f"{name} has left")
+        self.stop(self.keys.stop_request(name, instance), f"{name} has left")
         self._forget_process(name, instance)
         self._forget(name)
         if self.phase in ("gathering", "running"):
@@ -350,7 +350,7 @@ class RealtimePlant(PlantNode):
     def _tell_waiting(self) -> None:
         """Tell the agents that the plant is there, and for whom they wait with it."""
         absent = tuple(name for name in self.config.agents if name not in self.members.nameplates)
-        waiting = Waiting(sender=PLANT, incarnation=self.config.incarnation, seq=0, t=self.t, waits_for=absent)
+        waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=absent)
         self._publish(self.keys.control, encode(waiting))
 
     def _let_leave_and_join(self) -> None:
@@ -360,7 +360,7 @@ class RealtimePlant(PlantNode):
             instance = self.members.instance(name)
             if instance:
                 reason = f"{name} leaves at t = {self.t:.2f} s, as the scenario says"
-                self.stop(self.keys.dismissal(name, instance), reason)
+                self.stop(self.keys.stop_request(name, instance), reason)
                 self._say(reason)
         if join:
             self._say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
@@ -380,10 +380,10 @@ class RealtimePlant(PlantNode):
 
     def _measure(self, now: float) -> None:
         """Send every agent that is present its measurement, and who is heard."""
-        readings, t, tick, incarnation = self.plant.measure(), self.t, self.tick, self.config.incarnation
+        readings, t, tick, epoch = self.plant.measure(), self.t, self.tick, self.config.epoch
         heard = tuple(name for name in self.plant.inverters if now - self._came.get(name, now - HEARD) < HEARD)
         for name in self.members.nameplates:
-            message = measurement_of(name, readings[name], incarnation=incarnation, tick=tick, t=t, roster=heard)
+            message = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t, roster=heard)
             self._publish(self.keys.measurement(name), encode(message))
         self._step_due = True
 

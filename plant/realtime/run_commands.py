@@ -38,7 +38,7 @@ class RunCommands:
             text, ok = str(error), False
         return Answer(
             sender=PLANT,
-            incarnation=node.config.incarnation,
+            epoch=node.config.epoch,
             seq=command.seq,
             t=node.t,
             ok=ok,
@@ -73,7 +73,7 @@ class RunCommands:
             if not instance:
                 running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
-            node.stop(node.keys.dismissal(argument, instance), "stopped by command")
+            node.stop(node.keys.stop_request(argument, instance), "stopped by command")
             return f"{argument} was asked to leave at t = {node.t:.2f} s"
         if verb == "synchronise":
             node.plant.switch(argument, "close", synchronised=True)
@@ -94,9 +94,9 @@ class RunCommands:
             return {"number": 0, "t": node.t, "asked": agents}
         overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
         t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
-        order, said, receivers = node.link_commands.give(command.argument, t, command.reply_to)
-        node.note_links(f"order {order.seq} to links: {said}" + (f", from t = {t:.2f} s on" if receivers else ""))
-        return {"number": order.seq, "t": order.t, "asked": agents, "said": said, "receivers": receivers}
+        request, said, receivers = node.link_commands.give(command.argument, t, command.reply_to)
+        node.note_links(f"link command {request.seq}: {said}" + (f", from t = {t:.2f} s on" if receivers else ""))
+        return {"number": request.seq, "t": request.t, "asked": agents, "said": said, "receivers": receivers}
 
     def _agents(self, *, present: bool) -> list[str]:
         met = self._node.members.nameplates

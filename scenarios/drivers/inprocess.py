@@ -209,7 +209,7 @@ def run_inprocess(
         ]
 
         def newcomer(name: str) -> LockstepAgent:
-            known[name] = msgspec.structs.replace(known[name], incarnation=known[name].incarnation + 1)
+            known[name] = msgspec.structs.replace(known[name], epoch=known[name].epoch + 1)
             agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
             return agents[-1]
 

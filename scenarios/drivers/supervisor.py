@@ -72,7 +72,7 @@ class Supervisor:
                 command = list(self._plant_command or usual)
                 self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
                 continue
-            config = replace(self._agents[name], incarnation=life)
+            config = replace(self._agents[name], epoch=life)
             command = ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
             self.children.add(Child(name, command, config, log, self._on_exit))
 

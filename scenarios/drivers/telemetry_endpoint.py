@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.codec import RejectedError, encode
-from wire.messages import PLANT, Answer, AnyMessage, Command, LinkOrder, LinkReport, Telemetry
+from wire.messages import PLANT, Answer, AnyMessage, Command, LinkReport, LinkRequest, Telemetry
 from wire.node import Route
 from wire.plant_follower import PlantFollower
 
@@ -27,7 +27,7 @@ class TelemetryEndpoint(PlantFollower):
         self._name, self._stream = name, stream
         self._questions = 0
         self._recordable: list[Recordable] = []
-        self._routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkOrder), self._on_recordable)
+        self._routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkRequest), self._on_recordable)
         if stream is not None:
             self._routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
 
@@ -62,7 +62,7 @@ class TelemetryEndpoint(PlantFollower):
         return encode(
             Command(
                 sender=name,
-                incarnation=1,
+                epoch=1,
                 seq=self._questions,
                 t=0.0,
                 verb="telemetry",

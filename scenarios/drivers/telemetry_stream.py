@@ -6,7 +6,7 @@ keeps what it has published of late (`plant.realtime.kept_telemetry`) and publis
 
 from __future__ import annotations
 
-from wire.messages import Answer, LinkOrder, LinkReport, Telemetry
+from wire.messages import Answer, LinkReport, LinkRequest, Telemetry
 
 QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""
@@ -21,7 +21,7 @@ LONGEST = 60.0
 """Longest such time (s)."""
 
 
-Recordable = Telemetry | LinkReport | LinkOrder
+Recordable = Telemetry | LinkReport | LinkRequest
 """What the plant publishes for recorders."""
 
 
@@ -36,12 +36,12 @@ class TelemetryStream:
     Examples
     --------
     >>> def telemetry(seq):
-    ...     return Telemetry(sender="plant", incarnation=1, seq=seq, t=0.0, inverters=(), rows=(), events=(),
+    ...     return Telemetry(sender="plant", epoch=1, seq=seq, t=0.0, inverters=(), rows=(), events=(),
     ...         final=False, outcome="", reproducible=False)
     >>> stream = TelemetryStream()
     >>> [len(stream.take(telemetry(seq), now=0.0)) for seq in (0, 1, 3)], stream.question(now=0.0)
     ([1, 1, 0], '2')
-    >>> stream.answered(Answer(sender="plant", incarnation=1, seq=0, t=0.0, ok=True, text="2"), now=0.1)
+    >>> stream.answered(Answer(sender="plant", epoch=1, seq=0, t=0.0, ok=True, text="2"), now=0.1)
     >>> [len(stream.take(telemetry(seq), now=0.1)) for seq in (2, 3, 3, 4)], stream.question(now=0.2)
     ([1, 1, 0, 1], None)
     """

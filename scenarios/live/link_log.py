@@ -22,7 +22,7 @@ from scenarios.spec import Scenario
 from scenarios.spec.agent_schedule import inverters_of
 from scenarios.spec.netem_tables import netem_of
 from scenarios.spec.scenario_writing import to_toml
-from wire.messages import LinkOrder, LinkReport
+from wire.messages import LinkReport, LinkRequest
 
 
 class LinkLog:
@@ -37,9 +37,9 @@ class LinkLog:
     folder : Path or None
         Where links.csv and links.json go; None for nowhere.
     replay : Path or None
-        File of the scenario that replays the run's links: written in any case, and anew with every order.
+        File of the scenario that replays the run's links: written in any case, and anew with every link command.
     by_the_way : Path or None
-        The same, but only written once there is an order.
+        The same, but only written once there is a link command.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class LinkLog:
         """Hash of the fates of all messages on emulated links; "" if none was sent."""
         return self._record.sha256 if any(book.sent for book in self._record.counts.values()) else ""
 
-    def __call__(self, message: LinkReport | LinkOrder) -> None:
+    def __call__(self, message: LinkReport | LinkRequest) -> None:
         """Take a report of links, or a command to them."""
         if isinstance(message, LinkReport):
             if self._folder is not None:
@@ -106,7 +106,7 @@ def replay_of(scenario: Scenario, feeder: Feeder, changes: Sequence[Change], t: 
     feeder : Feeder
         Its feeder.
     changes : Sequence[Change]
-        What was ordered.
+        The link commands.
     t : float
         How far the run came (s): the scenario ends there, if it does not end later anyway.
     """

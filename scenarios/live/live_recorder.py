@@ -12,7 +12,7 @@ from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, Word
 from scenarios.live.link_log import LinkLog
 from scenarios.live.show.events import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
-from wire.messages import LinkOrder, LinkReport, Pacing, Telemetry
+from wire.messages import LinkReport, LinkRequest, Pacing, Telemetry
 from wire.rate_limit import RateLimit
 
 _STOP = "stop"
@@ -158,7 +158,7 @@ class LiveRecorder:
         for before, after in recorder.missing[known:]:
             self._say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
 
-    def _take_links(self, message: LinkReport | LinkOrder) -> None:
+    def _take_links(self, message: LinkReport | LinkRequest) -> None:
         if self._link_log is None:
             return
         try:

@@ -20,7 +20,7 @@ from scenarios.live.run_address import (
 from wire.codec import RejectedError, decode
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
-from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAnswer, Telemetry
+from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
 
 VISITOR = "visitor"
 
@@ -106,7 +106,7 @@ class RunClient:
             message = decode(payload)
         except RejectedError:  # nothing depends on a visitor
             return None
-        of_plant = message.sender == PLANT and message.incarnation in self.epochs
+        of_plant = message.sender == PLANT and message.epoch in self.epochs
         match self.keys.parts(key), message:
             case ("status", name), AgentStatus():
                 believed = message.sender == name
@@ -114,7 +114,7 @@ class RunClient:
                 believed = of_plant
             case ("answer", _), Answer():
                 believed = of_plant
-            case ("answer", _), LinkAnswer():
+            case ("answer", _), LinkAcknowledgement():
                 believed = True
             case _:
                 believed = False

@@ -19,7 +19,7 @@ from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
-from wire.messages import PLANT, Answer, Command, LinkAnswer
+from wire.messages import PLANT, Answer, Command, LinkAcknowledgement
 from wire.table_schema import Problem
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
@@ -60,17 +60,17 @@ def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
 
 def _request(
     client: RunClient, verb: Verb, argument: str, receivers: Callable[[str], set[str]]
-) -> tuple[str, dict[str, LinkAnswer]]:
+) -> tuple[str, dict[str, LinkAcknowledgement]]:
     """Return the plant's answer, and the answers that come in time of the receivers that follow from it."""
-    command = Command(sender="visitor", incarnation=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=client.id)
+    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=client.id)
     client.publish(client.keys.command, encode(command))
     text: str | None = None
-    answers: dict[str, LinkAnswer] = {}
+    answers: dict[str, LinkAcknowledgement] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
         for key, payload in client.take(left):
             message = client.read(key, payload)
-            if isinstance(message, LinkAnswer):
+            if isinstance(message, LinkAcknowledgement):
                 answers[message.sender] = message
             elif isinstance(message, Answer):
                 if not message.ok:
@@ -260,7 +260,7 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
     return reply.t, found, tuple(name for name in reply.asked if name not in answers)
 
 
-def _request_links(client: RunClient, verb: Verb, argument: str) -> tuple[_LinkReply, dict[str, LinkAnswer]]:
+def _request_links(client: RunClient, verb: Verb, argument: str) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
     text, answers = _request(client, verb, argument, lambda text: _link_reply(text).answers_needed)
     return _link_reply(text), answers
 

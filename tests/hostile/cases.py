@@ -31,8 +31,8 @@ BODIES: dict[str, dict[str, Any]] = {
     "Stop": dict(reason="enough", refused=False),
     "Leave": {},
     "LinkReport": dict(data=b"book", instance="a", final=False),
-    "LinkOrder": dict(text="{}", reply_to="z1"),
-    "LinkAnswer": dict(ok=True, text="done", reply_to="z1", data=b""),
+    "LinkRequest": dict(text="{}", reply_to="z1"),
+    "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
     "Command": dict(verb="status", argument="", reply_to="z1"),
     "Answer": dict(ok=True, text="done"),
     "AgentStatus": dict(
@@ -75,7 +75,7 @@ def sealed(body: bytes) -> bytes:
 
 def sound(kind: type[Message], **header: Any) -> dict[str, Any]:
     """A message that can be decoded, as a dictionary."""
-    head = dict(type=kind.__name__, sender="inv2", incarnation=1, seq=3, t=0.06)
+    head = dict(type=kind.__name__, sender="inv2", epoch=1, seq=3, t=0.06)
     return {**head, **BODIES[kind.__name__], **header}
 
 
@@ -211,14 +211,14 @@ def hostile(keys: Truth, epochs: Mapping[str, int], rng: random.Random) -> Itera
         Draws the order.
     """
     headers: list[dict[str, Any]] = [
-        {"sender": sender, "incarnation": epoch + life, "seq": seq}
+        {"sender": sender, "epoch": epoch + life, "seq": seq}
         for sender, epoch in epochs.items()
         for life, seq in ((0, 3), (-1, 10**6), (1, 2**53 - 1))
     ]
     every = [*keys]
     found = [(key, case.payload) for header in headers for case in all_cases(**header) for key in rng.sample(every, 2)]
     found += [
-        (key, packed(sound(kind, sender=sender, incarnation=epoch, seq=seq, t=t)))
+        (key, packed(sound(kind, sender=sender, epoch=epoch, seq=seq, t=t)))
         for key in every
         for kind in MESSAGES
         for sender, epoch in epochs.items()
@@ -239,4 +239,4 @@ def _is_true(key: str, payload: bytes, keys: Truth, epochs: Mapping[str, int]) -
         return False
     if not isinstance(message, types) or isinstance(message, Nameplate):
         return False
-    return not sender or (message.sender == sender and message.incarnation == epochs[sender])
+    return not sender or (message.sender == sender and message.epoch == epochs[sender])

@@ -107,7 +107,7 @@ def on_the_plant(
             reading, late = readings[k][name], readings[max(k - measurement, 0)][name]
             reading = reading._replace(f=late.f) if frequency_only else reading._replace(f=late.f, Q=late.Q, V=late.V)
             states[name] = agent.tick(
-                measurement_of(name, reading, incarnation=1, tick=k, t=k * T, roster=roster), neighbours
+                measurement_of(name, reading, epoch=1, tick=k, t=k * T, roster=roster), neighbours
             )
         said.append(states)
         for name, late_state in said[max(k - setpoint, 0)].items():

@@ -15,9 +15,9 @@ from wire.messages import (
     AgentStatus,
     Command,
     Leave,
-    LinkAnswer,
-    LinkOrder,
+    LinkAcknowledgement,
     LinkReport,
+    LinkRequest,
     Measurement,
     Nameplate,
     State,
@@ -45,18 +45,18 @@ def test_a_foreign_peer_ends_no_process_and_harms_no_control(tmp_path: Path) -> 
             {token.split("/")[-1]: token.split("/")[-2] for token in town.tokens if "/agent/" in token},
         )
         assert town.telemetry is not None
-        epochs = {name: town.status[name].incarnation for name in THREE} | {"plant": town.telemetry.incarnation}
+        epochs = {name: town.status[name].epoch for name in THREE} | {"plant": town.telemetry.epoch}
         truth: Truth = {
             keys.control: ("plant", (Stop, Waiting)),
             keys.command: ("", (Command,)),
             **{keys.measurement(name): ("plant", (Measurement,)) for name in THREE},
-            **{keys.order(name): ("plant", (LinkOrder,)) for name in THREE},
+            **{keys.link_request(name): ("plant", (LinkRequest,)) for name in THREE},
             **{keys.state(name): (name, (State,)) for name in THREE},
             **{keys.leave(name): (name, (Leave,)) for name in THREE},
             **{keys.status(name): (name, (AgentStatus,)) for name in THREE},
             **{keys.report(name): (name, (LinkReport,)) for name in THREE},
-            **{keys.obeyed(name): (name, (LinkAnswer,)) for name in THREE},
-            **{keys.dismissal(name, instance): ("plant", (Stop,)) for instance, name in name_of.items()},
+            **{keys.link_acknowledgement(name): (name, (LinkAcknowledgement,)) for name in THREE},
+            **{keys.stop_request(name, instance): ("plant", (Stop,)) for instance, name in name_of.items()},
             **{keys.nameplate(name, instance): (name, (Nameplate,)) for instance, name in name_of.items()},
         }
         foreigner = Session("foreigner", listen=("tcp/127.0.0.1:0",), connect=(town.endpoint,), clock="wall")

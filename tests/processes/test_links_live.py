@@ -1,4 +1,4 @@
-"""Emulated links in wall-clock time, with real processes: ordered while the run goes on, and as a scenario says."""
+"""Emulated links in wall-clock time, with real processes: commanded while the run goes on, and as a scenario says."""
 
 from __future__ import annotations
 
@@ -63,16 +63,18 @@ def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTr
 
 
 def give(town: Town, order: LinkCommand, *receivers: str) -> float:
-    """Give an order and wait until the receivers have taken it; from when on (s) it holds."""
-    before = len(town.obeyed)
+    """Give a link command and wait until the receivers have taken it; from when on (s) it holds."""
+    before = len(town.acknowledgements)
     answer = town.command("link", order.to_text())
     assert answer.ok, answer.text
     taken = json.loads(answer.text)
     town.until(
-        lambda: {other.sender for other in town.obeyed[before:] if other.seq == taken["number"]} >= {*receivers},
+        lambda: (
+            {other.sender for other in town.acknowledgements[before:] if other.seq == taken["number"]} >= {*receivers}
+        ),
         f"order {taken['number']} is taken by {', '.join(receivers)}",
     )
-    assert all(other.ok for other in town.obeyed[before:])
+    assert all(other.ok for other in town.acknowledgements[before:])
     return float(taken["t"])
 
 
@@ -210,7 +212,7 @@ def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
     )
     assert code == 0, text
     assert said is not None, text
-    plant.expect(r"order 1 to links: inv1 -> inv4: loss 0.2, delay 0.08 to 0.12 s, from t = [\d.]+ s on")
+    plant.expect(r"link command 1: inv1 -> inv4: loss 0.2, delay 0.08 to 0.12 s, from t = [\d.]+ s on")
     code, text = desk.type("link", "cut", "inv4", "inv7", "--for", "60")
     assert (code, text.splitlines()[1:]) == (0, ["acknowledged: inv4", "no agent yet, told when it comes: inv7"]), text
     code, text = desk.type("link", "show")
@@ -237,7 +239,7 @@ def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
     case = desk.folder / "here" / "IV"
     assert sorted(path.name for path in case.iterdir()) == ["events.csv", "history.csv", "links.csv", "links.json"]
     events = (case / "events.csv").read_text()
-    assert events.count(',link,links,"order ') == 3
+    assert events.count(',link,links,"link command ') == 3
     assert (desk.folder / "here" / "replay.toml").read_text() == (desk.folder / "again.toml").read_text()
     entries = load_scenario(desk.folder / "again.toml")[0].netem.links
     assert {(entry.on, entry.from_s) for entry in entries if "inv1" in entry.on} == {("inv1 -> inv4", float(said[1]))}

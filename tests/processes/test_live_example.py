@@ -24,6 +24,6 @@ def test_a_live_run_is_changed_by_commands_and_read_at_its_end(tmp_path: Path) -
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert "inv2 left; its inverter is off the network" in done.stdout
-    assert "order 1 to links: inv1 <-> inv4: delay 0.1 s" in done.stdout
+    assert "link command 1: inv1 <-> inv4: delay 0.1 s" in done.stdout
     assert "P of inv2 at the end: 0 W" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["live_run.png"]

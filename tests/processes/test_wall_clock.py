@@ -77,12 +77,12 @@ def test_a_frozen_agent_and_a_killed_one_are_out_and_in_again(tmp_path: Path) ->
         count = len(town.events)
         town.signal("inv2", signal.SIGKILL)
         town.until_event("inv2", "inv2 died; its inverter stays on primary droop", after=count).together(OTHERS)
-        first = town.status["inv2"].incarnation
+        first = town.status["inv2"].epoch
         before = len(town.rows)
         town.start("inv2").together(FOUR)
         settled(town)
 
-        assert town.status["inv2"].incarnation > first
+        assert town.status["inv2"].epoch > first
         assert largest_step(town.rows[before:], (1, 3, 4)) < 100.0
 
 
@@ -170,7 +170,7 @@ def test_a_second_agent_of_one_name_is_refused(tmp_path: Path) -> None:
     """By name, in one line, with exit status 2; the first goes on, and its inverter stays on."""
     with Town(3, tmp_path).all() as town:
         first = town.children["inv2"]
-        life = town.status["inv2"].incarnation
+        life = town.status["inv2"].epoch
         second = town.add("second", ["-m", "agents"], town.agent_configs["inv2"])
         status = town.until_ended("second")
         since = town.t
@@ -179,7 +179,7 @@ def test_a_second_agent_of_one_name_is_refused(tmp_path: Path) -> None:
         assert status == 2
         assert "inv2: another agent of this name takes part in run toy already" in second.log.read_text()
         assert first.status is None
-        assert town.status["inv2"].incarnation == life
+        assert town.status["inv2"].epoch == life
         assert not any("disconnected" in event.text for event in town.events)
         town.together(("inv1", "inv2", "inv3"))
 

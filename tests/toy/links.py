@@ -111,7 +111,7 @@ class Links:
     def _start(self, name: str) -> None:
         """Start an agent, perhaps once more: all others hear of it, and it of them, each at another time."""
         config = self._configs[name]
-        self._configs[name] = msgspec.structs.replace(config, incarnation=config.incarnation + 1)
+        self._configs[name] = msgspec.structs.replace(config, epoch=config.epoch + 1)
         agent = self._bear(self._configs[name])
         others = list(self._living)
         self.agents.append(agent)

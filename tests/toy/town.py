@@ -25,9 +25,9 @@ from wire.messages import (
     AgentStatus,
     Answer,
     Command,
-    LinkAnswer,
-    LinkOrder,
+    LinkAcknowledgement,
     LinkReport,
+    LinkRequest,
     PlantEvent,
     State,
     Telemetry,
@@ -105,8 +105,8 @@ class Town:
         self.rows: list[tuple[float, ...]] = []
         self.telemetry: Telemetry | None = None
         self.answers: list[Answer] = []
-        self.obeyed: list[LinkAnswer] = []
-        self.orders: list[LinkOrder] = []
+        self.acknowledgements: list[LinkAcknowledgement] = []
+        self.orders: list[LinkRequest] = []
         self.link_record = LinkRecord()
         self.tokens: set[str] = set()
         self.session = Session("observer", listen=("tcp/127.0.0.1:0",), connect=connect, clock="wall")
@@ -161,7 +161,7 @@ class Town:
         """Send the plant a command, and wait for its answer."""
         count = len(self.answers)
         command = Command(
-            sender="observer", incarnation=1, seq=count, t=0.0, verb=verb, argument=argument, reply_to="observer"
+            sender="observer", epoch=1, seq=count, t=0.0, verb=verb, argument=argument, reply_to="observer"
         )
         self.session.publish(self.keys.command, encode(command))
         self.until(lambda: len(self.answers) > count, f"answer to {verb}")
@@ -220,7 +220,7 @@ class Town:
             own = {AgentStatus: self.keys.status, State: self.keys.state}.get(type(message))
             if own is not None and key != own(message.sender):
                 return
-            if isinstance(message, Telemetry | LinkReport | LinkOrder) and key != self.keys.telemetry:
+            if isinstance(message, Telemetry | LinkReport | LinkRequest) and key != self.keys.telemetry:
                 return
             if isinstance(message, AgentStatus):
                 self.status[message.sender] = message
@@ -228,9 +228,9 @@ class Town:
                 self.states[message.sender] = message
             elif isinstance(message, Answer):
                 self.answers.append(message)
-            elif isinstance(message, LinkAnswer):
-                self.obeyed.append(message)
-            elif isinstance(message, LinkOrder):
+            elif isinstance(message, LinkAcknowledgement):
+                self.acknowledgements.append(message)
+            elif isinstance(message, LinkRequest):
                 self.orders.append(message)
             elif isinstance(message, LinkReport):
                 self.link_record(message)

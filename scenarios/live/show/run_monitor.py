@@ -98,11 +98,11 @@ class RunMonitor:
 
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Note the plant's telemetry; `now` is the client's clock (s)."""
-        if message.incarnation != self._epoch:
+        if message.epoch != self._epoch:
             if self._epoch:
                 self._events.clear()
                 self._plant_status = None
-            self._epoch, self._latest = message.incarnation, 0.0
+            self._epoch, self._latest = message.epoch, 0.0
         if message.t < self._latest:
             return  # published again for a recorder that has missed it
         self._latest = message.t

@@ -20,7 +20,7 @@ KEYS = Keys("toy")
 
 def nameplate(name: str, epoch: int = 1) -> Nameplate:
     """Nameplate of an agent of the toy."""
-    return Agent(replace(agent_config(name), incarnation=epoch)).nameplate
+    return Agent(replace(agent_config(name), epoch=epoch)).nameplate
 
 
 class Lab:
@@ -76,19 +76,19 @@ class Lab:
         """A roster of inv1 and these."""
         processes = {"inv1": "me"} | {name: name for name in names} | instances
         roster, ids = tuple(processes), tuple(processes.values())
-        self.hear(KEYS.control, Prepare(sender="plant", incarnation=1, seq=number, t=0.0, roster=roster, instances=ids))
+        self.hear(KEYS.control, Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=roster, instances=ids))
 
     def measure(self, k: int, *names: str) -> None:
         """The grant of tick k, for inv1 and these."""
         message = Measurement(
-            sender="plant", incarnation=1, seq=k, t=round(0.02 * k, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
+            sender="plant", epoch=1, seq=k, t=round(0.02 * k, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
             P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", *names),
         )  # fmt: skip
         self.hear(KEYS.measurement("inv1"), message)
 
     def state(self, name: str, k: int, P_set: float = 5e4) -> None:
         """A neighbour's state of tick k."""
-        state = State(sender=name, incarnation=1, seq=k, t=round(0.02 * k, 9), P_set=P_set, V_set=277.0, Q=0.0)
+        state = State(sender=name, epoch=1, seq=k, t=round(0.02 * k, 9), P_set=P_set, V_set=277.0, Q=0.0)
         self.hear(KEYS.state(name), state)
 
     def take(self) -> list[tuple[str, str]]:

@@ -59,7 +59,7 @@ class Lab:
         """Answer the query for a nameplate."""
         key = KEYS.nameplate(name, instance)
         assert key in self.fetched
-        self.hear(key, replace(Agent(agent_config(name)).nameplate, incarnation=life))
+        self.hear(key, replace(Agent(agent_config(name)).nameplate, epoch=life))
 
     def hear(self, key: str, message: Message) -> None:
         """A message comes in."""
@@ -75,16 +75,14 @@ class Lab:
     def measure(self, k: int, **changes: Any) -> None:
         """The plant's measurement of tick k comes in."""
         values: dict[str, Any] = dict(
-            sender="plant", incarnation=1, seq=k, t=round(k * T_C, 9), to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0,
+            sender="plant", epoch=1, seq=k, t=round(k * T_C, 9), to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0,
             P_set=50e3, V_set=277.0, grid_connected=False, island="inv1", roster=(),
         )  # fmt: skip
         self.hear(KEYS.measurement("inv1"), Measurement(**values | changes))
 
     def state(self, name: str, seq: int, t: float = 0.0, **changes: Any) -> None:
         """A neighbour's state comes in."""
-        values: dict[str, Any] = dict(
-            sender=name, incarnation=1, seq=seq, t=t, P_set=80e3, V_set=277.0, Q=0.0, island="inv1"
-        )
+        values: dict[str, Any] = dict(sender=name, epoch=1, seq=seq, t=t, P_set=80e3, V_set=277.0, Q=0.0, island="inv1")
         self.hear(KEYS.state(name), State(**values | changes))
 
     def go(self, seconds: float) -> None:

@@ -18,7 +18,7 @@ def measurement(k: int = 0, **changes: Any) -> Measurement:
     """What inv1 measures in an island at 59.7 Hz."""
     values: dict[str, Any] = {
         "sender": "plant",
-        "incarnation": 1,
+        "epoch": 1,
         "seq": k,
         "t": 0.02 * k,
         "to": "inv1",
@@ -35,14 +35,14 @@ def measurement(k: int = 0, **changes: Any) -> Measurement:
     return Measurement(**values | changes)
 
 
-def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, incarnation: int = 1) -> State:
+def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, epoch: int = 1) -> State:
     """What a neighbour decided."""
-    return State(sender=sender, incarnation=incarnation, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
+    return State(sender=sender, epoch=epoch, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
-def plate(name: str, *, incarnation: int = 1, P_rated: float = 100e3) -> Nameplate:
+def plate(name: str, *, epoch: int = 1, P_rated: float = 100e3) -> Nameplate:
     """Nameplate of one of the toy's inverters."""
-    return replace(Agent(agent_config(name)).nameplate, incarnation=incarnation, P_rated=P_rated)
+    return replace(Agent(agent_config(name)).nameplate, epoch=epoch, P_rated=P_rated)
 
 
 def met(control: Control = ALL_FULL, name: str = "inv1") -> Agent:
@@ -126,7 +126,7 @@ def test_another_life_of_a_name_begins_anew() -> None:
     for life in (2, 0):
         agent, fresh = met(), met()
         agent.hear(state("inv2", 7))
-        agent.meet(plate("inv2", incarnation=life))
+        agent.meet(plate("inv2", epoch=life))
 
         assert agent.tick(measurement(8), ("inv2",)) == fresh.tick(measurement(8), ("inv2",))
 

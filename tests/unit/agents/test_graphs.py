@@ -139,7 +139,7 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
     agent = Agent(agent_config("inv1", control("my_graphs:of_three", folder)))
     for name in ("inv2", "inv3"):
         agent.meet(Agent(agent_config(name)).nameplate)
-    now = Measurement(sender="plant", incarnation=1, seq=0, t=0.0, to="inv1", P=3e4, Q=0.0, V=277.0, f=59.9, P_set=3e4,
+    now = Measurement(sender="plant", epoch=1, seq=0, t=0.0, to="inv1", P=3e4, Q=0.0, V=277.0, f=59.9, P_set=3e4,
                       V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))  # fmt: skip
 
     assert agent.in_neighbours(("inv1", "inv2", "inv3")) == ()

@@ -123,7 +123,7 @@ def test_a_restarted_neighbour_is_heard_again_and_its_ghost_is_not() -> None:
     lab.measure(1)
     lab.go(T_C)
     ghost = lab.decided()[0].P_set
-    lab.state("inv2", 0, incarnation=2)
+    lab.state("inv2", 0, epoch=2)
     lab.measure(2)
     lab.go(T_C)
 
@@ -141,11 +141,11 @@ def test_a_second_process_of_a_name_waits_until_the_first_is_gone() -> None:
     lab.measure(1)
     lab.go(T_C)
     assert lab.decided()[0].P_set > 50e3
-    lab.state("inv2", 1, incarnation=2)
+    lab.state("inv2", 1, epoch=2)
     assert lab.side.rejects.counts["ghost"] == 1
 
     lab.token("inv2", "a", gone=True)
-    lab.state("inv2", 2, incarnation=2)
+    lab.state("inv2", 2, epoch=2)
     assert lab.side.rejects.counts["ghost"] == 1
 
 
@@ -181,7 +181,7 @@ def test_it_survives_the_plants_death_and_follows_its_new_life() -> None:
     lab.go(0.5)
     assert lab.status().phase == "seeking"
     lab.token("plant", epoch=2)
-    lab.measure(0, incarnation=2, P_set=33e3)
+    lab.measure(0, epoch=2, P_set=33e3)
     lab.measure(501)
     lab.go(T_C)
 
@@ -209,15 +209,15 @@ def test_it_leaves_properly() -> None:
     refused.token("plant")
     asked.side.leave("asked to leave: SIGTERM")
     asked.do()
-    stop = Stop(sender="plant", incarnation=1, seq=0, t=0.0, reason="inv1 was stopped by command")
-    stopped.hear(KEYS.dismissal("inv1", "me"), stop)
-    refused.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1: another agent", refused=True))
+    stop = Stop(sender="plant", epoch=1, seq=0, t=0.0, reason="inv1 was stopped by command")
+    stopped.hear(KEYS.stop_request("inv1", "me"), stop)
+    refused.hear(KEYS.stop_request("inv1", "me"), replace(stop, reason="inv1: another agent", refused=True))
 
     assert [lab.side.finished for lab in (asked, stopped, refused)] == [False, False, True]
     for lab in (asked, stopped):
         lab.go(T_C)
         assert lab.decided()[1:] == []
-        lab.hear(KEYS.dismissal("inv1", "me"), replace(stop, reason="inv1 has left"))
+        lab.hear(KEYS.stop_request("inv1", "me"), replace(stop, reason="inv1 has left"))
 
     assert asked.side.finished
     assert stopped.side.finished
@@ -267,16 +267,16 @@ def test_a_plant_whose_clock_lags_is_followed_once_the_old_token_is_gone() -> No
     """Its epoch is lower than its predecessor's, whose last words count for nothing from then on."""
     lab = Lab()
     lab.token("plant", epoch=900)
-    lab.measure(500, incarnation=900)
+    lab.measure(500, epoch=900)
     lab.go(0.0)
     lab.token("plant", epoch=40)
-    lab.measure(0, incarnation=40, P_set=33e3)
-    lab.measure(501, incarnation=900)
+    lab.measure(0, epoch=40, P_set=33e3)
+    lab.measure(501, epoch=900)
     lab.go(T_C)
     before = [state.P_set for state in lab.decided()]
     lab.token("plant", epoch=900, gone=True)
-    lab.measure(502, incarnation=900)
-    lab.measure(1, incarnation=40, P_set=33e3)
+    lab.measure(502, epoch=900)
+    lab.measure(1, epoch=40, P_set=33e3)
     lab.go(T_C)
 
     assert before == [50e3, 50e3]
@@ -287,10 +287,10 @@ def test_a_plant_whose_clock_lags_is_followed_once_the_old_token_is_gone() -> No
 def test_nobody_but_the_plant_that_is_followed_stops_an_agent() -> None:
     """A ghost's Stop, or one in an epoch that no token has, is dropped under either key."""
     lab = running()
-    for key in (KEYS.control, KEYS.dismissal("inv1", "me")):
+    for key in (KEYS.control, KEYS.stop_request("inv1", "me")):
         for epoch in (0, 2):
-            lab.hear(key, Stop(sender="plant", incarnation=epoch, seq=0, t=0.0, reason="enough", refused=True))
-        lab.hear(key, Stop(sender="inv2", incarnation=1, seq=0, t=0.0, reason="enough", refused=True))
+            lab.hear(key, Stop(sender="plant", epoch=epoch, seq=0, t=0.0, reason="enough", refused=True))
+        lab.hear(key, Stop(sender="inv2", epoch=1, seq=0, t=0.0, reason="enough", refused=True))
     lab.go(T_C)
 
     assert not lab.side.finished

@@ -34,7 +34,7 @@ def test_messages_under_anothers_key_open_no_session_as_long_as_their_sender_is_
         for name, other in (("inv2", "inv3"), ("inv3", "inv2")):
             lab.state(name, k, k * T_C)
             for extra in range(12):
-                said = State(sender=other, incarnation=1, seq=k + extra, t=k * T_C, P_set=0.0, V_set=277.0, Q=0.0)
+                said = State(sender=other, epoch=1, seq=k + extra, t=k * T_C, P_set=0.0, V_set=277.0, Q=0.0)
                 lab.hear(KEYS.state(name), said)
                 lab.hear(KEYS.measurement("inv1"), said)
         lab.go(T_C)
@@ -51,7 +51,7 @@ def test_messages_under_anothers_key_prove_a_confused_session_once_their_sender_
         k += 1
         lab.measure(k, roster=("inv1", "inv2", "inv3"))
         lab.state("inv2", k, k * T_C)
-        lab.hear(KEYS.state("inv2"), State(sender="inv3", incarnation=1, seq=k, t=0.0, P_set=0.0, V_set=277.0, Q=0.0))
+        lab.hear(KEYS.state("inv2"), State(sender="inv3", epoch=1, seq=k, t=0.0, P_set=0.0, V_set=277.0, Q=0.0))
         lab.go(T_C)
 
     assert lab.side.session_broken
@@ -156,7 +156,7 @@ def test_a_plant_that_says_it_waits_is_not_silent() -> None:
     lab.go(2.0)
     lab.token("plant", epoch=2)
     for _ in range(40):
-        lab.hear(KEYS.control, Waiting(sender="plant", incarnation=2, seq=0, t=0.0, waits_for=("inv3", "inv4")))
+        lab.hear(KEYS.control, Waiting(sender="plant", epoch=2, seq=0, t=0.0, waits_for=("inv3", "inv4")))
         lab.go(0.5)
     assert not lab.side.finished
     assert lab.status().waits_for == "a measurement of inv1 from the plant, which waits for inv3, inv4"

@@ -41,7 +41,7 @@ class Link:
             if self.up:
                 command = Command(
                     sender="me",
-                    incarnation=1,
+                    epoch=1,
                     seq=self._questions,
                     t=0.0,
                     verb="telemetry",
@@ -58,7 +58,7 @@ class Link:
 
 def report(number: int) -> LinkReport:
     """What an agent's links did."""
-    return LinkReport(sender="inv1", incarnation=1, seq=0, t=0.0, data=str(number).encode())
+    return LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=str(number).encode())
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -173,7 +173,7 @@ def test_a_session_that_brings_nothing_is_opened_anew_ever_more_seldom() -> None
     """Questions without an answer: the link may be stale on one side, or the plant frozen for long."""
     stream, now, opened = TelemetryStream(), 0.0, []
     first = Telemetry(
-        sender="plant", incarnation=1, seq=0, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
+        sender="plant", epoch=1, seq=0, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
         reproducible=False,
     )  # fmt: skip
     assert not stream.is_astray(1e6)
@@ -183,7 +183,7 @@ def test_a_session_that_brings_nothing_is_opened_anew_ever_more_seldom() -> None
         stream.question(now)
         if stream.is_astray(now):
             opened.append(now)
-    stream.answered(Answer(sender="plant", incarnation=1, seq=9, t=0.0, ok=True, text="1"), now)
+    stream.answered(Answer(sender="plant", epoch=1, seq=9, t=0.0, ok=True, text="1"), now)
 
     assert opened[0] == pytest.approx(1.5 + ASTRAY)
     assert [b - a for a, b in pairwise(opened)] == [6.0, 12.0, 24.0]

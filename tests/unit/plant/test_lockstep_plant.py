@@ -80,12 +80,12 @@ class Lab:
     def ready(self, number: int, *names: str) -> None:
         """Agents are ready for a roster."""
         for name in names:
-            self.hear(KEYS.ready(name), Ready(sender=name, incarnation=1, seq=number, t=0.0))
+            self.hear(KEYS.ready(name), Ready(sender=name, epoch=1, seq=number, t=0.0))
 
     def state(self, k: int, *names: str) -> None:
         """States of tick k."""
         for name in names:
-            state = State(sender=name, incarnation=1, seq=k, t=round(0.02 * k, 9), P_set=5e4, V_set=277.0, Q=0.0)
+            state = State(sender=name, epoch=1, seq=k, t=round(0.02 * k, 9), P_set=5e4, V_set=277.0, Q=0.0)
             self.hear(KEYS.state(name), state)
 
     def tick(self, count: int) -> None:
@@ -100,7 +100,7 @@ class Lab:
     def stopped(self) -> dict[tuple[str, ...], tuple[str, bool]]:
         """Processes that were told to close: why, and whether they were refused."""
         stops = [(KEYS.parts(key), message) for key, message in self.sent if isinstance(message, Stop)]
-        return {parts[1:]: (message.reason, message.refused) for parts, message in stops if parts[0] == "dismissal"}
+        return {parts[1:]: (message.reason, message.refused) for parts, message in stops if parts[0] == "stop_request"}
 
     def events(self) -> list[str]:
         """What was noted of agents, once the run has been ended."""

@@ -61,7 +61,7 @@ class Lab:
         """Agents come, and answer for their nameplates."""
         for name in names:
             self.token(name, instance)
-            plate = replace(Agent(agent_config(name)).nameplate, incarnation=life)
+            plate = replace(Agent(agent_config(name)).nameplate, epoch=life)
             self.hear(KEYS.nameplate(name, instance), plate)
 
     def hear(self, key: str, message: Message) -> None:
@@ -73,7 +73,7 @@ class Lab:
         """An agent's state comes in."""
         state = State(
             sender=name,
-            incarnation=life,
+            epoch=life,
             seq=seq,
             t=0.0,
             P_set=P_set,
@@ -86,11 +86,11 @@ class Lab:
 
     def leave(self, name: str, life: int = 1) -> None:
         """An agent says that it leaves."""
-        self.hear(KEYS.leave(name), Leave(sender=name, incarnation=life, seq=0, t=0.0))
+        self.hear(KEYS.leave(name), Leave(sender=name, epoch=life, seq=0, t=0.0))
 
     def ask(self, verb: Any, argument: str = "") -> Answer:
         """Send a command."""
-        command = Command(sender="cli", incarnation=1, seq=7, t=0.0, verb=verb, argument=argument, reply_to="z1")
+        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, argument=argument, reply_to="z1")
         self.hear(KEYS.command, command)
         key, answer = next((key, m) for key, m in reversed(self.sent) if isinstance(m, Answer))
         assert (key, answer.seq) == (KEYS.answer("z1"), 7)
@@ -265,7 +265,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
     keys = [key for key, message in lab.sent if isinstance(message, Stop)]
     stops: list[Stop] = lab.take(Stop)
 
-    assert keys == [KEYS.dismissal("inv2", "b"), KEYS.dismissal("inv9", "c")]
+    assert keys == [KEYS.stop_request("inv2", "b"), KEYS.stop_request("inv9", "c")]
     assert all(stop.refused for stop in stops)
     assert stops[0].reason.startswith("inv2: another agent of this name takes part in run toy already")
     assert stops[1].reason == "inv9: no inverter of this name; inverters are inv1, inv2, inv3"
@@ -370,7 +370,7 @@ def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> No
     awaited = [(m.t, m.awaited) for m in lab.take(Telemetry) if m.awaited]
     lab.join("inv2", instance="b", life=2)
 
-    assert stops == [(KEYS.dismissal("inv2", "a"), False)]
+    assert stops == [(KEYS.stop_request("inv2", "a"), False)]
     assert off == 0.0
     assert awaited == [(0.2, ("inv2",))]
     assert lab.toy.measure()["inv2"].P != 0.0
@@ -383,7 +383,7 @@ def test_a_nameplate_that_does_not_come_is_asked_for_again() -> None:
     lab.token("inv2", "b")
     lab.step(60)
     asked = lab.fetched.count(KEYS.nameplate("inv2", "b"))
-    lab.hear(KEYS.nameplate("inv2", "b"), replace(Agent(agent_config("inv2")).nameplate, incarnation=2))
+    lab.hear(KEYS.nameplate("inv2", "b"), replace(Agent(agent_config("inv2")).nameplate, epoch=2))
     lab.step(60)
 
     assert asked == 2
@@ -402,7 +402,7 @@ def test_an_agent_that_comes_while_the_run_ends_is_told_so() -> None:
     lab.token("inv2", "b")
 
     ((key, stop),) = lab.sent
-    assert key == KEYS.dismissal("inv2", "b")
+    assert key == KEYS.stop_request("inv2", "b")
     assert isinstance(stop, Stop)
     assert stop.reason == "the end of it"
     assert not stop.refused

@@ -19,7 +19,7 @@ def status(name: str, ages: dict[str, float], seq: int = 0) -> AgentStatus:
     """What an agent says of its neighbours."""
     return AgentStatus(
         sender=name,
-        incarnation=1,
+        epoch=1,
         seq=seq,
         t=0.0,
         phase="running",

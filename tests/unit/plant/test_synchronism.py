@@ -158,9 +158,7 @@ def test_the_command_to_close_in_step_is_answered_with_the_differences(network: 
     config = replace(toy_configs(9, end=60.0)[0], clock="wall")
     side = RealtimePlant(config, p)
     side.start(0.0)
-    command = Command(
-        sender="visitor", incarnation=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v"
-    )
+    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="synchronise", argument="13-152", reply_to="v")
     side.received(side.keys.command, encode(command), 0.1)
 
     (answer,) = [

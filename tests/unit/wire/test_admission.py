@@ -9,7 +9,7 @@ from wire.messages import State
 
 def state(seq: int, epoch: int = 5, name: str = "inv2") -> State:
     """Sent at the pace of 20 ms."""
-    return State(sender=name, incarnation=epoch, seq=seq, t=min(0.02 * seq, 1e9), P_set=0.0, V_set=0.0, Q=0.0)
+    return State(sender=name, epoch=epoch, seq=seq, t=min(0.02 * seq, 1e9), P_set=0.0, V_set=0.0, Q=0.0)
 
 
 def bound(*epochs: int) -> Admission:

@@ -26,7 +26,7 @@ from wire.messages import (
     Telemetry,
 )
 
-STATE = State(sender="inv1", incarnation=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
+STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
 
 
 def kind_of(payload: bytes) -> str:
@@ -211,7 +211,7 @@ def test_lines_are_printable_whatever_was_sent() -> None:
 def test_telemetry_may_carry_what_is_not_finite() -> None:
     """The recorder is told the plant's truth, even where it is not a number."""
     telemetry = Telemetry(
-        sender="plant", incarnation=1, seq=0, t=0.0, inverters=("inv1",), rows=((0.0, math.nan, *[1.0] * 5),),
+        sender="plant", epoch=1, seq=0, t=0.0, inverters=("inv1",), rows=((0.0, math.nan, *[1.0] * 5),),
         events=(), final=False, outcome="", reproducible=True,
     )  # fmt: skip
 

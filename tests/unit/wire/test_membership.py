@@ -19,7 +19,7 @@ from wire.messages import Nameplate
 
 def nameplate(name: str = "inv2", epoch: int = 1) -> Nameplate:
     """Nameplate of an agent of the toy."""
-    return Agent(replace(agent_config(name), incarnation=epoch)).nameplate
+    return Agent(replace(agent_config(name), epoch=epoch)).nameplate
 
 
 def members(*instances: str) -> tuple[Membership, Admission]:
@@ -39,7 +39,7 @@ def test_of_two_processes_of_a_name_the_first_counts_until_it_is_gone() -> None:
 
     assert made.vanished("inv2", "a")
     assert (made.instance("inv2"), admission.epoch("inv2")) == ("b", 2)
-    assert made.nameplates["inv2"].incarnation == 2
+    assert made.nameplates["inv2"].epoch == 2
     assert made.vanished("inv2", "b")
     assert (made.instance("inv2"), admission.epoch("inv2"), made.nameplates) == ("", None, {})
 
@@ -121,5 +121,5 @@ def test_the_process_that_counts_is_there_and_its_nameplate_is_its_own(seed: int
         known = made.nameplates.get("inv2")
 
         assert (counts in there) if there else counts == ""
-        assert known is None or known.incarnation == admission.epoch("inv2")
-        assert known is None or chr(known.incarnation) in there
+        assert known is None or known.epoch == admission.epoch("inv2")
+        assert known is None or chr(known.epoch) in there

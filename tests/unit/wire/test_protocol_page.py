@@ -12,8 +12,8 @@ from wire.codec import decode, encode
 from wire.keys import describe
 from wire.messages import (
     Leave,
-    LinkAnswer,
-    LinkOrder,
+    LinkAcknowledgement,
+    LinkRequest,
     Measurement,
     Message,
     Nameplate,
@@ -26,7 +26,7 @@ from wire.messages import (
 
 PAGE = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text()
 SECTION = PAGE.split("## Write an agent of your own")[1].split("\n## ")[0]
-NEEDED = (Nameplate, Ready, State, Leave, LinkAnswer, Prepare, Measurement, Stop, Waiting, LinkOrder)
+NEEDED = (Nameplate, Ready, State, Leave, LinkAcknowledgement, Prepare, Measurement, Stop, Waiting, LinkRequest)
 
 
 def words(text: str) -> set[str]:
@@ -38,7 +38,7 @@ def test_the_bytes_on_the_page_are_those_of_the_codec() -> None:
     """The example is a whole message, byte for byte."""
     rows = re.findall(r"^((?:[0-9a-f]{2} )+)", SECTION, re.MULTILINE)
     payload = bytes.fromhex("".join(rows))
-    ready = Ready(sender="inv2", incarnation=7, seq=0, t=0.0)
+    ready = Ready(sender="inv2", epoch=7, seq=0, t=0.0)
 
     assert decode(payload) == ready
     assert encode(ready) == payload

@@ -62,7 +62,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
 
     def join(name: str, instance: str, epoch: int) -> None:
         plant.appeared(KEYS.alive_agent(name, instance), now)
-        plate = replace(Agent(agent_config(name)).nameplate, incarnation=epoch)
+        plate = replace(Agent(agent_config(name)).nameplate, epoch=epoch)
         plant.received(KEYS.nameplate(name, instance), encode(plate), now)
 
     def step(said: State) -> None:
@@ -76,7 +76,7 @@ def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer(
 
     def said(epoch: int, seq: int) -> State:
         P_set = 11e3 if epoch == 9 else 22e3
-        return State(sender="inv2", incarnation=epoch, seq=seq, t=0.0, P_set=P_set, V_set=277.0, Q=0.0)
+        return State(sender="inv2", epoch=epoch, seq=seq, t=0.0, P_set=P_set, V_set=277.0, Q=0.0)
 
     for name in ("inv1", "inv2", "inv3"):
         join(name, "a", 9)

@@ -45,21 +45,19 @@ TOKENS = tuple(
 
 def plate(name: str) -> Nameplate:
     """What an agent truly is."""
-    return Agent(replace(agent_config(name), incarnation=EPOCH)).nameplate
+    return Agent(replace(agent_config(name), epoch=EPOCH)).nameplate
 
 
 def state(name: str, k: int) -> State:
     """What a neighbour truly says at tick k."""
     share = 60e3 + 5e3 * NAMES.index(name)
-    return State(
-        sender=name, incarnation=EPOCH, seq=k, t=round(k * T_C, 9), P_set=share, V_set=277.0, Q=1e3, island="inv1"
-    )
+    return State(sender=name, epoch=EPOCH, seq=k, t=round(k * T_C, 9), P_set=share, V_set=277.0, Q=1e3, island="inv1")
 
 
 def measurement(k: int) -> Measurement:
     """What the plant truly measures of inv1 at tick k."""
     return Measurement(
-        sender="plant", incarnation=EPOCH, seq=k, t=round(k * T_C, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.95,
+        sender="plant", epoch=EPOCH, seq=k, t=round(k * T_C, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.95,
         P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=NAMES,
     )  # fmt: skip
 
@@ -100,7 +98,7 @@ class RealtimeAgentScene(_Played):
     """inv1 in wall-clock time."""
 
     def __init__(self) -> None:
-        super().__init__(RealtimeAgent(replace(agent_config("inv1"), clock="wall", incarnation=EPOCH), "a"))
+        super().__init__(RealtimeAgent(replace(agent_config("inv1"), clock="wall", epoch=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
@@ -120,13 +118,13 @@ class AgentScene(_Played):
     """inv1 in simulated time."""
 
     def __init__(self) -> None:
-        super().__init__(LockstepAgent(replace(agent_config("inv1"), incarnation=EPOCH), "a"))
+        super().__init__(LockstepAgent(replace(agent_config("inv1"), epoch=EPOCH), "a"))
         self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
         for name in NAMES[1:]:
             self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
             self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name), plate(name))
         instances = tuple(INSTANCES[name] for name in NAMES)
-        prepare = Prepare(sender="plant", incarnation=EPOCH, seq=0, t=0.0, roster=NAMES, instances=instances)
+        prepare = Prepare(sender="plant", epoch=EPOCH, seq=0, t=0.0, roster=NAMES, instances=instances)
         self.hear(KEYS.control, prepare)
 
     def honest(self, k: int) -> None:
@@ -142,7 +140,7 @@ class RealtimePlantScene(_Played):
 
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=None)  # type: ignore[arg-type]
-        config = replace(config, clock="wall", incarnation=EPOCH)
+        config = replace(config, clock="wall", epoch=EPOCH)
         super().__init__(RealtimePlant(config, ToyPlant(config)))
         _join(self)
 
@@ -160,11 +158,11 @@ class PlantScene(_Played):
 
     def __init__(self) -> None:
         config, _ = toy_configs(3, end=1e4)
-        config = replace(config, incarnation=EPOCH)
+        config = replace(config, epoch=EPOCH)
         super().__init__(LockstepPlant(config, ToyPlant(config)))
         _join(self)
         for name in NAMES:
-            self.hear(KEYS.ready(name), Ready(sender=name, incarnation=EPOCH, seq=0, t=0.0))
+            self.hear(KEYS.ready(name), Ready(sender=name, epoch=EPOCH, seq=0, t=0.0))
         self.take()
 
     def honest(self, k: int) -> None:

@@ -153,9 +153,9 @@ def test_an_agent_of_an_unknown_name_is_refused() -> None:
 def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
     """Whatever bytes arrive on whatever key, nothing is raised, it is counted, and the rows are the same."""
     run, rng = links(seed, n=3, end=0.1), random.Random(seed)
-    ghost = Stop(sender="plant", incarnation=0, seq=0, t=0.0, reason="a ghost")
-    forged = State(sender="inv2", incarnation=1, seq=0, t=0.0, P_set=0.0, V_set=0.0, Q=0.0)
-    late = Ready(sender="inv1", incarnation=1, seq=99, t=0.0)
+    ghost = Stop(sender="plant", epoch=0, seq=0, t=0.0, reason="a ghost")
+    forged = State(sender="inv2", epoch=1, seq=0, t=0.0, P_set=0.0, V_set=0.0, Q=0.0)
+    late = Ready(sender="inv1", epoch=1, seq=99, t=0.0)
     torn = encode(ghost)[1:-4]
     sealed = torn + crc32(torn).to_bytes(4, "little")
     payloads = [rng.randbytes(40), sealed, b"x" * 70_000, encode(ghost), encode(late)]

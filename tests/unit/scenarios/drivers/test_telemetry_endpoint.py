@@ -6,7 +6,7 @@ from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
 from wire.codec import encode
 from wire.keys import Keys
-from wire.messages import Answer, LinkOrder, LinkReport, Telemetry
+from wire.messages import Answer, LinkReport, LinkRequest, Telemetry
 
 KEYS = Keys("demo")
 
@@ -14,7 +14,7 @@ KEYS = Keys("demo")
 def telemetry(seq: int, epoch: int = 7, sender: str = "plant") -> Telemetry:
     """One without rows."""
     return Telemetry(
-        sender=sender, incarnation=epoch, seq=seq, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
+        sender=sender, epoch=epoch, seq=seq, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
         reproducible=True,
     )  # fmt: skip
 
@@ -26,7 +26,7 @@ class Recorder:
     core: TelemetryEndpoint
     taken: list[object] = field(default_factory=list)
 
-    def hear(self, message: Telemetry | LinkReport | LinkOrder | Answer, key: str = KEYS.telemetry) -> None:
+    def hear(self, message: Telemetry | LinkReport | LinkRequest | Answer, key: str = KEYS.telemetry) -> None:
         """Bring a message on a key."""
         self.core.received(key, encode(message), 0.0)
         self.taken += self.core.take()
@@ -55,8 +55,8 @@ def test_a_report_that_the_plant_passes_on_is_taken_and_an_order_of_anybody_else
     """Reports keep the name of the agent that made them; all else on the key is of the plant."""
     it = recorder()
     it.core.appeared(KEYS.alive_plant(7))
-    report = LinkReport(sender="inv1", incarnation=3, seq=0, t=0.0, data=b"book")
-    order = LinkOrder(sender="inv1", incarnation=3, seq=1, t=0.0, text="{}", reply_to="z1")
+    report = LinkReport(sender="inv1", epoch=3, seq=0, t=0.0, data=b"book")
+    order = LinkRequest(sender="inv1", epoch=3, seq=1, t=0.0, text="{}", reply_to="z1")
     it.hear(report)
     it.hear(order)
     it.hear(telemetry(0, sender="inv1"))
@@ -72,7 +72,7 @@ def test_only_the_answer_to_the_last_question_counts() -> None:
     it.hear(telemetry(0))
     asked = it.core.question(now=QUIET + 1.0)
     for seq, first in ((0, "9"), (1, "1")):
-        it.hear(Answer(sender="plant", incarnation=7, seq=seq, t=0.0, ok=True, text=first), KEYS.answer("fleet"))
+        it.hear(Answer(sender="plant", epoch=7, seq=seq, t=0.0, ok=True, text=first), KEYS.answer("fleet"))
     it.hear(telemetry(1))
 
     assert asked is not None

@@ -38,7 +38,7 @@ from tests.unit.agents import realtime_lab as agent_side
 from tests.unit.plant import test_realtime_plant as plant_side
 from wire.codec import decode
 from wire.links import CommandEffect
-from wire.messages import LinkAnswer, LinkOrder, Measurement, State
+from wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
 
 SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
 CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
@@ -56,20 +56,20 @@ def agent_lab() -> agent_side.Lab:
 
 def order(lab: agent_side.Lab, number: int, t: float, text: str = CUT, life: int = 1) -> None:
     """An order of the plant comes in."""
-    message = LinkOrder(sender="plant", incarnation=life, seq=number, t=t, text=text, reply_to="z1")
-    lab.hear(agent_side.KEYS.order("inv1"), message)
+    message = LinkRequest(sender="plant", epoch=life, seq=number, t=t, text=text, reply_to="z1")
+    lab.hear(agent_side.KEYS.link_request("inv1"), message)
 
 
 def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
     """What the agent has answered so far."""
-    return [(m.seq, m.ok, m.text) for m in lab.published if isinstance(m, LinkAnswer)]
+    return [(m.seq, m.ok, m.text) for m in lab.published if isinstance(m, LinkAcknowledgement)]
 
 
 @given(st.integers(0, 10_000))
 def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
     """Whatever is lost on either way, and however often the agent's process is a new one."""
     rng, taken, now = random.Random(seed), list[str](), 0.0
-    wire: list[LinkOrder] = []
+    wire: list[LinkRequest] = []
 
     class Note:
         def command(self, text: str, t: float) -> CommandEffect:
@@ -82,7 +82,7 @@ def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
 
     def publish(key: str, payload: bytes) -> None:
         message = decode(payload)
-        if key == plant_side.KEYS.order("inv1") and isinstance(message, LinkOrder):
+        if key == plant_side.KEYS.link_request("inv1") and isinstance(message, LinkRequest):
             wire.append(message)
 
     plant = LinkCommandSender(1, plant_side.KEYS, Note(), publish)  # type: ignore[arg-type]
@@ -124,21 +124,21 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
     answer = lab.ask("link", CUT)
     lab.step()
     kinds = [type(message) for key, message in lab.sent if key.endswith("/inv1")]
-    orders = lab.take(LinkOrder)
+    orders = lab.take(LinkRequest)
     lab.token("inv2", gone=True)
     lab.join("inv2", instance="b", life=2)
     lab.step()
-    again = [(key, m.seq) for key, m in lab.sent if isinstance(m, LinkOrder)]
+    again = [(key, m.seq) for key, m in lab.sent if isinstance(m, LinkRequest)]
 
     assert answer.ok
     assert json.loads(answer.text) == {
         "number": 1, "t": 0.08, "asked": ["inv1", "inv2"], "said": "inv2 -> inv1: cut", "receivers": ["inv1"]
     }  # fmt: skip
-    assert kinds == [LinkOrder, Measurement]
+    assert kinds == [LinkRequest, Measurement]
     assert {(m.seq, m.t, m.text) for m in orders} == {(1, 0.08, CUT)}
-    assert again == [(plant_side.KEYS.order("inv2"), 1)]
+    assert again == [(plant_side.KEYS.link_request("inv2"), 1)]
     assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_text()).ok
-    assert [event.text for event in lab.events("link")] == ["order 1 to links: inv2 -> inv1: cut, from t = 0.08 s on"]
+    assert [event.text for event in lab.events("link")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
 
 
 def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none() -> None:
@@ -162,8 +162,8 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     assert (first["said"], first["receivers"]) == ("inv2 -> inv1: healed", ["inv1"])
     assert (again["said"], again["receivers"]) == ("all links: no link has a fault, nothing to heal", [])
     assert [event.text.partition(", from")[0] for event in lab.events("link")[1:]] == [
-        "order 2 to links: inv2 -> inv1: healed",
-        "order 3 to links: all links: no link has a fault, nothing to heal",
+        "link command 2: inv2 -> inv1: healed",
+        "link command 3: all links: no link has a fault, nothing to heal",
     ]
     assert (links.impaired(4.9), links.impaired(5.0)) == ((), ("inv1",))
 
@@ -173,7 +173,7 @@ def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> No
     fault = Fault(on="inv2 -> inv1", loss=0.5, from_s=2.0, to_s=3.0)
     links = EmulatedLinks("inv1", replace(SETUP, netem=Netem(links=(fault,))))
     for k in range(200):
-        state = State(sender="inv2", incarnation=1, seq=k, t=0.02 * k, P_set=0.0, V_set=277.0, Q=0.0)
+        state = State(sender="inv2", epoch=1, seq=k, t=0.02 * k, P_set=0.0, V_set=277.0, Q=0.0)
         links.offer(state, b"state", state.t)
 
     assert [set(decode_statuses(links.status(t))) for t in (1.9, 2.0, 4.0)] == [set(), {"inv2"}, {"inv2"}]
@@ -187,15 +187,15 @@ def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() 
     lab.side.start(lab.now)
     lab.join("inv1", "inv2")
     lab.ask("link", CUT)
-    answer = LinkAnswer(sender="inv2", incarnation=1, seq=1, t=0.0, ok=True, text="", reply_to="z1")
-    lab.hear(plant_side.KEYS.obeyed("inv2"), answer)
+    answer = LinkAcknowledgement(sender="inv2", epoch=1, seq=1, t=0.0, ok=True, text="", reply_to="z1")
+    lab.hear(plant_side.KEYS.link_acknowledgement("inv2"), answer)
     passed_on = [message for key, message in lab.sent if key == plant_side.KEYS.answer("z1")]
     lab.step()
     lab.sent.clear()
     lab.step(60)
 
     assert answer in passed_on
-    assert [key for key, m in lab.sent if isinstance(m, LinkOrder)] == [plant_side.KEYS.order("inv1")]
+    assert [key for key, m in lab.sent if isinstance(m, LinkRequest)] == [plant_side.KEYS.link_request("inv1")]
 
 
 def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
@@ -239,11 +239,11 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
     first = lab.status().impaired
     lab.token("plant", gone=True)
     lab.token("plant", epoch=2)
-    lab.measure(0, incarnation=2)
+    lab.measure(0, epoch=2)
     order(lab, 2, 0.0, life=1)
     lab.go(0.5)
     order(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_text(), life=2)
-    lab.measure(1, incarnation=2)
+    lab.measure(1, epoch=2)
     lab.go(0.5)
 
     assert (first, lab.status().impaired) == (("inv2",), ("inv3",))
@@ -353,7 +353,7 @@ def test_what_links_drop_counts_as_lost() -> None:
     during = lab.status().lost
     lab.token("plant", gone=True)
     lab.token("plant", epoch=2)
-    lab.measure(0, incarnation=2)
+    lab.measure(0, epoch=2)
     lab.go(0.5)
 
     assert during == 39

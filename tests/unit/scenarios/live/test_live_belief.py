@@ -23,7 +23,7 @@ from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
 from wire.codec import RejectedError, decode, encode
 from wire.keys import Keys
-from wire.messages import AgentStatus, LinkOrder, LinkReport, Message, Telemetry
+from wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 
 KEYS = Keys("lab")
 NAMES = ("inv1", "inv2")
@@ -60,7 +60,7 @@ def telemetry(t: float, epoch: int = 7, inverters: tuple[str, ...] = NAMES) -> T
     """What the plant truly tells."""
     row = (t, *(60.0, 5e4, 0.0, 277.0, 5e4, 277.0) * len(inverters))
     return Telemetry(
-        sender="plant", incarnation=epoch, seq=0, t=t, inverters=inverters, rows=(row,), events=(), final=False,
+        sender="plant", epoch=epoch, seq=0, t=t, inverters=inverters, rows=(row,), events=(), final=False,
         outcome="", reproducible=False,
     )  # fmt: skip
 
@@ -80,7 +80,7 @@ def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None
     monitor = RunMonitor("lab")
     subscriber = RunSubscriber(at, monitor)
     keys: Truth = {
-        KEYS.telemetry: ("plant", (Telemetry, LinkReport, LinkOrder)),
+        KEYS.telemetry: ("plant", (Telemetry, LinkReport, LinkRequest)),
         **{KEYS.status(name): (name, (AgentStatus,)) for name in NAMES},
     }
     line.events = [
@@ -122,7 +122,7 @@ COUNTS = LinkCounts(sent=1, duplicated=0, delivered=1, dropped={}, corrupted=0, 
 
 def report(body: object, sender: str = "inv1") -> LinkReport:
     """A report with this in it."""
-    return LinkReport(sender=sender, incarnation=1, seq=0, t=0.0, data=msgspec.msgpack.encode(body))
+    return LinkReport(sender=sender, epoch=1, seq=0, t=0.0, data=msgspec.msgpack.encode(body))
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_a_sound_book_is_recorded() -> None:
     book = LinkReportData(
         traces=(LinkTrace("inv2", "inv1", (1, 2), (0.0, 0.02), ("cut", 0.1)),), counts={"inv2": COUNTS}
     )
-    record(LinkReport(sender="inv1", incarnation=1, seq=0, t=0.0, data=encode_data(book)))
+    record(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=encode_data(book)))
 
     assert record.garbled == 0
     assert record.counts == {("inv2", "inv1"): COUNTS}
@@ -171,5 +171,5 @@ def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line:
     said: Message = telemetry(1.0)
 
     assert at.read(KEYS.telemetry, encode(said)) == said
-    assert at.read(KEYS.telemetry, encode(replace(telemetry(1.0), incarnation=6))) is None
+    assert at.read(KEYS.telemetry, encode(replace(telemetry(1.0), epoch=6))) is None
     assert at.read(KEYS.telemetry, b"nonsense") is None

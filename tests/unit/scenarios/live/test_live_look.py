@@ -25,7 +25,7 @@ def plate(name: str) -> AgentConfig:
 def told(t: float, *events: PlantEvent, life: int = 1) -> Telemetry:
     """Telemetry of two inverters at a time (s)."""
     return Telemetry(
-        sender="plant", incarnation=life, seq=0, t=t, inverters=("inv1", "inv2"),
+        sender="plant", epoch=life, seq=0, t=t, inverters=("inv1", "inv2"),
         rows=((t, 60.01, 3e5, 1e4, 2400.0, 3.1e5, 2412.0, 60.0, 2.5e5, -2e4, 2376.0, 2.5e5, 2400.0),),
         events=events, final=False, outcome="", reproducible=False,
         pacing=Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0),
@@ -35,7 +35,7 @@ def told(t: float, *events: PlantEvent, life: int = 1) -> Telemetry:
 def status(sender: str, neighbours: dict[str, float], used: tuple[str, ...], waits_for: str = "") -> AgentStatus:
     """How an agent fares that hears neighbours at ages (s)."""
     return AgentStatus(
-        sender=sender, incarnation=1, seq=5, t=2.0, phase="waiting" if waits_for else "running", waits_for=waits_for,
+        sender=sender, epoch=1, seq=5, t=2.0, phase="waiting" if waits_for else "running", waits_for=waits_for,
         island="grid", neighbours=tuple(neighbours), ages=tuple(neighbours.values()), used=used, received=120, sent=60,
         rejected=0, lost=2, ticks=60, missed=0, lateness=0.001,
     )  # fmt: skip

@@ -55,7 +55,7 @@ BACK = told("roster", 3.4, "inv2", "inv2 joined, at t = 3.4 s")
         ("islanding", [told("roster", 0.0, "inv3", "inv3 joined, at t = 0 s")], (), []),
         ("islanding", [told("roster", 0.0, "inv10", "inv10 joined, at t = 0 s")], ("event1", "event2"), ["inv10"]),
         ("islanding", [ABSENT], ("event1", "event2"), ["0.00 s  started without the agents of inv3"]),
-        ("islanding", [told("link", 4.5, "links", "order 1 to links: * -> *: cut")], ("event2",), ["order 1 to"]),
+        ("islanding", [told("link", 4.5, "links", "link command 1: * -> *: cut")], ("event2",), ["link command 1"]),
         ("plug-n-play", [LEFT, BACK], (), []),
         ("plug-n-play", [LEFT], ("return",), ["3.00 s  inv2 was to join, and nobody started it in time"]),
         ("plug-n-play", [], ("leave", "return"), ["2.00 s  inv2 was to leave", "3.00 s  inv2 was to join"]),

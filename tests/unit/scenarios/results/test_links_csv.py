@@ -26,7 +26,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
         receiver.offer("inv1", k, 0.02 * k, 0.02 * k, bytes(100))
     record = LinkRecord()
     for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-        record(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
+        record(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
     record.write(tmp_path / "links.csv")
 
     with (tmp_path / "links.csv").open(newline="") as file:
@@ -71,9 +71,9 @@ def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path)
             receiver.offer("inv1", k, 0.02 * k, 0.02 * k, b"state")
             receiver.due(0.02 * k)
         for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
-            on_disk(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
+            on_disk(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
             if first < 5_000:
-                in_memory(LinkReport(sender="inv2", incarnation=1, seq=0, t=1.2, data=data))
+                in_memory(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
             elif first == 5_000:
                 before, _ = tracemalloc.get_traced_memory()
     grown = tracemalloc.get_traced_memory()[0] - before

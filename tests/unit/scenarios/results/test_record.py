@@ -20,7 +20,7 @@ def telemetry(rows: Rows, events: tuple[PlantEvent, ...] = (), *, reproducible: 
     """A message of one inverter's rows."""
     return Telemetry(
         sender="plant",
-        incarnation=1,
+        epoch=1,
         seq=0,
         t=rows[-1][0] if rows else 0.0,
         inverters=("inv1",),
