@@ -156,7 +156,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     name : str
         What the scenario calls the rule, for messages.
     strict : bool, optional
-        Whether who is no member is a mistake, as when a scenario is checked; else it is left out: in wall-clock time
+        Whether who is no member is a problem, as when a scenario is checked; else it is left out: in wall-clock time
         agents meet one after the other, and may have died.
 
     Raises

@@ -24,7 +24,7 @@ from agents.graphs import (
     ring,
 )
 
-__all__ = ["adjacency", "in_neighbours", "is_pairwise", "laplacian", "link_mistakes", "natural_order", "rule_of"]
+__all__ = ["adjacency", "in_neighbours", "is_pairwise", "laplacian", "link_problems", "natural_order", "rule_of"]
 
 _OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "clustered": clustered, "ring": ring}
 
@@ -93,22 +93,22 @@ def in_neighbours(
     return tuple(other for other in heard if other not in missing)
 
 
-def link_mistakes(control: Control, names: Sequence[str]) -> tuple[str, ...]:
+def link_problems(control: Control, names: Sequence[str]) -> tuple[str, ...]:
     """What is wrong with the listed links, given the names of all inverters; empty if nothing is.
 
     Examples
     --------
     >>> control = Control(secondary="all", graph="links", links=(("inv1", "inv9"),))
-    >>> link_mistakes(control, ("inv1", "inv2"))
+    >>> link_problems(control, ("inv1", "inv2"))
     ('links[0]: no inverter "inv9"; inverters are inv1, inv2',)
     """
-    mistakes = []
+    problems = []
     for i, link in enumerate(control.links):
         unknown = [end for end in dict.fromkeys(link) if end not in names]
-        mistakes += [f'links[{i}]: no inverter "{end}"; inverters are {", ".join(names)}' for end in unknown]
+        problems += [f'links[{i}]: no inverter "{end}"; inverters are {", ".join(names)}' for end in unknown]
         if link[0] == link[1]:
-            mistakes.append(f"links[{i}]: {link[0]} is linked to itself; a link joins two inverters")
-    return tuple(mistakes)
+            problems.append(f"links[{i}]: {link[0]} is linked to itself; a link joins two inverters")
+    return tuple(problems)
 
 
 def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[float]]:

@@ -22,14 +22,14 @@ from typing import Any
 import msgspec
 from machine import machine
 
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.record import Recorder
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 TARGET = 1.05
 """Issue 4: netem with no fault configured costs less than 5 %."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from scenarios.sweep.file import Run
 from scenarios.sweep.workers import cores, on_this_machine
 

@@ -31,8 +31,8 @@ from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
 from scenarios.results.record import Recorder
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 IN_PROCESS_TARGET, PROCESSES_TARGET = 0.7, 4.0
 """Seconds for one case of 7 s simulated: warm in one process; with processes, their start included."""

@@ -25,10 +25,10 @@ from machine import machine
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.record import Recorder
-from scenarios.spec.configs import configs
-from scenarios.spec.scenario_changes import as_in
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_changes import as_in
 from scenarios.sweep.file import Plan, Run, read_sweep
 from scenarios.sweep.sweep_case import run_one
 from scenarios.sweep.sweep_folder import SweepFolder
@@ -95,7 +95,7 @@ def loop(runs: Sequence[Run], folder: Path) -> float:
             recorded = recorder.finish(scenario.time.end_s, plant.record_step)
         history = History.of(recorded.inverters, recorded.rows)
         for window in metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s):
-            metrics.measure(history, Plates.of(feeder.inverters), window, feeder.f_nom)
+            metrics.measure(history, Nameplates.of(feeder.inverters), window, feeder.f_nom)
     return perf_counter() - began
 
 

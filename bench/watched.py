@@ -18,7 +18,7 @@ from plant.equipment import F_NOM
 from scenarios.drivers.children import Child, Children
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from wire.codec import decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys
@@ -292,12 +292,12 @@ class Watched:
             return
         rows = np.array(telemetry.rows)
         at = [telemetry.inverters.index(name) for name in self._judged]
-        plates = [self.agents[name] for name in self._judged]
-        GFM = [i for i, plate in zip(at, plates, strict=True) if plate.kind == "GFM"]
+        nameplates = [self.agents[name] for name in self._judged]
+        GFM = [i for i, plate in zip(at, nameplates, strict=True) if plate.kind == "GFM"]
         index = sharing_index(
             rows[:, [2 + 6 * i for i in at]],
-            np.array([plate.P_rated for plate in plates]),
-            np.array([plate.m_p for plate in plates]),
+            np.array([plate.P_rated for plate in nameplates]),
+            np.array([plate.m_p for plate in nameplates]),
         )
         error = np.abs(rows[:, [1 + 6 * i for i in GFM]] - F_NOM).max(axis=1)
         verdicts = (error < F_BAND) & (index < MPSI_BAND)

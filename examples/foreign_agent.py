@@ -75,8 +75,7 @@ class Agent:
         self.head = {"sender": self.name, "epoch": time.time_ns() // 1_000_000, "seq": 0, "t": 0.0}
         self.own = self.head | {"type": "Nameplate"}
         self.own |= {key: config[key] for key in ("kind", "microgrid", "P_rated", "V_nom", "f_nom", "m_p", "m_q")}
-        self.inbox = queue.SimpleQueue()
-        me = f"{self.name}/{session.zid()}"
+        self.inbox, me = queue.SimpleQueue(), f"{self.name}/{session.zid()}"
         self.alive = {tuple(me.split("/")): self.own}  # tokens that are there, (name, instance): their nameplates
         self.members: dict[str, str] = {}  # instance of each name on the last roster that was prepared
         self.states: dict[str, list] = {}  # of each neighbour the last two: its nameplate, the state, when it came

@@ -14,7 +14,7 @@ DELAYS = [0.0, 0.02, 0.05, 0.1, 0.2]  # s
 def swing(window: gp.WindowData) -> float:
     """Return by how much a set-point of P still moves in the last second of a window, at worst (pu of its rating)."""
     late = window.t > window.end - 1.0
-    return float((np.ptp(window.P_set[late], axis=0) / window.plates.s).max())
+    return float((np.ptp(window.P_set[late], axis=0) / window.nameplates.s).max())
 
 
 every_link = {"case.IV.link": [{"on": "* <-> *", "delay": 0.0}]}

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from scenarios.results.own.window_metrics import WindowData
     from scenarios.results.run_files import FolderError
     from scenarios.run import BrokenRunError
-    from scenarios.spec.loading import catalogue
-    from scenarios.spec.scenario_errors import ScenarioError
+    from scenarios.schema.loading import catalogue
+    from scenarios.schema.scenario_errors import ScenarioError
     from wire.plausible import Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
@@ -61,11 +61,11 @@ _HOME = {
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
-    "ScenarioError": "scenarios.spec.scenario_errors",
+    "ScenarioError": "scenarios.schema.scenario_errors",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.plausible",
     "WindowData": "scenarios.results.own.window_metrics",
-    "catalogue": "scenarios.spec.loading",
+    "catalogue": "scenarios.schema.loading",
     "claim": "scenarios.results.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",

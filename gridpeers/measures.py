@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from scenarios.results.history import Flags, Floats, History, Plates
+from scenarios.results.history import Flags, Floats, History, Nameplates
 from scenarios.results.metrics import MPSI, MQSI, V_error, Window, mean_frequency, mean_voltage
 from scenarios.results.settling import Settling, settling
 from scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
-    from scenarios.spec import Scenario
+    from scenarios.schema import Scenario
 
 __all__ = [
     "MPSI",
@@ -20,18 +20,18 @@ __all__ = [
     "Flags",
     "Floats",
     "History",
-    "Plates",
+    "Nameplates",
     "Settling",
     "V_error",
     "Window",
     "mean_frequency",
     "mean_voltage",
-    "plates_of",
+    "nameplates_of",
     "settling",
 ]
 
 
-def plates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Plates:
+def nameplates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Nameplates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
     Parameters
@@ -41,8 +41,8 @@ def plates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Plates:
     case : str, optional
         Leave out the inverters that have no agent in this case, as the sharing indices do.
     """
-    from scenarios.spec.agent_schedule import inverters_of
-    from scenarios.spec.agentless import without_agent
+    from scenarios.schema.agent_schedule import inverters_of
+    from scenarios.schema.agentless import without_agent
 
-    plates = Plates.of(inverters_of(spec, feeder))
-    return plates.without(without_agent(spec, case)) if case else plates
+    nameplates = Nameplates.of(inverters_of(spec, feeder))
+    return nameplates.without(without_agent(spec, case)) if case else nameplates

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from gridpeers.values import plain
-from scenarios.spec import scenario_model as model
-from scenarios.spec.loading import check_tables, find_scenario, read_toml
-from scenarios.spec.scenario_errors import Mistakes, ScenarioError
+from scenarios.schema import scenario_model as model
+from scenarios.schema.loading import check_tables, find_scenario, read_toml
+from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.sweep.file.paths import PathError, Tree, put, remove
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def as_scenario(it: Scenario | str | Path) -> Scenario:
     Raises
     ------
     ScenarioError
-        If it is none, or has mistakes.
+        If it is none, or has problems.
     """
     if isinstance(it, Scenario):
         return it
@@ -48,7 +48,7 @@ def load(name_or_path: str | Path) -> Scenario:
     Raises
     ------
     ScenarioError
-        With every mistake of the file and of its feeder.
+        With every problem of the file and of its feeder.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class Scenario:
     Raises
     ------
     ScenarioError
-        With every mistake in them.
+        With every problem in them.
 
     Examples
     --------
@@ -88,27 +88,27 @@ class Scenario:
     """
 
     def __init__(self, **tables: Any) -> None:
-        mistakes = Mistakes("Scenario(...)")
+        problems = Problems("Scenario(...)")
         tree: Tree = {}
         for key, value in tables.items():
             try:
                 tree[key] = plain(value)
             except ValueError as error:
-                mistakes.add(key, str(error))
-        mistakes.raise_if_any()
-        self._set(tree, Path("scenario.toml").absolute(), "", frozenset(), mistakes)
+                problems.add(key, str(error))
+        problems.raise_if_any()
+        self._set(tree, Path("scenario.toml").absolute(), "", frozenset(), problems)
 
     @classmethod
     def _of(cls, tree: Tree, path: Path, text: str) -> Scenario:
         """Make one of a file's tables."""
         self = cls.__new__(cls)
-        self._set(tree, path, text, frozenset(), Mistakes(path.name, text))
+        self._set(tree, path, text, frozenset(), Problems(path.name, text))
         return self
 
-    def _set(self, tree: Tree, path: Path, text: str, changed: frozenset[str], mistakes: Mistakes) -> None:
+    def _set(self, tree: Tree, path: Path, text: str, changed: frozenset[str], problems: Problems) -> None:
         self._tree, self._path, self._text, self._changed = tree, path, text, changed
-        spec, feeder = check_tables(tree, path, mistakes)
-        mistakes.raise_if_any()
+        spec, feeder = check_tables(tree, path, problems)
+        problems.raise_if_any()
         assert feeder is not None
         self._spec, self._feeder = spec, feeder
 
@@ -134,7 +134,7 @@ class Scenario:
         >>> load("islanding").replace({"gains.k_p": "much", "case.VI.graph": "ring"})
         Traceback (most recent call last):
             ...
-        scenarios.spec.scenario_errors.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
+        scenarios.schema.scenario_errors.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
         replace: gains.k_p: must be a number, got "much"
         """
         if not isinstance(changes, Mapping) or not all(isinstance(path, str) for path in changes):
@@ -142,7 +142,7 @@ class Scenario:
                 [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
             )
         tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
-        mistakes = Mistakes(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
+        problems = Problems(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
         for path, value in changes.items():
             try:
                 if value is None:
@@ -150,9 +150,9 @@ class Scenario:
                 else:
                     put(tree, path, plain(value))
             except (PathError, ValueError) as error:
-                mistakes.add(path, str(error))
+                problems.add(path, str(error))
         new = type(self).__new__(type(self))
-        new._set(tree, self._path, self._text, changed, mistakes)
+        new._set(tree, self._path, self._text, changed, problems)
         return new
 
     def check(self) -> tuple[str, ...]:
@@ -164,7 +164,7 @@ class Scenario:
             If the feeder has no operating point to start from.
         """
         from scenarios.operating_point import start_problem
-        from scenarios.spec.supply import supply_notes
+        from scenarios.schema.supply import supply_notes
 
         if problem := start_problem(self._spec, self._feeder):
             raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])
@@ -248,13 +248,13 @@ class Scenario:
     @property
     def inverters(self) -> tuple[str, ...]:
         """Names of the inverters, those that join later last."""
-        from scenarios.spec.agent_schedule import inverters_of
+        from scenarios.schema.agent_schedule import inverters_of
 
         return tuple(row.name for row in inverters_of(self._spec, self._feeder))
 
     @property
     def spec(self) -> model.Scenario:
-        """All keys as typed values, defaults included (`scenarios.spec.scenario_model`)."""
+        """All keys as typed values, defaults included (`scenarios.schema.scenario_model`)."""
         return self._spec
 
     @property
@@ -269,7 +269,7 @@ class Scenario:
 
     def to_toml(self) -> str:
         """Return the text of a scenario file with every key spelled out."""
-        from scenarios.spec.scenario_writing import to_toml
+        from scenarios.schema.scenario_writing import to_toml
 
         return to_toml(self._spec, {})
 

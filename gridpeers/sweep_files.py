@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenarios.catalogue_files import SWEEPS
-from scenarios.spec.loading import read_toml
+from scenarios.schema.loading import read_toml
 from scenarios.sweep.file import Plan, read_sweep
 
 __all__ = ["Plan", "read_sweep", "sweep_title"]

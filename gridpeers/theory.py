@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from netem.spec.netem import Netem
+from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from plant.tables import read_feeder
 from scenarios.predict.delay_limits import delay_limit
@@ -17,9 +17,9 @@ from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
 from scenarios.predict.var_response import VarResponse, var_growth, var_response
 from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
-from scenarios.spec import Case
-from scenarios.spec import Scenario as Spec
-from scenarios.spec.scenario_changes import as_in
+from scenarios.schema import Case
+from scenarios.schema import Scenario as Spec
+from scenarios.schema.scenario_changes import as_in
 
 __all__ = [
     "Case",

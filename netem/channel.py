@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from netem.draws import Stream
 from netem.fault_schedule import GATES, Schedule
 from netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
-from netem.spec.fault import Span
-from netem.spec.pattern import Link
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
 from wire.plugin import Plugin
 
 NEVER = -math.inf
@@ -62,7 +62,7 @@ class Channel:
 
     Examples
     --------
-    >>> from netem.spec.fault import Fault
+    >>> from netem.schema.fault import Fault
     >>> fault = Fault(on="inv1 -> inv2", delay=0.25, loss=0.1)
     >>> channel = Channel(Link("inv1", "inv2"), fault.spans("inv1", "inv2", {}), seed=1)
     >>> channel.judge(0, 0.0, 100).deliveries

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from netem.models.instant import INSTANT
-from netem.spec.fault import Span
+from netem.schema.fault import Span
 
 CUTS = ("cut", "partition")
 """Kinds that let nothing pass as long as they hold."""
@@ -35,7 +35,7 @@ class Schedule:
     ----------
     spans : Iterable[Span]
         Faults, those of a scenario first. Where two of one kind hold at once, the later one in this order counts; in
-        a scenario that is a mistake, but what somebody does live takes precedence over the scenario while it lasts.
+        a scenario that is a problem, but what somebody does live takes precedence over the scenario while it lasts.
     """
 
     def __init__(self, spans: Iterable[Span]) -> None:

@@ -17,10 +17,10 @@ from netem.channel import FOREVER, NEVER, Channel
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models.corrupt import flip
 from netem.models.instant import INSTANT
-from netem.spec.change import Change, Heal, changed, schedule_of
-from netem.spec.fault import Fault, Span
-from netem.spec.netem import Netem
-from netem.spec.pattern import Link
+from netem.schema.change import Change, Heal, changed, schedule_of
+from netem.schema.fault import Fault, Span
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
 from wire.messages import AnyMessage
 
 MOST_FAILURES = 8

@@ -15,7 +15,7 @@ def build_plant(config: PlantConfig) -> Plant:
     Raises
     ------
     FeederError
-        If the feeder's tables have mistakes.
+        If the feeder's tables have problems.
     PlantError
         If there is no operating point.
     """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from plant.build import build_plant
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
-from scenarios.spec import Scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario
+from scenarios.schema.configs import configs
 
 
 def start_problem(scenario: Scenario, feeder: Feeder) -> str:

@@ -26,7 +26,7 @@ from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.claims import judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
 from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
@@ -36,10 +36,10 @@ from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.configs import configs
-from scenarios.spec.own_modules import claims_of
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.configs import configs
+from scenarios.schema.own_modules import claims_of
+from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
 
@@ -142,12 +142,12 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
-    plates = Plates.of(inverters_of(scenario, request.feeder))
+    nameplates = Nameplates.of(inverters_of(scenario, request.feeder))
     histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
     came = {case: as_they_came(scenario, record.events) for case, record in recorded.items()}
     events = came[list(came)[-1]]  # in wall-clock time each case has its own
     opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
-    found, saved = measure_run(scenario, request.feeder, plates, histories, opened, recorded)
+    found, saved = measure_run(scenario, request.feeder, nameplates, histories, opened, recorded)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
     compared = _compared(request, recorded)
     unlike = {
@@ -165,7 +165,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     notes += [f"case {case}: {note}" for case, record in recorded.items() for note in _of_laws(record, saved[case])]
     write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
     if request.lasting:
-        _draw(drawing_of(scenario, request.feeder, plates, histories, events), folder / "plots")
+        _draw(drawing_of(scenario, request.feeder, nameplates, histories, events), folder / "plots")
     benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
     report = RunReport(
         scenario=scenario.name,

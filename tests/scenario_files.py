@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.spec import ScenarioError, load_scenario
+from scenarios.schema import ScenarioError, load_scenario
 
 
 def written(folder: Path, text: str) -> Path:
@@ -16,8 +16,8 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def mistakes(folder: Path, text: str) -> tuple[str, ...]:
+def problems(folder: Path, text: str) -> tuple[str, ...]:
     """What is wrong with a scenario file of this text."""
     with pytest.raises(ScenarioError) as caught:
         load_scenario(written(folder, text))
-    return caught.value.mistakes
+    return caught.value.problems

@@ -46,7 +46,7 @@ def _within(file: str, folders: tuple[str, ...]) -> bool:
 def compile_once() -> None:
     """Compile the plant's inner loop in a fresh clone, before several processes do it side by side."""
     from scenarios.operating_point import start_problem
-    from scenarios.spec import load_scenario
+    from scenarios.schema import load_scenario
 
     assert start_problem(*load_scenario("islanding")) == ""
 

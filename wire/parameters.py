@@ -162,7 +162,7 @@ def values_of(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If a value is wrong or missing; the text has all mistakes.
+        If a value is wrong or missing; the text has all problems.
     """
     if wrong := objections(cls, given):
         raise ValueError("; ".join(f"{name}: {text}" for name, text in wrong))

@@ -102,7 +102,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
     return it
 
 
-def problems(registry: Registry[Any], plugin: Plugin) -> list[tuple[str, str]]:
+def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[tuple[str, str]]:
     """Return all that is wrong with a plugin: for each the parameter, "" for the whole, and a sentence."""
     try:
         found = registry.resolve(plugin.use, plugin.folder)

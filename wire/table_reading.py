@@ -41,7 +41,7 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
 
     Examples
     --------
-    >>> from netem.spec.netem import Netem
+    >>> from netem.schema.netem import Netem
     >>> netem, problems = read_table(Netem, {"link": [{"on": "* <-> *", "delay": "20 ms", "los": 0.1}]})
     >>> for path, text in problems:  # doctest: +ELLIPSIS
     ...     print(f"{path}: {text}")

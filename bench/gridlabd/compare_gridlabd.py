@@ -29,8 +29,8 @@ from plant.network import Network
 from plant.plant_config import GflParameters, PlantConfig, SwitchEvent
 from plant.plant_interface import PlantLike
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 from .impedance import with_impedances
 from .twin import GridlabdError, Twin

@@ -1,6 +1,6 @@
 """Write a feeder of `plant/data` as a GridLAB-D model (GLM).
 
-This file reads the tables by itself and shares no code with `plant.tables` and `plant.network`, so that a mistake
+This file reads the tables by itself and shares no code with `plant.tables` and `plant.network`, so that a problem
 there shows as a difference. Only the inverters' parameters come as `plant.plant_config` has them.
 """
 

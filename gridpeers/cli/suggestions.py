@@ -1,4 +1,4 @@
-"""What was typed wrong, in one line as all other mistakes, with the nearest word; typer has three lines for it."""
+"""What was typed wrong, in one line as all other problems, with the nearest word; typer has three lines for it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gridpeers.cli.usage import BAD_INPUT, fail
 from wire.suggestion import suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]
-"""Base of all mistakes on a command line; releases of typer keep it in different modules."""
+"""Base of all problems on a command line; releases of typer keep it in different modules."""
 
 
 class Commands(TyperGroup):
@@ -48,7 +48,7 @@ def _told() -> Iterator[None]:
 
 
 def _line(error: Any) -> str:
-    """A mistake in one line: where, what, and what would be right."""
+    """A problem in one line: where, what, and what would be right."""
     message = error.format_message().rstrip(".")
     path = error.ctx.command_path if error.ctx is not None else "gridpeers"
     param, kind = getattr(error, "param", None), type(error).__name__

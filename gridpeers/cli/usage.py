@@ -10,7 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
-    from scenarios.spec import Scenario, ScenarioError
+    from scenarios.schema import Scenario, ScenarioError
 
 ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
@@ -21,9 +21,9 @@ PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 1
 
 
 def load(name: str) -> tuple[Scenario, Feeder]:
-    """Read and check a scenario and its feeder, or end with every mistake in them."""
+    """Read and check a scenario and its feeder, or end with every problem in them."""
     from gridpeers.scenario import load as load_face
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
 
     if not name:
         fail(["no scenario was named; `gridpeers list` shows those of the catalogue"], BAD_INPUT)
@@ -36,10 +36,10 @@ def load(name: str) -> tuple[Scenario, Feeder]:
 
 
 def refuse(error: ScenarioError) -> NoReturn:
-    """End with every mistake in a file."""
-    count = len(error.mistakes)
-    head = [] if count == 1 else [f"{count} mistakes:"]
-    fail([*head, *error.mistakes], BAD_INPUT)
+    """End with every problem in a file."""
+    count = len(error.problems)
+    head = [] if count == 1 else [f"{count} problems:"]
+    fail([*head, *error.problems], BAD_INPUT)
 
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
@@ -55,7 +55,7 @@ def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
     import msgspec
 
     from gridpeers.runs.choices import with_cases
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
 
     if case is not None:
         names = [name.strip() for name in case.split(",") if name.strip()]

@@ -10,15 +10,15 @@ import msgspec
 from scenarios.live.live_options import SPEEDS
 from scenarios.results.metrics_file import Clock
 from scenarios.run import Driver
-from scenarios.spec import ScenarioError
-from scenarios.spec import scenario_model as model
+from scenarios.schema import ScenarioError
+from scenarios.schema import scenario_model as model
 from wire.suggestion import suggestion
 
 
 def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:
     """Return a scenario with some of its cases; all if none is named.
 
-    An `option` of the command line heads every mistake.
+    An `option` of the command line heads every problem.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str
 
     Examples
     --------
-    >>> from scenarios.spec import load_scenario
+    >>> from scenarios.schema import load_scenario
     >>> list(with_cases(load_scenario("islanding")[0], ["IV", "I"]).cases)
     ['I', 'IV']
     """

@@ -14,11 +14,11 @@ from plant.tables import read_feeder
 from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
-from scenarios.spec import ScenarioError
-from scenarios.spec.loading import read_tables, read_toml
-from scenarios.spec.portability import check_portable
-from scenarios.spec.scenario_changes import as_in
-from scenarios.spec.scenario_errors import Mistakes
+from scenarios.schema import ScenarioError
+from scenarios.schema.loading import read_tables, read_toml
+from scenarios.schema.portability import check_portable
+from scenarios.schema.scenario_changes import as_in
+from scenarios.schema.scenario_errors import Problems
 from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -105,12 +105,12 @@ def read(folder: str | Path) -> Result | Results:
         raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
     try:
         text, tables = read_toml(path / "scenario.toml")
-        mistakes = Mistakes(str(path / "scenario.toml"), text)
-        spec = read_tables(tables, mistakes)  # not checked further: to read a run needs no law, and no path of old
-        mistakes.raise_if_any()
+        problems = Problems(str(path / "scenario.toml"), text)
+        spec = read_tables(tables, problems)  # not checked further: to read a run needs no law, and no path of old
+        problems.raise_if_any()
         feeder = as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
         results = Results(RunFolder(path.absolute()), spec, feeder)
     except (OSError, ValueError, KeyError) as error:
-        text = "; ".join(getattr(error, "mistakes", ())) or str(error)
+        text = "; ".join(getattr(error, "problems", ())) or str(error)
         raise FolderError(f"{folder}: cannot be read: {text}") from error
     return next(iter(results.values())) if len(results) == 1 else results

@@ -12,8 +12,8 @@ import pandas as pd
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.running import read
 from gridpeers.runs.showing import shown_in_notebooks
-from scenarios.spec.scenario_errors import ScenarioError
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema.scenario_errors import ScenarioError
+from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import flatten
 
 if TYPE_CHECKING:

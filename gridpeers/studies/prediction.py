@@ -19,10 +19,10 @@ from scenarios.predict.prediction_table import case_text
 from scenarios.predict.times import predicted_times
 from scenarios.predict.vars import Sensitivity, sensitivity
 from scenarios.run import BrokenRunError
-from scenarios.spec import ScenarioError
-from scenarios.spec import scenario_model as model
-from scenarios.spec.law_choice import PAPER, law_of
-from scenarios.spec.netem_tables import is_calm, netem_of
+from scenarios.schema import ScenarioError
+from scenarios.schema import scenario_model as model
+from scenarios.schema.law_choice import PAPER, law_of
+from scenarios.schema.netem_tables import is_calm, netem_of
 
 _LIMITS: dict[str, DelayKind] = {
     "agent to agent": "neighbours",

@@ -15,10 +15,10 @@ from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.results.own.metric import METRICS
-from scenarios.spec import Scenario as Spec
-from scenarios.spec.own_modules import metrics_of
-from scenarios.spec.portability import check_portable
-from scenarios.spec.scenario_errors import Mistakes, ScenarioError
+from scenarios.schema import Scenario as Spec
+from scenarios.schema.own_modules import metrics_of
+from scenarios.schema.portability import check_portable
+from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file.plan import Plan, Run
 from scenarios.sweep.file.sweep_model import Sweep
@@ -142,7 +142,7 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
 
 def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
     """Check what is to be run."""
-    mistakes = Mistakes("sweep")
+    problems = Problems("sweep")
     crossed: dict[str, Any] = {}
     paired: dict[str, Any] = {}
     for table, values, lists in (("grid", grid, crossed), ("zip", zipped, paired)):
@@ -153,10 +153,10 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
                 lists[path] = [plain(item) for item in items]
             except (TypeError, ValueError) as error:
                 text = str(error) if isinstance(error, ValueError) else f"needs a list of values, got {items!r}"
-                mistakes.add(f"{table}.{path}", text)
+                problems.add(f"{table}.{path}", text)
     if not isinstance(seeds, int):
-        mistakes.add("seeds", f"must be a whole number, got {seeds!r}")
-    mistakes.raise_if_any()
+        problems.add("seeds", f"must be a whole number, got {seeds!r}")
+    problems.raise_if_any()
     request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
     return plan_of(request, Base(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 

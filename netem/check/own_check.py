@@ -16,8 +16,8 @@ from netem.check.rows import UNSEEN, Array, Messages
 from netem.draws import Stream
 from netem.models.instant import INSTANT
 from netem.models.own_fault import DROPPED_BY_OWN, judge_of
-from netem.spec.fault import Span
-from netem.spec.pattern import Link
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
 
 AS_IT_SAYS = "as its judge says"
 """What such a fault is configured to do."""

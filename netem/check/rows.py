@@ -11,7 +11,7 @@ import numpy.typing as npt
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace, Outcome
 from netem.models.instant import INSTANT
-from netem.spec.fault import Span
+from netem.schema.fault import Span
 
 Array = npt.NDArray[np.float64]
 

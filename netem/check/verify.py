@@ -15,8 +15,8 @@ from netem.check.rows import Messages, Row, messages
 from netem.draws import Stream
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace
-from netem.spec.fault import Span
-from netem.spec.pattern import Link
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
 from wire.plugin import Plugin
 
 LEVEL = 0.001

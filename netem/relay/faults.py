@@ -50,11 +50,11 @@ class Faults:
     """Probability that a datagram skips the delay and so overtakes those before it (udp only)."""
 
     def __post_init__(self) -> None:
-        mistakes = list(self._mistakes())
-        if mistakes:
-            raise FaultsError("\n".join(mistakes))
+        problems = list(self._problems())
+        if problems:
+            raise FaultsError("\n".join(problems))
 
-    def _mistakes(self) -> Iterator[str]:
+    def _problems(self) -> Iterator[str]:
         for key, text in (
             ("delay", Plausible("a delay", 0.0, LONGEST_DELAY).objection(self.delay, "s")),
             ("jitter", Plausible("a jitter", 0.0, LONGEST_DELAY).objection(self.jitter, "s")),

@@ -26,14 +26,14 @@ from plant.tables.plausible_feeder import (
 from wire.suggestion import suggestion
 
 
-def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig] | None:
+def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:
     """Read line_configs.csv: the upper triangles of the matrices, one element per row. None if it is unreadable."""
     columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
     last_row: dict[str, Row] = {}
     mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
-    table = Table(folder, "line_configs.csv", columns, mistakes, required=True)
+    table = Table(folder, "line_configs.csv", columns, problems, required=True)
     for row in table:
         name = row.text("config")
         first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
@@ -48,7 +48,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
             spoiled.add(name)
             continue
         if (first, second) in matrix:
-            row.mistake(f'config "{name}" element {first}-{second}: given already; give each element once')
+            row.problem(f'config "{name}" element {first}-{second}: given already; give each element once')
         matrix[first, second] = matrix[second, first] = (complex(R, X), B)
         last_row[name] = row
         mistaken[name] = mistaken.get(name, False) or row.mistaken
@@ -57,7 +57,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
         phases = "".join(phase for phase in PHASES if any(phase in pair for pair in matrix))
         missing = [f"{a}-{b}" for a in phases for b in phases if a <= b and (a, b) not in matrix]
         if missing and name not in spoiled:
-            last_row[name].mistake(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
+            last_row[name].problem(f'config "{name}" lacks element {", ".join(missing)}; give the whole upper triangle')
         blank = (0j, 0.0)
         Z = tuple(tuple(matrix.get((a, b), blank)[0] for b in phases) for a in phases)
         B_matrix = tuple(tuple(matrix.get((a, b), blank)[1] for b in phases) for a in phases)
@@ -66,7 +66,7 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
             continue
         for what, part in (("an R", lambda z: z.real), ("an X", lambda z: z.imag)):
             if not positive_definite(tuple(tuple(map(part, row)) for row in Z)):
-                last_row[name].mistake(
+                last_row[name].problem(
                     f'config "{name}" has {what} matrix that no line has (not positive definite); the elements off '
                     "the diagonal must be smaller than those on it"
                 )
@@ -74,25 +74,25 @@ def read_line_configs(folder: Path, mistakes: list[str]) -> dict[str, LineConfig
 
 
 def read_lines(
-    folder: Path, buses: BusTable, configs: dict[str, LineConfig] | None, mistakes: list[str]
+    folder: Path, buses: BusTable, configs: dict[str, LineConfig] | None, problems: list[str]
 ) -> tuple[Line, ...]:
     """Read lines.csv; lengths in m."""
     columns = ("line", "from_bus", "to_bus", "phases", "config", "length_m")
     lines: dict[str, Line] = {}
-    for row in Table(folder, "lines.csv", columns, mistakes, required=True):
+    for row in Table(folder, "lines.csv", columns, problems, required=True):
         name, config, phases = row.text("line"), row.text("config"), row.phases()
         length = row.number("length_m", above=0.0, plausible=LENGTH)
         ends = buses.find_ends(row, phases)
         if configs is None or not config:
             pass
         elif config not in configs:
-            row.mistake(
+            row.problem(
                 f'config "{config}": no such line configuration; {suggestion(config, configs, "line configurations")}'
             )
         elif not set(phases) <= set(configs[config].phases):
-            row.mistake(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
+            row.problem(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
         if name in lines:
-            row.mistake(f'line "{name}": there is one of this name already; names must differ')
+            row.problem(f'line "{name}": there is one of this name already; names must differ')
         elif ends:
             buses.require_equal_voltage(row, ends, "line")
             lines[name] = Line(
@@ -106,12 +106,12 @@ def read_lines(
     return tuple(lines.values())
 
 
-def read_switches(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Switch, ...]:
+def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Switch, ...]:
     """Read switches.csv; a switch is named by its buses ("13-152"), column alias may give a second name."""
     columns = ("from_bus", "to_bus", "phases", "state")
     switches: list[Switch] = []
     names: set[str] = set()
-    for row in Table(folder, "switches.csv", columns, mistakes):
+    for row in Table(folder, "switches.csv", columns, problems):
         phases = row.phases()
         ends = buses.find_ends(row, phases)
         closed = row.choice("state", "state of a switch", ("closed", "open")) == "closed"
@@ -121,31 +121,31 @@ def read_switches(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[S
         one, other = ends[0].name, ends[1].name
         name, alias = f"{one}-{other}", row.text("alias", default="")
         for taken in [text for text in (name, alias) if text in names]:
-            row.mistake(f'switch "{taken}": there is one of this name already; names must differ')
+            row.problem(f'switch "{taken}": there is one of this name already; names must differ')
         switch = Switch(name=name, alias=alias, from_bus=one, to_bus=other, phases=phases, closed=closed)
         names.update(switch.names)
         switches.append(switch)
     return tuple(switches)
 
 
-def read_regulators(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Regulator, ...]:
+def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Regulator, ...]:
     """Read regulators.csv; one row for all phases that stand on the same tap."""
     columns = ("regulator", "from_bus", "to_bus", "phases", "tap", "tap_step_pu")
     regulators: list[Regulator] = []
     seen: set[tuple[str, str]] = set()
-    for row in Table(folder, "regulators.csv", columns, mistakes):
+    for row in Table(folder, "regulators.csv", columns, problems):
         name, phases = row.text("regulator"), row.phases()
         ends = buses.find_ends(row, phases)
         ratio = 1.0 + row.number("tap") * row.number("tap_step_pu", above=0.0)
         if ratio <= 0.0:
-            row.mistake(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
+            row.problem(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
         elif not math.isnan(ratio) and not RATIO.low <= ratio <= RATIO.high:
-            row.mistake(
+            row.problem(
                 f"tap and tap_step_pu give a ratio of {ratio:g}; {RATIO.low:g} to {RATIO.high:g} makes sense "
                 "(tap is a number of steps, as in 5 or -3, each of 0.00625 pu as a rule)"
             )
         for phase in [phase for phase in phases if (name, phase) in seen]:
-            row.mistake(f'regulator "{name}" phase {phase}: given already; give each phase once')
+            row.problem(f'regulator "{name}" phase {phase}: given already; give each phase once')
         seen |= {(name, phase) for phase in phases}
         if ends:
             buses.require_equal_voltage(row, ends, "regulator")
@@ -155,11 +155,11 @@ def read_regulators(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple
     return tuple(regulators)
 
 
-def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Transformer, ...]:
+def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Transformer, ...]:
     """Read transformers.csv; impedances in percent of the rating."""
     columns = ("transformer", "from_bus", "to_bus", "connection", "S_rated_kVA", "R_percent", "X_percent")
     transformers: dict[str, Transformer] = {}
-    for row in Table(folder, "transformers.csv", columns, mistakes):
+    for row in Table(folder, "transformers.csv", columns, problems):
         name = row.text("transformer")
         ends = buses.find_ends(row, "ABC")
         connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))
@@ -168,7 +168,7 @@ def read_transformers(folder: Path, buses: BusTable, mistakes: list[str]) -> tup
         R = row.number("R_percent", at_least=0.0, plausible=R_PERCENT)
         z = complex(R, row.number("X_percent", above=0.0, plausible=X_PERCENT)) / 100.0
         if name in transformers:
-            row.mistake(f'transformer "{name}": there is one of this name already; names must differ')
+            row.problem(f'transformer "{name}": there is one of this name already; names must differ')
         elif ends:
             if connection == "D-D":
                 buses.mark_floating(ends[1])

@@ -25,13 +25,13 @@ class BusTable:
         The buses, in the table's order.
     """
 
-    def __init__(self, folder: Path, mistakes: list[str]) -> None:
+    def __init__(self, folder: Path, problems: list[str]) -> None:
         self._by_name: dict[str, Bus] = {}
         self._row_of: dict[str, Row] = {}
-        table = Table(folder, "buses.csv", ("bus", "phases", "V_nom_kV_LL"), mistakes, required=True)
+        table = Table(folder, "buses.csv", ("bus", "phases", "V_nom_kV_LL"), problems, required=True)
         self._readable = table.readable and len(table) > 0
         if table.readable and not len(table):
-            mistakes.append("buses.csv: has no rows; a feeder needs at least one bus")
+            problems.append("buses.csv: has no rows; a feeder needs at least one bus")
         for row in table:
             name = row.text("bus")
             bus = Bus(
@@ -43,7 +43,7 @@ class BusTable:
                 y=row.number("y") if row.text("y", default="") else 0.0,
             )
             if name in self._by_name:
-                row.mistake(f'bus "{name}": there is one of this name already; names must differ')
+                row.problem(f'bus "{name}": there is one of this name already; names must differ')
             elif name:
                 self._by_name[name] = bus
                 self._row_of[name] = row
@@ -51,11 +51,11 @@ class BusTable:
         self._floating: set[str] = set()
 
     def find(self, row: Row, column: str = "bus") -> Bus | None:
-        """Read a reference to a bus; None, and a mistake noted, if there is no such bus."""
+        """Read a reference to a bus; None, and a problem noted, if there is no such bus."""
         name = row.text(column)
         bus = self._by_name.get(name)
         if name and bus is None and self._readable:
-            row.mistake(f'{column} "{name}": no such bus; {suggestion(name, self._by_name, "buses")}')
+            row.problem(f'{column} "{name}": no such bus; {suggestion(name, self._by_name, "buses")}')
         return bus
 
     def find_ends(self, row: Row, phases: str) -> tuple[Bus, Bus] | None:
@@ -67,22 +67,22 @@ class BusTable:
         if ends[0] is None or ends[1] is None:
             return None
         if ends[0].name == ends[1].name:
-            row.mistake(f'both ends are bus "{ends[0].name}"; a branch needs two buses')
+            row.problem(f'both ends are bus "{ends[0].name}"; a branch needs two buses')
             return None
         return ends[0], ends[1]
 
     def require_phases(self, row: Row, bus: Bus, phases: Iterable[str]) -> bool:
-        """Note a mistake if the bus lacks one of the phases; tell whether all is well."""
+        """Note a problem if the bus lacks one of the phases; tell whether all is well."""
         missing = [phase for phase in phases if phase not in bus.phases]
         if missing:
-            row.mistake(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
+            row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
         return not missing
 
     def require_equal_voltage(self, row: Row, ends: tuple[Bus, Bus], what: str) -> None:
-        """Note a mistake if something that is no transformer joins two nominal voltages."""
+        """Note a problem if something that is no transformer joins two nominal voltages."""
         V_from, V_to = (bus.V_nom * sqrt(3.0) / 1000.0 for bus in ends)
         if abs(V_from - V_to) > 1e-6 * V_from:
-            row.mistake(
+            row.problem(
                 f"a {what} between buses of {V_from:g} kV and {V_to:g} kV; "
                 f"it joins equal nominal voltages only, use transformers.csv"
             )
@@ -92,20 +92,20 @@ class BusTable:
         self._floating.add(bus.name)
 
     def require_ground(self, row: Row, bus: Bus, what: str) -> bool:
-        """Note a mistake if something connected to ground stands behind a delta winding; tell whether all is well."""
+        """Note a problem if something connected to ground stands behind a delta winding; tell whether all is well."""
         if bus.name in self._floating:
-            row.mistake(
+            row.problem(
                 f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; '
                 f"use delta loads there, or a Yg-Yg transformer"
             )
         return bus.name not in self._floating
 
     def row_of(self, name: str) -> Row:
-        """Give the table's row of a bus, to note a mistake there."""
+        """Give the table's row of a bus, to note a problem there."""
         return self._row_of[name]
 
 
-def report_unconnected(feeder: Feeder, buses: BusTable, mistakes: list[str]) -> None:
+def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> None:
     """Note every node that is cut off even with all switches closed: a feeder is one network, in each phase."""
     inverters = (*feeder.inverters, *feeder.spares)
     whole = [*([feeder.source.bus] if feeder.source else []), *(row.bus for row in inverters)][:1]
@@ -117,14 +117,14 @@ def report_unconnected(feeder: Feeder, buses: BusTable, mistakes: list[str]) -> 
         shown = [_named(name, order[name], part) for name in names]
         if len(names) == 1:
             phases = ", ".join(phase for phase in order[names[0]] if (names[0], phase) in part)
-            buses.row_of(names[0]).mistake(
+            buses.row_of(names[0]).problem(
                 f'bus "{names[0]}" phase {phases}: nothing connects it; '
                 f"end a line, switch, regulator or transformer there, or remove it"
             )
             continue
         there = [row.name for row in inverters if row.bus in names]
         rest = f"the substation at bus {whole[0]}" if feeder.source else "the rest"
-        mistakes.append(
+        problems.append(
             f"buses.csv: {len(names)} buses are not connected with {rest}: {', '.join(shown[:_SHOWN])}"
             + (f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else "")
             + (f" (with {', '.join(there)})" if there else "")

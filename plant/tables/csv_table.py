@@ -13,34 +13,34 @@ from wire.suggestion import suggestion
 
 
 class Row:
-    """One line of a table. Every reader notes a mistake and returns a harmless stand-in when the cell is wrong.
+    """One line of a table. Every reader notes a problem and returns a harmless stand-in when the cell is wrong.
 
     Attributes
     ----------
     mistaken : bool
-        Whether a mistake was noted so far.
+        Whether a problem was noted so far.
     """
 
-    def __init__(self, file: str, number: int, cells: dict[str, str], mistakes: list[str]) -> None:
+    def __init__(self, file: str, number: int, cells: dict[str, str], problems: list[str]) -> None:
         self._where = f"{file} row {number}"
         self._cells = cells
-        self._mistakes = mistakes
+        self._problems = problems
         self.mistaken = False
 
-    def mistake(self, text: str) -> None:
+    def problem(self, text: str) -> None:
         """Note that something is wrong with this row."""
         self.mistaken = True
-        self._mistakes.append(f"{self._where}: {text}")
+        self._problems.append(f"{self._where}: {text}")
 
     def text(self, column: str, default: str | None = None) -> str:
-        """Read a name; an empty cell is a mistake unless there is a default."""
+        """Read a name; an empty cell is a problem unless there is a default."""
         value = self._cells.get(column, "")
         if not value:
             if default is not None:
                 return default
-            self.mistake(f"{column} is empty; give a name")
+            self.problem(f"{column} is empty; give a name")
         if not value.isprintable():
-            self.mistake(f"{column} {value!a}: has characters that cannot be printed; use letters and digits")
+            self.problem(f"{column} {value!a}: has characters that cannot be printed; use letters and digits")
         return value
 
     def number(
@@ -53,7 +53,7 @@ class Row:
     ) -> float:
         """Read a finite number within bounds; NaN stands in, which no later comparison complains about.
 
-        An implausible number is a mistake, but stands: what it relates to can still be checked.
+        An implausible number is a problem, but stands: what it relates to can still be checked.
         """
         value = self._cells.get(column, "")
         try:
@@ -61,24 +61,24 @@ class Row:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            self.mistake(f'{column} must be a number, got "{value}"')
+            self.problem(f'{column} must be a number, got "{value}"')
             return math.nan
         unit = f" {_unit_of(column)}".rstrip()
         if above is not None and not number > above:
-            self.mistake(f"{column} must be greater than {above:g}{unit}, got {number:g}{unit}")
+            self.problem(f"{column} must be greater than {above:g}{unit}, got {number:g}{unit}")
             return math.nan
         if at_least is not None and number < at_least:
-            self.mistake(f"{column} must not be less than {at_least:g}{unit}, got {number:g}{unit}")
+            self.problem(f"{column} must not be less than {at_least:g}{unit}, got {number:g}{unit}")
             return math.nan
         if plausible is not None and (wrong := plausible.objection(number, unit.strip())):
-            self.mistake(f"{column}: {wrong}")
+            self.problem(f"{column}: {wrong}")
         return number
 
     def choice(self, column: str, what: str, choices: Collection[str]) -> str:
         """Read one of a few words; the first choice stands in."""
         value = self._cells.get(column, "")
         if value not in choices:
-            self.mistake(f'{column} "{value}": no such {what}; choose one of {", ".join(choices)}')
+            self.problem(f'{column} "{value}": no such {what}; choose one of {", ".join(choices)}')
             return next(iter(choices))
         return value
 
@@ -87,7 +87,7 @@ class Row:
         value = self._cells.get(column, "")
         ordered = "".join(phase for phase in PHASES if phase in value)
         if not value or sorted(value) != sorted(ordered):
-            self.mistake(f'{column} must be letters out of A, B, C, each once (as "ABC" or "B"), got "{value}"')
+            self.problem(f'{column} must be letters out of A, B, C, each once (as "ABC" or "B"), got "{value}"')
             return stand_in
         return ordered
 
@@ -112,10 +112,10 @@ class Table:
         Name of the file in it.
     columns : Collection[str]
         Columns that must be there.
-    mistakes : list of str
-        Where mistakes are noted.
+    problems : list of str
+        Where problems are noted.
     required : bool
-        Whether it is a mistake if the file does not exist; else it then has no rows.
+        Whether it is a problem if the file does not exist; else it then has no rows.
 
     Attributes
     ----------
@@ -124,23 +124,23 @@ class Table:
     """
 
     def __init__(
-        self, folder: Path, file: str, columns: Collection[str], mistakes: list[str], *, required: bool = False
+        self, folder: Path, file: str, columns: Collection[str], problems: list[str], *, required: bool = False
     ) -> None:
         self.file = file
-        self._mistakes = mistakes
+        self._problems = problems
         self._rows: list[Row] = []
-        before = len(mistakes)
+        before = len(problems)
         self._open(folder / file, columns, required)
-        self.readable = len(mistakes) == before
+        self.readable = len(problems) == before
 
     def _open(self, path: Path, columns: Collection[str], required: bool) -> None:
-        file, mistakes = self.file, self._mistakes
+        file, problems = self.file, self._problems
         if path.exists() and not path.is_file():
-            mistakes.append(f"{file}: is no file")
+            problems.append(f"{file}: is no file")
             return
         if not path.is_file():
             if required:
-                mistakes.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")
+                problems.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")
             return
         try:
             with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -148,25 +148,25 @@ class Table:
                 found = [name.strip() for name in reader.fieldnames or ()]
                 reader.fieldnames = found
                 for column in dict.fromkeys(name for name in columns if found.count(name) > 1):
-                    mistakes.append(f'{file}: column "{column}" stands there twice; keep one')
+                    problems.append(f'{file}: column "{column}" stands there twice; keep one')
                     return
                 for column in columns:
                     if column not in found:
-                        mistakes.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
+                        problems.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
                 if set(columns) <= set(found):
                     self._read(reader)
         except OSError as error:
-            mistakes.append(f"{file}: cannot be read: {error.strerror}")
+            problems.append(f"{file}: cannot be read: {error.strerror}")
         except (UnicodeDecodeError, csv.Error) as error:
-            mistakes.append(f"{file}: not a CSV file in UTF-8 ({error})")
+            problems.append(f"{file}: not a CSV file in UTF-8 ({error})")
 
     def _read(self, reader: csv.DictReader[str]) -> None:
         for cells in reader:
             # DictReader files what stands beyond the last column under the key None.
             surplus = cells.pop(None, None)
-            row = Row(self.file, reader.line_num, {k: (v or "").strip() for k, v in cells.items()}, self._mistakes)
+            row = Row(self.file, reader.line_num, {k: (v or "").strip() for k, v in cells.items()}, self._problems)
             if surplus:
-                row.mistake(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
+                row.problem(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
             self._rows.append(row)
 
     def __iter__(self) -> Iterator[Row]:

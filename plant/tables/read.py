@@ -33,14 +33,14 @@ class FeederError(ValueError):
 
     Attributes
     ----------
-    mistakes : tuple of str
+    problems : tuple of str
         One sentence each: file, row (the header is row 1), value, what would be right.
     """
 
-    def __init__(self, feeder: str, mistakes: tuple[str, ...]) -> None:
-        self.mistakes = mistakes
-        count = "a mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
-        super().__init__(f'feeder "{feeder}" has {count}:\n' + "\n".join(f"  {mistake}" for mistake in mistakes))
+    def __init__(self, feeder: str, problems: tuple[str, ...]) -> None:
+        self.problems = problems
+        count = "a problem" if len(problems) == 1 else f"{len(problems)} problems"
+        super().__init__(f'feeder "{feeder}" has {count}:\n' + "\n".join(f"  {problem}" for problem in problems))
 
 
 def feeders() -> tuple[str, ...]:
@@ -86,28 +86,28 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     (134, ['inv1', 'inv4', 'inv7'])
     """
     folder = _folder(feeder)
-    mistakes: list[str] = []
-    _report_strange_files(folder, mistakes)
-    buses = BusTable(folder, mistakes)
-    configs = read_line_configs(folder, mistakes)
-    lines = read_lines(folder, buses, configs, mistakes)
-    switches = read_switches(folder, buses, mistakes)
-    regulators = read_regulators(folder, buses, mistakes)
-    transformers = read_transformers(folder, buses, mistakes)
+    problems: list[str] = []
+    _report_strange_files(folder, problems)
+    buses = BusTable(folder, problems)
+    configs = read_line_configs(folder, problems)
+    lines = read_lines(folder, buses, configs, problems)
+    switches = read_switches(folder, buses, problems)
+    regulators = read_regulators(folder, buses, problems)
+    transformers = read_transformers(folder, buses, problems)
     sets = load_sets(folder)
     if load_set in sets:
-        loads = read_loads(folder, f"loads_{load_set}.csv", buses, mistakes)
+        loads = read_loads(folder, f"loads_{load_set}.csv", buses, problems)
     else:
         loads = ()
-        mistakes.append(
+        problems.append(
             f'load set "{load_set}": no such set; there are {", ".join(sets)}'
             if sets
             else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {', '.join(LOAD_COLUMNS)}"
         )
-    capacitors = read_capacitors(folder, buses, mistakes)
-    inverters = read_inverters(folder, buses, loads, mistakes)
-    source = read_source(folder, buses, mistakes)
-    f_nom = read_f_nom(folder, mistakes)
+    capacitors = read_capacitors(folder, buses, problems)
+    inverters = read_inverters(folder, buses, loads, problems)
+    source = read_source(folder, buses, problems)
+    f_nom = read_f_nom(folder, problems)
     found = Feeder(
         name=folder.name,
         load_set=load_set,
@@ -124,11 +124,11 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         source=source,
         f_nom=f_nom,
     )
-    if not mistakes and found.buses:
-        # After other mistakes this would only repeat them: a misnamed end leaves the right bus unconnected.
-        report_unconnected(found, buses, mistakes)
-    if mistakes:
-        raise FeederError(feeder, tuple(mistakes))
+    if not problems and found.buses:
+        # After other problems this would only repeat them: a misnamed end leaves the right bus unconnected.
+        report_unconnected(found, buses, problems)
+    if problems:
+        raise FeederError(feeder, tuple(problems))
     return found
 
 
@@ -152,7 +152,7 @@ def _folder(feeder: str) -> Path:
     )
 
 
-def _report_strange_files(folder: Path, mistakes: list[str]) -> None:
+def _report_strange_files(folder: Path, problems: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
         if path.name not in FILES and not path.name.startswith("loads_"):
-            mistakes.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, FILES, 'tables')}")
+            problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, FILES, 'tables')}")

@@ -36,10 +36,10 @@ LOAD_COLUMNS = ("bus", "connection", "model", "P_a_kW", "Q_a_kvar", "P_b_kW", "Q
 """Columns of a load set; for a delta load a, b, c are A-B, B-C, C-A."""
 
 
-def read_loads(folder: Path, file: str, buses: BusTable, mistakes: list[str]) -> tuple[Load, ...]:
+def read_loads(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[Load, ...]:
     """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
-    for row in Table(folder, file, LOAD_COLUMNS, mistakes, required=True):
+    for row in Table(folder, file, LOAD_COLUMNS, problems, required=True):
         bus = buses.find(row)
         connection = row.choice("connection", "connection of a load", ("Y", "D"))
         model = row.choice("model", "load model", ("P", "I", "Z"))
@@ -58,7 +58,7 @@ def read_loads(folder: Path, file: str, buses: BusTable, mistakes: list[str]) ->
             if power == 0 or not missing:
                 continue
             between = f"between {branch[0]} and {branch[1]}" if connection == "D" else f"on phase {branch}"
-            row.mistake(f'bus "{bus.name}" has a load {between} but no phase {", ".join(missing)}; it has {bus.phases}')
+            row.problem(f'bus "{bus.name}" has a load {between} but no phase {", ".join(missing)}; it has {bus.phases}')
         loads.append(
             Load(
                 bus=bus.name,
@@ -70,11 +70,11 @@ def read_loads(folder: Path, file: str, buses: BusTable, mistakes: list[str]) ->
     return tuple(loads)
 
 
-def read_capacitors(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple[Capacitor, ...]:
+def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Capacitor, ...]:
     """Read capacitors.csv: banks from phase to ground."""
     columns = ("bus", "Q_a_kvar", "Q_b_kvar", "Q_c_kvar", "V_rated_kV_LN")
     capacitors: list[Capacitor] = []
-    for row in Table(folder, "capacitors.csv", columns, mistakes):
+    for row in Table(folder, "capacitors.csv", columns, problems):
         bus = buses.find(row)
         most = power_of("a capacitor bank", bus.V_nom, BRANCH_CURRENT, 1) if bus else None
         Q = tuple(1000.0 * row.number(f"Q_{p}_kvar", at_least=0.0, plausible=most) for p in "abc")
@@ -88,21 +88,21 @@ def read_capacitors(folder: Path, buses: BusTable, mistakes: list[str]) -> tuple
 
 
 def _require_bank_voltage(row: Row, V_rated: float, bus: Bus) -> None:
-    """Note a mistake if a bank's rated voltage (V) is not near its bus's nominal one, as 4.16 kV L-L is not at 2.40."""
+    """Note a problem if a bank's rated voltage (V) is not near its bus's nominal one, as 4.16 kV L-L is not at 2.40."""
     ratio = V_rated / bus.V_nom
     if math.isnan(ratio) or 0.9 <= ratio <= 1.5:
         return
     nominal, given = bus.V_nom / 1e3, V_rated / 1e3
     meant = f"; did you mean {given / 3**0.5:g} ({given:g} kV line-to-line)?" if 0.9 <= ratio / 3**0.5 <= 1.5 else ""
     meant = f"; did you mean {given / 1e3:g} ({given:g} V)?" if 0.9 <= ratio / 1e3 <= 1.5 else meant
-    row.mistake(
+    row.problem(
         f"V_rated_kV_LN: {given:g} kV is not plausible for a capacitor bank at a bus of {nominal:.4g} kV "
         f"line-to-neutral (0.9 to 1.5 times that){meant}"
     )
 
 
 def read_inverters(
-    folder: Path, buses: BusTable, loads: tuple[Load, ...], mistakes: list[str]
+    folder: Path, buses: BusTable, loads: tuple[Load, ...], problems: list[str]
 ) -> tuple[InverterRow, ...]:
     """Read inverters.csv: nameplates and places. The column `spare` ("yes" or empty) may be missing.
 
@@ -112,7 +112,7 @@ def read_inverters(
     columns = ("name", "kind", "bus", "microgrid", "P_rated_kW", "m_p_pu", "m_q_pu")
     inverters: dict[str, InverterRow] = {}
     at: dict[str, str] = {}
-    for row in Table(folder, "inverters.csv", columns, mistakes):
+    for row in Table(folder, "inverters.csv", columns, problems):
         name, microgrid = row.text("name"), row.text("microgrid")
         kind = row.choice("kind", "kind of inverter", ("GFM", "GFL"))
         bus = buses.find(row)
@@ -123,15 +123,15 @@ def read_inverters(
             _require_name(row, name)
         spare = row.text("spare", default="")
         if spare not in ("", "yes"):
-            row.mistake(f'spare "{spare}": must be "yes" or empty')
+            row.problem(f'spare "{spare}": must be "yes" or empty')
         if name in inverters:
-            row.mistake(f'inverter "{name}": there is one of this name already; names must differ')
+            row.problem(f'inverter "{name}": there is one of this name already; names must differ')
         if bus is None:
             continue
         buses.require_phases(row, bus, "ABC")
         buses.require_ground(row, bus, "an inverter")
         if bus.name in at:
-            row.mistake(f'bus "{bus.name}" has inverter "{at[bus.name]}" already; only one can stand on a bus')
+            row.problem(f'bus "{bus.name}" has inverter "{at[bus.name]}" already; only one can stand on a bus')
         at.setdefault(bus.name, name)
         inverters.setdefault(
             name,
@@ -161,28 +161,28 @@ def _rating(bus: Bus | None, load: float) -> Plausible | None:
 
 
 def _require_name(row: Row, name: str) -> None:
-    """Note a mistake if an inverter's name cannot be a part of a key, or already means something else there."""
+    """Note a problem if an inverter's name cannot be a part of a key, or already means something else there."""
     try:
         check_name("name", name)
     except ValueError:
         if name.isprintable():
-            row.mistake(
+            row.problem(
                 f'name "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or ".", '
                 f'as in "{re.sub(r"[^A-Za-z0-9_.-]", "", name)[:64] or "inv1"}"'
             )
     if name in TAKEN:
-        row.mistake(f'name "{name}" is taken: {TAKEN[name]}; name the inverter otherwise')
+        row.problem(f'name "{name}" is taken: {TAKEN[name]}; name the inverter otherwise')
 
 
-def read_source(folder: Path, buses: BusTable, mistakes: list[str]) -> Source | None:
+def read_source(folder: Path, buses: BusTable, problems: list[str]) -> Source | None:
     """Read source.csv: the substation, at most one."""
     found: Source | None = None
-    for row in Table(folder, "source.csv", ("bus", "V_pu", "angle_deg"), mistakes):
+    for row in Table(folder, "source.csv", ("bus", "V_pu", "angle_deg"), problems):
         bus = buses.find(row)
         V_pu = row.number("V_pu", above=0.0, plausible=SOURCE_VOLTAGE)
         angle = radians(row.number("angle_deg", plausible=SOURCE_ANGLE))
         if found is not None:
-            row.mistake("a second source; a feeder has one at most")
+            row.problem("a second source; a feeder has one at most")
         if bus is not None:
             buses.require_phases(row, bus, "ABC")
             found = found or Source(bus=bus.name, V_pu=V_pu, angle=angle)

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from netem.receiver import Arrival, Receiver
-from netem.spec.change import Change, schedule_of
-from netem.spec.fault import Fault
-from netem.spec.node_fault import NodeFault
-from netem.spec.pattern import Link, links_among, parse
+from netem.schema.change import Change, schedule_of
+from netem.schema.fault import Fault
+from netem.schema.node_fault import NodeFault
+from netem.schema.pattern import Link, links_among, parse
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_descriptions import words
@@ -93,9 +93,9 @@ class EmulatedLinks:
             If the text is no command to links, or its values are wrong; nothing has changed then.
         """
         command = LinkCommand.of_text(text)
-        mistakes = command.mistakes(self._microgrids)
-        if mistakes:
-            raise ValueError("; ".join(f"{path}: {what}" for path, what in mistakes))
+        problems = command.problems(self._microgrids)
+        if problems:
+            raise ValueError("; ".join(f"{path}: {what}" for path, what in problems))
         links, change = self._concerned(command, t), command.at(t)
         senders = [link.src for link in links if link.dst == self._name]
         self._changes.append(change)

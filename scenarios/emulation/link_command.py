@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from netem.spec.change import Change, Heal
-from netem.spec.fault import LONGEST_RUN, Fault
-from netem.spec.pattern import Link, objections
+from netem.schema.change import Change, Heal
+from netem.schema.fault import LONGEST_RUN, Fault
+from netem.schema.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words
 from wire.plausible import Plausible
 from wire.table_schema import Problem
@@ -46,7 +46,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
         return msgspec.structs.replace(self._change, **times)
 
-    def mistakes(self, microgrids: Mapping[str, str]) -> list[Problem]:
+    def problems(self, microgrids: Mapping[str, str]) -> list[Problem]:
         """Return all its errors in a run of these inverters."""
         links = [Problem("on", text) for text in objections(self.on, tuple(microgrids), microgrids)]
         return links + self.wrong_values()

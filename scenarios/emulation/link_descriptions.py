@@ -10,7 +10,7 @@ from netem.models.cut import Cut
 from netem.models.delay import Constant, Uniform
 from netem.models.loss import Bernoulli
 from netem.models.rate import Rate
-from netem.spec.profiles import PROFILES
+from netem.schema.profiles import PROFILES
 from wire.plugin import Plugin
 
 
@@ -20,7 +20,7 @@ def words(kind: str, model: Any) -> str:
     Parameters
     ----------
     kind : str
-        Of `netem.spec.fault.KINDS`, or "partition".
+        Of `netem.schema.fault.KINDS`, or "partition".
     model : Any
         The struct of `netem.models`.
 

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import msgspec
 
-from netem.spec.change import Change, replayed
-from netem.spec.netem import Netem
+from netem.schema.change import Change, replayed
+from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.run_address import UsageError
 from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
 from scenarios.results.run_files import shown, write_whole
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.netem_tables import netem_of
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.netem_tables import netem_of
+from scenarios.schema.scenario_writing import to_toml
 from wire.messages import LinkReport, LinkRequest
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_status, write_whole
 from scenarios.run import versions
-from scenarios.spec import Scenario
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema import Scenario
+from scenarios.schema.scenario_writing import to_toml
 
 BY_HAND = "by hand"
 """The driver of such a run, as files name it."""

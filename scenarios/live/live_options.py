@@ -10,9 +10,9 @@ from agents.agent_config import AgentConfig
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
 from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
-from scenarios.spec import Scenario
-from scenarios.spec.configs import configs
-from scenarios.spec.netem_tables import netem_of, setup_of
+from scenarios.schema import Scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.suggestion import suggestion
 
 SPEEDS = (0.1, 50.0)
@@ -74,7 +74,7 @@ def configure(
 
     Examples
     --------
-    >>> from scenarios.spec import load_scenario
+    >>> from scenarios.schema import load_scenario
     >>> plant, agents = configure(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
     >>> plant.end, plant.settings.spares, agents[-1].name
     (None, ('inv10',), 'inv10')

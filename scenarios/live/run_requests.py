@@ -224,7 +224,7 @@ def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
 
 def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
     """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
-    problems: Iterable[Problem] = command.wrong_values() if setup is None else command.mistakes(setup.microgrids)
+    problems: Iterable[Problem] = command.wrong_values() if setup is None else command.problems(setup.microgrids)
     options = [(path.partition(".")[0], text) for path, text in problems]
     wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
     if wrong:

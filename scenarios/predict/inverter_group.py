@@ -13,10 +13,10 @@ from agents.topology import adjacency
 from plant.equipment import F_NOM, Feeder, InverterRow
 from plant.plant_config import GflParameters, GfmParameters
 from scenarios.results.history import Flags, Floats
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.graph import graph_of
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.agentless import without_agent
+from scenarios.schema.graph import graph_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class InverterGroup:
     acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which run the secondary law; the others keep their set-points. All, if left out."""
     shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """Which have an agent: the sharing index is theirs, as in a run (`Plates.shares`). All, if left out."""
+    """Which have an agent: the sharing index is theirs, as in a run (`Nameplates.shares`). All, if left out."""
     s: Floats = field(default_factory=lambda: np.zeros(0))
     """Ratings (W); all alike, if left out."""
     m_p: Floats = field(default_factory=lambda: np.zeros(0))
@@ -142,7 +142,7 @@ def inverter_group_of(
 
     Examples
     --------
-    >>> from scenarios.spec import load_scenario
+    >>> from scenarios.schema import load_scenario
     >>> fleet = inverter_group_of(*load_scenario("islanding"), "IV")
     >>> fleet.n, fleet.A.sum(), fleet.leads.sum()
     (9, np.float64(72.0), np.int64(3))

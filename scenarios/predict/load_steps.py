@@ -15,9 +15,9 @@ from plant.equipment import Feeder
 from plant.feeder import GRID, Plant, raise_for_trip
 from plant.plant_config import PlantConfig
 from scenarios.predict.times import LoadStep
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.configs import configs
 
 
 @dataclass(frozen=True, kw_only=True)

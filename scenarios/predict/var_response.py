@@ -24,8 +24,8 @@ from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.load_steps import LoadError
 from scenarios.predict.vars import STEP, factors, plant_in_first_window
 from scenarios.results.history import Floats
-from scenarios.spec import Scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario
+from scenarios.schema.configs import configs
 
 LENGTH = 2.0
 """How long an answer is followed (s). What is left then is one in ten of the slowest inverter's, and slow."""

@@ -29,8 +29,8 @@ from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import AT_REST
 from scenarios.predict.load_steps import LoadError
 from scenarios.results.history import Floats
-from scenarios.spec import Scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario
+from scenarios.schema.configs import configs
 
 STEP = 0.002
 """By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from plant.equipment import Feeder
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval, island_intervals, islands_of
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.agentless import without_agent
+from scenarios.schema.power_limits import limits_of
+from scenarios.schema.scenario_model import Event
 from scenarios.short_names import in_order, short
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.power_limits import limits_of
-from scenarios.spec.scenario_model import Event
 
 
 class Mark(NamedTuple):
@@ -36,7 +36,7 @@ class Drawing:
     """Recorded cases by name."""
     titles: Mapping[str, str]
     """A few words on each case."""
-    plates: Plates
+    nameplates: Nameplates
     """Nameplates, in the order of the histories' columns."""
     events: Sequence[Mark]
     """What is marked at its time."""
@@ -55,15 +55,15 @@ class Drawing:
     island_intervals: Sequence[IslandInterval] = ()
     """When there are several islands; figures of all cases then show the worst."""
 
-    def plates_in(self, case: str) -> Plates:
+    def nameplates_in(self, case: str) -> Nameplates:
         """Return the nameplates as they count in a case."""
-        return self.plates.without(self.without_agent.get(case, frozenset()))
+        return self.nameplates.without(self.without_agent.get(case, frozenset()))
 
 
 def drawing_of(
     scenario: Scenario,
     feeder: Feeder,
-    plates: Plates,
+    nameplates: Nameplates,
     histories: Mapping[str, History],
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
@@ -76,7 +76,7 @@ def drawing_of(
     return Drawing(
         histories=histories,
         titles={case: rule.title for case, rule in scenario.cases.items()},
-        plates=plates,
+        nameplates=nameplates,
         events=[Mark(label, t, what.get(label, "")) for label, t in events],
         f_nom=feeder.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
@@ -93,7 +93,7 @@ def happening(event: Event, scenario: Scenario) -> str:
 
     Examples
     --------
-    >>> from scenarios.spec import load_scenario
+    >>> from scenarios.schema import load_scenario
     >>> scenario, _ = load_scenario("microgrid-switching")
     >>> [happening(event, scenario) for event in scenario.events]
     ['13-152 opens', 'sw1_2, sw2_3 open']

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from plant.equipment import F_NOM, Feeder
 from scenarios.results import metrics
 from scenarios.results.benchmark_registry import Published
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own.metric import Measured
 from scenarios.results.settling import Settling, settling
-from scenarios.spec import Scenario
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.power_limits import limits_of
+from scenarios.schema import Scenario
+from scenarios.schema.agentless import without_agent
+from scenarios.schema.power_limits import limits_of
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""
@@ -106,7 +106,7 @@ class Findings:
 def find(
     scenario: Scenario,
     feeder: Feeder,
-    plates: Plates,
+    nameplates: Nameplates,
     histories: Mapping[str, History],
     events: Mapping[str, Sequence[tuple[str, float]]],
 ) -> Findings:
@@ -116,7 +116,7 @@ def find(
     ----------
     scenario, feeder : Scenario, Feeder
         What was run.
-    plates : Plates
+    nameplates : Nameplates
         Nameplates in the order of the histories' columns.
     histories : Mapping[str, History]
         Recorded cases.
@@ -124,14 +124,14 @@ def find(
         Label and time (s) of each event, by case, as they came.
     """
     windows = {case: metrics.windows(events[case], scenario.time.end_s) for case in histories}
-    return find_in(windows, scenario, feeder, plates, histories)
+    return find_in(windows, scenario, feeder, nameplates, histories)
 
 
 def find_in(
     windows: Mapping[str, Sequence[Window]],
     scenario: Scenario,
     feeder: Feeder,
-    plates: Plates,
+    nameplates: Nameplates,
     histories: Mapping[str, History],
 ) -> Findings:
     """Measure all cases of a run in given windows, by case; each has the label of an event of the scenario.
@@ -142,27 +142,27 @@ def find_in(
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     where = islands_of(scenario, feeder)
-    everybody = plates
+    everybody = nameplates
     for case, whole in histories.items():
-        plates = everybody.without(without_agent(scenario, case))
+        nameplates = everybody.without(without_agent(scenario, case))
         results[case], settled[case], islands[case] = {}, {}, {}
         within = whole.until(scenario.time.end_s)
         for window in windows[case]:
             history = within if window.end <= scenario.time.end_s else whole
-            results[case][window.label] = metrics.measure(history, plates, window, feeder.f_nom)
-            settled[case][window.label] = settling(history, plates, window, feeder.f_nom)
+            results[case][window.label] = metrics.measure(history, nameplates, window, feeder.f_nom)
+            settled[case][window.label] = settling(history, nameplates, window, feeder.f_nom)
             if len(where[window.label]) > 1:
                 islands[case][window.label] = {
-                    name: metrics.measure(*part_of(history, plates, members), window, feeder.f_nom)
+                    name: metrics.measure(*part_of(history, nameplates, members), window, feeder.f_nom)
                     for name, members in where[window.label].items()
                 }
-    plates = everybody
-    rating = dict(zip(plates.names, plates.s.tolist(), strict=True))
+    nameplates = everybody
+    rating = dict(zip(nameplates.names, nameplates.s.tolist(), strict=True))
     return Findings(
         results=results,
         f_nom=feeder.f_nom,
         P_set0=scenario.plant.P_set0_pu,
-        GFL=tuple(name for name, GFM in zip(plates.names, plates.GFM, strict=True) if not GFM),
+        GFL=tuple(name for name, GFM in zip(nameplates.names, nameplates.GFM, strict=True) if not GFM),
         settled=settled,
         islands=islands,
         available={
@@ -170,7 +170,7 @@ def find_in(
             for case in histories
         },
         without_agent={
-            case: tuple(name for name in plates.names if name in without)
+            case: tuple(name for name in nameplates.names if name in without)
             for case in histories
             if (without := without_agent(scenario, case))
         },

@@ -21,7 +21,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plates:
+class Nameplates:
     """Nameplates of N inverters as arrays, in the order of the history's columns."""
 
     names: tuple[str, ...]
@@ -43,12 +43,12 @@ class Plates:
         if not self.shares.size:
             object.__setattr__(self, "shares", np.ones(len(self.names), bool))
 
-    def without(self, names: Collection[str]) -> Plates:
+    def without(self, names: Collection[str]) -> Nameplates:
         """Return the same with some inverters left out of the sharing indices, as they have no agent."""
         return replace(self, shares=np.array([name not in names for name in self.names], bool)) if names else self
 
     @classmethod
-    def of(cls, inverters: Sequence[InverterRow]) -> Plates:
+    def of(cls, inverters: Sequence[InverterRow]) -> Nameplates:
         """Take the nameplates from a feeder's inverters."""
         return cls(
             names=tuple(row.name for row in inverters),
@@ -60,7 +60,7 @@ class Plates:
         )
 
 
-T = TypeVar("T", "Plates", "History")
+T = TypeVar("T", "Nameplates", "History")
 
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's time and quantities."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from plant.equipment import Feeder
 from plant.network import Network
-from scenarios.results.history import Floats, History, Plates
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
+from scenarios.results.history import Floats, History, Nameplates
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
 
 IslandMembers = dict[str, tuple[str, ...]]
 """Inverters of each island; an island is known by its first inverter."""
@@ -29,7 +29,7 @@ class IslandInterval(NamedTuple):
     islands: IslandMembers
 
 
-RowMeasure = Callable[[History, Plates], Floats]
+RowMeasure = Callable[[History, Nameplates], Floats]
 """A measure of each row."""
 
 
@@ -40,7 +40,7 @@ def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, IslandMembers]:
 
     Examples
     --------
-    >>> from scenarios.spec import load_scenario
+    >>> from scenarios.schema import load_scenario
     >>> islands_of(*load_scenario("microgrid-switching"))["event2"]["inv4"]
     ('inv4', 'inv5', 'inv6')
     """
@@ -57,7 +57,7 @@ def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, IslandMembers]:
     return found
 
 
-def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[History, Plates]:
+def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) -> tuple[History, Nameplates]:
     """Return the columns of some inverters alone, as if there were no others."""
     at = np.array([history.inverters.index(name) for name in names])
     columns = {
@@ -65,11 +65,11 @@ def part_of(history: History, plates: Plates, names: tuple[str, ...]) -> tuple[H
         for field in fields(history)
         if field.name not in ("inverters", "t")
     }
-    mine = {field.name: getattr(plates, field.name)[at] for field in fields(plates) if field.name != "names"}
-    return replace(history, inverters=names, **columns), replace(plates, names=names, **mine)
+    mine = {field.name: getattr(nameplates, field.name)[at] for field in fields(nameplates) if field.name != "names"}
+    return replace(history, inverters=names, **columns), replace(nameplates, names=names, **mine)
 
 
-def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[History, Plates]:
+def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[History, Nameplates]:
     """Return a history without the spare inverters that nobody ever started, and nameplates in its order.
 
     In a run by hand all spare inverters have columns; in others those have that the scenario lets join.
@@ -77,7 +77,7 @@ def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[Hi
     rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
     own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
     names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
-    return part_of(history, Plates.of([rows[name] for name in history.inverters]), names)
+    return part_of(history, Nameplates.of([rows[name] for name in history.inverters]), names)
 
 
 def island_intervals(scenario: Scenario, feeder: Feeder) -> tuple[IslandInterval, ...]:
@@ -94,11 +94,13 @@ def worst(quantity: RowMeasure, nominal: float, island_intervals: Sequence[Islan
     A mean over islands hides what is wrong in them: one is too fast, another too slow.
     """
 
-    def measure(history: History, plates: Plates) -> Floats:
-        found = quantity(history, plates)
+    def measure(history: History, nameplates: Nameplates) -> Floats:
+        found = quantity(history, nameplates)
         for interval in island_intervals:
             rows = (history.t > interval.start) & (history.t <= interval.end)
-            each = np.stack([quantity(*part_of(history, plates, names))[rows] for names in interval.islands.values()])
+            each = np.stack(
+                [quantity(*part_of(history, nameplates, names))[rows] for names in interval.islands.values()]
+            )
             far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
             found[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
         return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from scenarios.spec.scenario_model import Scenario
+from scenarios.schema.scenario_model import Scenario
 from wire.messages import PlantEvent
 
 

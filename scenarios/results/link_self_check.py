@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from netem.check.verify import Report, verify
-from netem.spec.pattern import Link
+from netem.schema.pattern import Link
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_records import LinkRecord
 from wire.messages import PLANT

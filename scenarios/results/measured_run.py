@@ -7,18 +7,18 @@ from dataclasses import replace
 
 from plant.equipment import Feeder
 from scenarios.results.findings import Findings, find_in
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics import Window, messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded
-from scenarios.spec import Scenario
-from scenarios.spec.agentless import with_agent
+from scenarios.schema import Scenario
+from scenarios.schema.agentless import with_agent
 
 
 def measure_run(
     scenario: Scenario,
     feeder: Feeder,
-    plates: Plates,
+    nameplates: Nameplates,
     histories: Mapping[str, History],
     windows: Mapping[str, Sequence[Window]],
     recorded: Mapping[str, Recorded],
@@ -29,7 +29,7 @@ def measure_run(
     ----------
     scenario, feeder : Scenario, Feeder
         What was run; its events are those that happened.
-    plates : Plates
+    nameplates : Nameplates
         Nameplates in the order of the histories' columns.
     histories, windows, recorded : Mapping
         By case: the history, its windows of measurement, and the record.
@@ -39,5 +39,5 @@ def measure_run(
         case: messages_saved(record.quiet, windows[case], len(with_agent(scenario, feeder, case)), T_c)
         for case, record in recorded.items()
     }
-    own = own_measures(scenario, feeder, plates, histories, windows, saved)
-    return replace(find_in(windows, scenario, feeder, plates, histories), own=own), saved
+    own = own_measures(scenario, feeder, nameplates, histories, windows, saved)
+    return replace(find_in(windows, scenario, feeder, nameplates, histories), own=own), saved

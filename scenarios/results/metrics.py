@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.results.history import Flags, Floats, History, Plates
+from scenarios.results.history import Flags, Floats, History, Nameplates
 from scenarios.results.steadiness import Ends, ends_of, reason
 
 F_BAND, MPSI_BAND = 0.01, 0.01
@@ -133,85 +133,85 @@ def mean_over(x: Floats, present: Flags) -> Floats:
     return total / np.where(count > 0, count, np.nan)
 
 
-def mean_voltage(history: History, plates: Plates) -> Floats:
+def mean_voltage(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean terminal voltage of each row (pu)."""
-    return mean_over(history.V / plates.V_nom, history.present)
+    return mean_over(history.V / nameplates.V_nom, history.present)
 
 
-def mean_frequency(history: History, plates: Plates) -> Floats:
+def mean_frequency(history: History, nameplates: Nameplates) -> Floats:
     """Return frequency of each row (Hz): the mean over the GFM, which alone set it; a PLL's reading lags and rings."""
-    return mean_over(history.f[:, plates.GFM], history.present[:, plates.GFM])
+    return mean_over(history.f[:, nameplates.GFM], history.present[:, nameplates.GFM])
 
 
-def f_in_band(history: History, plates: Plates, f_nom: float) -> Flags:
+def f_in_band(history: History, nameplates: Nameplates, f_nom: float) -> Flags:
     """Return whether there is a GFM in a row, and each that is there is within `F_BAND` of f_nom (Hz)."""
-    forming = history.present[:, plates.GFM]
-    near = np.abs(history.f[:, plates.GFM] - f_nom) < F_BAND
+    forming = history.present[:, nameplates.GFM]
+    near = np.abs(history.f[:, nameplates.GFM] - f_nom) < F_BAND
     within: Flags = np.all(near | ~forming, axis=1) & np.any(forming, axis=1)
     return within
 
 
-def MPSI(history: History, plates: Plates) -> Floats:
+def MPSI(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean power sharing index of each row, (16)."""
-    return sharing_index(history.P, plates.s, plates.m_p, history.present & plates.shares)
+    return sharing_index(history.P, nameplates.s, nameplates.m_p, history.present & nameplates.shares)
 
 
-def MQSI(history: History, plates: Plates) -> Floats:
+def MQSI(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean var sharing index of each row, (17)."""
-    return sharing_index(history.Q, plates.s, plates.m_q, history.present & plates.shares)
+    return sharing_index(history.Q, nameplates.s, nameplates.m_q, history.present & nameplates.shares)
 
 
-def V_error(history: History, plates: Plates) -> Floats:
+def V_error(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean of abs(V_i - 1) of each row (pu)."""
-    return mean_over(np.abs(history.V / plates.V_nom - 1.0), history.present)
+    return mean_over(np.abs(history.V / nameplates.V_nom - 1.0), history.present)
 
 
-def measure(history: History, plates: Plates, window: Window, f_nom: float) -> Steady:
+def measure(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Steady:
     """Measure one event of one case.
 
     Parameters
     ----------
     history : History
         The case as recorded.
-    plates : Plates
+    nameplates : Nameplates
         Nameplates in the order of its columns.
     window : Window
         The event's window. Rows at the very moments of events are left out: they belong to both sides.
     f_nom : float
         Nominal frequency (Hz).
     """
-    assert plates.names == history.inverters
-    f_error = mean_over(np.abs(history.f[:, plates.GFM] - f_nom), history.present[:, plates.GFM])
-    sharing = MPSI(history, plates)
+    assert nameplates.names == history.inverters
+    f_error = mean_over(np.abs(history.f[:, nameplates.GFM] - f_nom), history.present[:, nameplates.GFM])
+    sharing = MPSI(history, nameplates)
     inside = between(history.t, window)
     ends = ends_of(history.t, inside, window.start, window.end)
     steady = ends.steady
-    restored = f_in_band(history, plates, f_nom) & (sharing < MPSI_BAND)
+    restored = f_in_band(history, nameplates, f_nom) & (sharing < MPSI_BAND)
     total = history.P.sum(axis=1)
     carried = np.abs(total - _mean(total[steady])) <= LOAD_BAND * abs(_mean(total[steady]))
-    voltage, vars_ = V_error(history, plates), MQSI(history, plates)
+    voltage, vars_ = V_error(history, nameplates), MQSI(history, nameplates)
     return Steady(
         f_error_Hz=_mean(f_error[steady]),
         MPSI=_mean(sharing[steady]),
         V_error=_mean(voltage[steady]),
         MQSI=_mean(vars_[steady]),
         t_restore_s=for_good(history.t[inside], restored[inside], window.start),
-        p={name: _mean(history.P[steady, i] / plates.s[i]) for i, name in enumerate(plates.names)},
+        p={name: _mean(history.P[steady, i] / nameplates.s[i]) for i, name in enumerate(nameplates.names)},
         t_load_s=for_good(history.t[inside], carried[inside], window.start) if total[steady].any() else None,
-        reasons=_reasons(history, plates, ends, sharing, voltage, vars_),
+        reasons=_reasons(history, nameplates, ends, sharing, voltage, vars_),
     )
 
 
 def _reasons(
-    history: History, plates: Plates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
+    history: History, nameplates: Nameplates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
 ) -> dict[str, str]:
     """Return why measures are no steady values, by name."""
-    present, forming = history.present, plates.GFM
-    sharing_now = present & plates.shares
+    present, forming = history.present, nameplates.GFM
+    sharing_now = present & nameplates.shares
     dead = "de-energised: no inverter is on the network"
-    nobody = dead if plates.shares.all() else "nothing shared: no inverter with an agent is on the network"
+    nobody = dead if nameplates.shares.all() else "nothing shared: no inverter with an agent is on the network"
     leaderless = "no grid-forming inverter is on the network" if forming.any() else "there is no grid-forming inverter"
-    names = np.array(plates.names)
+    names = np.array(nameplates.names)
     found = {
         "f_error_Hz": reason(
             "f_error_Hz",
@@ -220,21 +220,21 @@ def _reasons(
             f"no leader: {leaderless}",
             tuple(names[forming]) if forming.sum() > 1 else (),
         ),
-        "MPSI": _idle(history.P, plates, ends, sharing_now) or reason("MPSI", sharing, ends, nobody),
+        "MPSI": _idle(history.P, nameplates, ends, sharing_now) or reason("MPSI", sharing, ends, nobody),
         "V_error": reason("V_error", voltage, ends, dead),
-        "MQSI": _idle(history.Q, plates, ends, sharing_now) or reason("MQSI", vars_, ends, nobody),
-        "p": reason("p", history.P / plates.s, ends, dead, plates.names),
+        "MQSI": _idle(history.Q, nameplates, ends, sharing_now) or reason("MQSI", vars_, ends, nobody),
+        "p": reason("p", history.P / nameplates.s, ends, dead, nameplates.names),
     }
     return {name: text for name, text in found.items() if text}
 
 
-def _idle(x: Floats, plates: Plates, ends: Ends, present: Flags) -> str:
+def _idle(x: Floats, nameplates: Nameplates, ends: Ends, present: Flags) -> str:
     """Return why a share of x (W or var) means nothing: there is next to nothing to share. "" where there is."""
     rows = ends.steady & present.any(axis=1)
     if not rows.any() or not present[ends.steady].any(axis=1).all():
         return ""  # dead, or without rows: told as that
     total = np.abs(np.where(present, x, 0.0).sum(axis=1))[rows]
-    rated = np.where(present, plates.s, 0.0).sum(axis=1)[rows]
+    rated = np.where(present, nameplates.s, 0.0).sum(axis=1)[rows]
     return f"nothing shared: the total is below {NO_LOAD:.1%} of the ratings" if _mean(total / rated) < NO_LOAD else ""
 
 

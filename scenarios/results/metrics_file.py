@@ -15,7 +15,7 @@ import msgspec
 from plant.equipment import Feeder
 from scenarios.results.findings import SHARED, Findings
 from scenarios.results.steadiness import BOUNDS
-from scenarios.spec import Scenario
+from scenarios.schema import Scenario
 from wire.messages import Pacing
 
 Clock = Literal["simulated", "wall"]

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Iterator
 import msgspec
 
 from agents.agent_config import Gains, Handling
-from netem.spec.fault import Fault
-from netem.spec.node_fault import NodeFault
-from netem.spec.partition import Partition
+from netem.schema.fault import Fault
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.results.own import pages as own_pages
-from scenarios.spec.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time
+from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS

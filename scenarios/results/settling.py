@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenarios.results.history import Flags, Floats, History, Plates
+from scenarios.results.history import Flags, Floats, History, Nameplates
 from scenarios.results.metrics import MPSI, MPSI_BAND, Window, between, f_in_band, for_good
 
 SWING = 2.0
@@ -32,14 +32,14 @@ class Settling:
     """Highest minus lowest terminal voltage (pu) of an inverter at the end of the window, the largest of all."""
 
 
-def settling(history: History, plates: Plates, window: Window, f_nom: float) -> Settling:
+def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
     """Measure how one event of one case settled.
 
     Parameters
     ----------
     history : History
         The case as recorded.
-    plates : Plates
+    nameplates : Nameplates
         Nameplates in the order of its columns.
     window : Window
         The event's window, as for `scenarios.results.metrics.measure`.
@@ -48,13 +48,13 @@ def settling(history: History, plates: Plates, window: Window, f_nom: float) -> 
     """
     inside = between(history.t, window)
     end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
-    forming, f = history.present[:, plates.GFM], history.f[:, plates.GFM]
-    shared: Flags = np.less(MPSI(history, plates)[inside], MPSI_BAND)
+    forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]
+    shared: Flags = np.less(MPSI(history, nameplates)[inside], MPSI_BAND)
     return Settling(
-        t_f_s=for_good(history.t[inside], f_in_band(history, plates, f_nom)[inside], window.start),
+        t_f_s=for_good(history.t[inside], f_in_band(history, nameplates, f_nom)[inside], window.start),
         t_share_s=for_good(history.t[inside], shared, window.start),
         f_swing_Hz=_swing(np.where(forming, f, np.nan)[end]),
-        V_swing_pu=_swing(np.where(history.present, history.V / plates.V_nom, np.nan)[end]),
+        V_swing_pu=_swing(np.where(history.present, history.V / nameplates.V_nom, np.nan)[end]),
     )
 
 

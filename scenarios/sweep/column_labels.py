@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from scenarios.field_docs import field_docs
-from scenarios.spec.scenario_model import Scenario
+from scenarios.schema.scenario_model import Scenario
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 

@@ -24,7 +24,7 @@ from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import LinkRecord
@@ -32,11 +32,11 @@ from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorder
 from scenarios.results.settling import settling
-from scenarios.spec import Scenario
-from scenarios.spec.agent_schedule import inverters_of
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.configs import configs
-from scenarios.spec.scenario_changes import as_in
+from scenarios.schema import Scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.agentless import without_agent
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_changes import as_in
 from scenarios.sweep.file import Plan
 
 KEPT_PLANTS = 4
@@ -97,17 +97,17 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History 
         return SweepRow(number=number, status="broke", why=outcome.broke), None
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     history = History.of(recorded.inverters, recorded.rows)
-    plates = Plates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
+    nameplates = Nameplates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}
     windows = metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
     with np.errstate(all="ignore"):  # what is no number is told as such
         for window in windows:
-            steady, settled = (of(history, plates, window, feeder.f_nom) for of in (metrics.measure, settling))
+            steady, settled = (of(history, nameplates, window, feeder.f_nom) for of in (metrics.measure, settling))
             numbers = asdict(steady) | asdict(settled)
             reasons = numbers.pop("reasons")
             measures |= flat(window.label, numbers | {"steady": float(not reasons)})
     saved = messages_saved(recorded.quiet, windows, len(agents), scenario.time.T_c_s)
-    own = own_measures(scenario, feeder, plates, {case: history}, {case: windows}, {case: saved}).get(case, {})
+    own = own_measures(scenario, feeder, nameplates, {case: history}, {case: windows}, {case: saved}).get(case, {})
     for label, found in own.items():
         measures |= flat(label, dict(found.values))
     failed = [f"{label}: {name} {text}" for label, found in own.items() for name, text in found.reasons.items()]

@@ -18,7 +18,7 @@ import msgspec
 
 from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
 from scenarios.run import versions
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import SweepRow
 

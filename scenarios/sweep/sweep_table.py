@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from scenarios.run import versions
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of

@@ -17,7 +17,7 @@ from typing import Any, TypeVar, overload
 from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
 
-from scenarios.spec import Scenario
+from scenarios.schema import Scenario
 from scenarios.sweep.file import Run
 from scenarios.sweep.sweep_case import SweepRow, run_one
 

@@ -6,12 +6,12 @@ from msgspec.structs import replace
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import measure, windows
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_writing import to_toml
 from wire.messages import Telemetry
 
 
@@ -25,7 +25,7 @@ def blackout() -> tuple[History, Outcome]:
         rows.extend(telemetry.rows)
 
     outcome = run_inprocess(*configs(scenario, feeder, "IV"), take)
-    return History.of(Plates.of(feeder.inverters).names, rows), outcome
+    return History.of(Nameplates.of(feeder.inverters).names, rows), outcome
 
 
 def test_a_blackout_does_not_end_the_run(blackout: tuple[History, Outcome]) -> None:
@@ -59,7 +59,7 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
     history, outcome = blackout
     scenario, feeder = load_scenario("blackout")
     every = windows(as_they_came(scenario, outcome.events), scenario.time.end_s)
-    found = {window.label: measure(history, Plates.of(feeder.inverters), window, 60.0) for window in every}
+    found = {window.label: measure(history, Nameplates.of(feeder.inverters), window, 60.0) for window in every}
 
     for label in ("islanding", "return"):
         steady = found[label]

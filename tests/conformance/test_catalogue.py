@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.ports import endpoint
 from scenarios.drivers.process_driver import run_processes
-from scenarios.spec import Event, load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Event, load_scenario
+from scenarios.schema.configs import configs
 from tests.toy.runs import Rows, first_difference
 
 

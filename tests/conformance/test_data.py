@@ -9,10 +9,10 @@ from agents.agent_config import Control
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.findings import find
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
 from tests.toy.runs import FleetRun, first_difference
@@ -32,7 +32,7 @@ def history_of(path: Path, case: str) -> History:
     scenario, feeder = load_scenario(path)
     outcome = run_inprocess(*configs(scenario, feeder, case), take)
     assert not outcome.broke
-    return History.of(Plates.of(feeder.inverters).names, rows)
+    return History.of(Nameplates.of(feeder.inverters).names, rows)
 
 
 def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
     history = history_of(written(tmp_path, text), "IV")
     _, feeder = load_scenario("islanding")
     before, after = history.t < 1.0, (history.t > 3.8) & (history.t < 4.0)
-    share = history.P[after] / Plates.of(feeder.inverters).s
+    share = history.P[after] / Nameplates.of(feeder.inverters).s
 
     assert np.abs(history.f[before] - 50.0).max() < 1e-6
     assert 0.05 < np.abs(history.f - 50.0).max() < 1.0
@@ -73,8 +73,8 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
     path = written(tmp_path, text)
     scenario, feeder = load_scenario(path)
-    history, plates = history_of(path, "IV"), Plates.of(feeder.inverters)
-    found = find(scenario, feeder, plates, {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]})
+    history, nameplates = history_of(path, "IV"), Nameplates.of(feeder.inverters)
+    found = find(scenario, feeder, nameplates, {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]})
     steady = found.results["IV"]["event1"]
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 

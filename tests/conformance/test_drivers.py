@@ -14,8 +14,8 @@ from agents.agent_config import AgentConfig, Control, GraphRule
 from plant.plant_config import PlantConfig, SwitchEvent
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 from tests.toy.runs import FleetRun, Rows, first_difference
 from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import ToyPlant

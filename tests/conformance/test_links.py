@@ -12,8 +12,8 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.process_driver import run_processes
 from scenarios.results.link_records import LinkRecord
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 STORM = """
 seed = 7

@@ -39,7 +39,7 @@ class Nearest:
 @gp.metric("f_min_Hz")
 def nadir(window):
     """Lowest frequency of a grid-forming inverter (Hz)."""
-    return window.history.xs("f", axis=1, level="quantity").loc[:, window.plates.GFM].min().min()
+    return window.history.xs("f", axis=1, level="quantity").loc[:, window.nameplates.GFM].min().min()
 
 
 def jammed(found):

@@ -8,8 +8,8 @@ import pytest
 
 from agents.agent_config import AgentConfig
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 EVENT, END = 4.0, 9.0
 """When the microgrid falls into three islands, and when it is looked at (s)."""

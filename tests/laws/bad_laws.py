@@ -1,4 +1,4 @@
-"""Laws that a user may write by mistake."""
+"""Laws that a user may write by problem."""
 
 from __future__ import annotations
 

@@ -110,12 +110,12 @@ def _text(path: Path) -> str:
     (3, r"case.IV.law: must be a text in quotes or a table, got 3"),
 ])  # fmt: skip
 def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said: str) -> None:
-    """Each mistake with its key, and what would be right."""
+    """Each problem with its key, and what would be right."""
     with pytest.raises(gp.ScenarioError) as refused:
         gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
 
-    assert len(refused.value.mistakes) == 1
-    assert re.search(said, refused.value.mistakes[0]), refused.value.mistakes
+    assert len(refused.value.problems) == 1
+    assert re.search(said, refused.value.problems[0]), refused.value.problems
 
 
 def test_a_program_may_have_any_parameter() -> None:
@@ -139,13 +139,13 @@ def test_a_program_that_the_system_cannot_run_is_refused(text: str, said: str, t
         gp.load("islanding").replace({"case.IV.law": {"command": ["./law"], "folder": str(tmp_path)}})
 
 
-def test_all_mistakes_of_a_law_come_at_once() -> None:
+def test_all_problems_of_a_law_come_at_once() -> None:
     """A key of the table itself hides none of the law's parameters."""
     law = {"use": "dapi", "time_limit_s": 0, "kk": 1, "k": -1.0}
     with pytest.raises(gp.ScenarioError) as refused:
         gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
 
-    assert [line.split(": ")[-2].split()[-1] for line in refused.value.mistakes] == [
+    assert [line.split(": ")[-2].split()[-1] for line in refused.value.problems] == [
         f"case.IV.law.{key}" for key in ("time_limit_s", "kk", "k")
     ]
 

@@ -9,9 +9,9 @@ from hypothesis import settings
 
 from netem.channel import Channel, Fate
 from netem.receiver import Receiver
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.pattern import Link
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
 
 MICROGRIDS = {f"inv{i}": f"MG{(i + 2) // 3}" for i in range(1, 10)}
 """The nine inverters of the paper, three to a microgrid."""

@@ -16,10 +16,10 @@ from netem.models.loss import GilbertElliott, Markov
 from netem.models.rate import Rate
 from netem.models.slots import Slots
 from netem.receiver import Receiver
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.pattern import Link
-from netem.spec.profiles import PROFILES
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
+from netem.schema.profiles import PROFILES
 from tests.netem.links import MICROGRIDS, T_C
 
 KINDS: dict[str, dict[str, Any]] = {

@@ -16,9 +16,9 @@ from netem.models.duplicate import Duplicate
 from netem.models.flap import Flap
 from netem.models.loss import GilbertElliott, Markov
 from netem.receiver import Receiver
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.pattern import Link
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
 from tests.netem.links import MICROGRIDS, T_C
 
 LINK = Link("inv1", "inv2")

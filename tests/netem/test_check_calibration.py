@@ -13,7 +13,7 @@ from netem.check.loss_check import count_bursts
 from netem.models.chain import RESTART
 from netem.models.delay import Lognormal, Uniform
 from netem.models.loss import GilbertElliott, LossModel, Markov
-from netem.spec.pattern import Link
+from netem.schema.pattern import Link
 from tests.netem.runs import ALL, all_links, checked, family, sound, traced, warned
 
 CHAINS = {

@@ -11,16 +11,16 @@ import msgspec
 
 from netem.models.delay import AnyDelay
 from netem.models.loss import AnyLoss
-from netem.spec.fault import KINDS
-from netem.spec.netem import Netem
-from netem.spec.profiles import PROFILES
+from netem.schema.fault import KINDS
+from netem.schema.netem import Netem
+from netem.schema.profiles import PROFILES
 from tests.netem.links import MICROGRIDS
 from wire.table_reading import read_table
 
 TEXT = (Path(__file__).parents[2] / "docs" / "netem.md").read_text(encoding="utf-8")
 
 
-def test_the_example_is_a_scenario_without_a_mistake() -> None:
+def test_the_example_is_a_scenario_without_a_problem() -> None:
     """Who copies the example gets what it says."""
     (example,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)
     netem, form = read_table(Netem, tomllib.loads(example))

@@ -17,8 +17,8 @@ from netem.models.duplicate import Duplicate
 from netem.models.flap import Flap
 from netem.models.rate import Rate
 from netem.models.slots import Slots
-from netem.spec.fault import Span
-from netem.spec.pattern import Link
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
 from tests.netem.links import T_C, channel, fates, steady
 
 time = st.integers(0, 200).map(lambda k: k / 10)

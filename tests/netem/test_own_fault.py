@@ -15,13 +15,13 @@ from netem.check.verify import verify
 from netem.ledger import LinkTrace
 from netem.models.own_fault import FAULTS, LinkFault
 from netem.receiver import Receiver
-from netem.spec.change import replayed
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.pattern import Link
+from netem.schema.change import replayed
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
-from wire.plugin import Plugin, problems
+from wire.plugin import Plugin, plugin_problems
 from wire.registry import PluginError
 from wire.table_reading import read_table
 
@@ -183,7 +183,7 @@ def test_the_self_check_says_what_it_cannot_ask(folder: str) -> None:
     assert rows(both)[0]["my_faults:Jam"].realised == "not tested: my_faults:Sized on it"
 
 
-def test_every_mistake_of_an_entry_is_told_at_its_key(folder: str) -> None:
+def test_every_problem_of_an_entry_is_told_at_its_key(folder: str) -> None:
     """Parameters with their range, and names that there are not."""
     tables = {
         "link": [{"on": "* <-> *", "my_faults:Jam": {"share": 3, "folder": folder}, "my_faults:Jem": True, "jam": 1}]
@@ -193,12 +193,12 @@ def test_every_mistake_of_an_entry_is_told_at_its_key(folder: str) -> None:
     placed = msgspec.structs.replace(
         entry, own=tuple(msgspec.structs.replace(it, folder=folder) for it in reversed(entry.own))
     )
-    told = {mistake.path: mistake.text for mistake in placed.problems()}
+    told = {problem.path: problem.text for problem in placed.problems()}
 
-    assert [mistake.path for mistake in wrong] == ["link[0].jam"]
+    assert [problem.path for problem in wrong] == ["link[0].jam"]
     assert told["my_faults:Jam.share"] == "must be from 0 to 1, got 3"
     assert 'module my_faults has no "Jem"; did you mean "Jam"?' in told["my_faults:Jem"]
-    assert "judge(self, message, draws)" in problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
+    assert "judge(self, message, draws)" in plugin_problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
     assert read_table(Netem, {"link": [{"on": "* <-> *", "my_faults:Jam": 3}]})[1][0].text.startswith("must be true or")
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netem.spec.pattern import Link, links_among, objections, parse
+from netem.schema.pattern import Link, links_among, objections, parse
 from tests.netem.links import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)
@@ -81,7 +81,7 @@ def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
     ],
 )
 def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]) -> None:
-    """The mistake quotes the pattern and says what would be right."""
+    """The problem quotes the pattern and says what would be right."""
     (text,) = objections(pattern, NAMES, MICROGRIDS)
 
     assert all(word in text for word in words), text

@@ -19,9 +19,9 @@ from netem.models.loss import GilbertElliott
 from netem.models.rate import Rate
 from netem.models.slots import Slots
 from netem.receiver import Arrival, Receiver
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.partition import Partition
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.partition import Partition
 from tests.netem.links import MICROGRIDS, T_C, receiver, steady
 
 PAYLOAD = bytes(range(120))

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from netem.models.delay import Trace
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.trace_file import with_traces
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.trace_file import with_traces
 from tests.netem.links import MICROGRIDS
 
 NAMES = list(MICROGRIDS)
@@ -40,11 +40,11 @@ def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None
     ],
 )
 def test_bad_rows_of_a_trace_are_named(tmp_path: Path, rows: str | None, words: list[str]) -> None:
-    """Each mistake has its row; a whole file in milliseconds is one mistake."""
+    """Each problem has its row; a whole file in milliseconds is one problem."""
     if rows is not None:
         (tmp_path / "d.csv").write_text(rows)
     _, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
 
-    assert {mistake.path for mistake in wrong} == {"link[0].delay.file"}
+    assert {problem.path for problem in wrong} == {"link[0].delay.file"}
     assert len(wrong) == len(words)
-    assert all(word in mistake.text for word, mistake in zip(words, wrong, strict=True))
+    assert all(word in problem.text for word, problem in zip(words, wrong, strict=True))

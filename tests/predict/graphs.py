@@ -14,8 +14,8 @@ from plant.telemetry_reporter import measurement_of
 from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
-from scenarios.spec import Scenario, load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario, load_scenario
+from scenarios.schema.configs import configs
 from wire.messages import State
 
 N = tuple(f"inv{i}" for i in range(1, 10))

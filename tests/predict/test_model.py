@@ -160,6 +160,6 @@ def test_what_the_law_never_moves_is_counted() -> None:
     ],
 )
 def test_impossible_delays_and_losses_are_refused(ticks: Ticks, said: str) -> None:
-    """A mistake of an experiment is told and not computed with."""
+    """A problem of an experiment is told and not computed with."""
     with pytest.raises(ValueError, match=said):
         _ = Loop(fleet=fleet("path"), ticks=ticks).matrix

@@ -10,7 +10,7 @@ from scenarios.predict.delay_limits import delay_limit
 from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, predicted_times
 from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.predict.graphs import fleet, on_the_plant, scenario_of
 
 T_C = 0.02

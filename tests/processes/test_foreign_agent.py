@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from plant.realtime.pacer import TOLERATED
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.metrics import sharing_index
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.toy.mixed import Mixed
 
 REAL = ("-m", "scenarios.emulation.emulated_plant")

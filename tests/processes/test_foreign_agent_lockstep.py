@@ -12,8 +12,8 @@ from msgspec.structs import replace
 from agents.agent_config import Control
 from plant.plant_config import SwitchEvent
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 from tests.toy.mixed import PROGRAM, Mixed
 from tests.toy.runs import Rows, first_difference
 from tests.toy.toy_configs import toy_configs

@@ -13,16 +13,16 @@ from msgspec.structs import replace
 
 from netem.ledger import LinkTrace, Outcome
 from netem.models.delay import Normal
-from netem.spec.change import Heal, replayed
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.node_fault import NodeFault
-from netem.spec.partition import Partition
+from netem.schema.change import Heal, replayed
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.results.link_records import LinkRecord
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.processes.terminals import Desk
 from tests.toy.runs import FleetRun
 from tests.toy.town import Town
@@ -196,7 +196,7 @@ def now(desk: Desk) -> float:
 
 
 def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
-    """What people type and read: set, cut, show, status, heal, mistakes; the record, and a scenario that can be run."""
+    """What people type and read: set, cut, show, status, heal, problems; the record, and a scenario that can be run."""
     listen = desk.options[-1]
     kept = ("--out", "here", "--record", "again.toml")
     agents = [desk.open("agent", name) for name in ("inv1", "inv4")]

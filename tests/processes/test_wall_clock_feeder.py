@@ -17,7 +17,7 @@ from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
 from scenarios.live.live_options import LiveOptions, configure
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.toy.runs import FleetRun
 
 REAL = ("-m", "scenarios.emulation.emulated_plant")

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from plant.build import build_plant
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.record import QUANTITIES
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.schedules.schedule import HEAL, Action, draw
 from tests.toy.town import Town
 from wire.messages import PLANT

@@ -7,8 +7,8 @@ from random import Random
 from typing import NamedTuple
 
 from netem.models.delay import Uniform
-from netem.spec.change import Heal
-from netem.spec.fault import Fault
+from netem.schema.change import Heal
+from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 
 BEGIN = 2.0

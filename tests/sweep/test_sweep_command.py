@@ -43,13 +43,13 @@ def test_a_dry_run_tells_the_size_and_writes_nothing(sweep_file: Write, tmp_path
 
 
 def test_a_bad_file_starts_and_writes_nothing(sweep_file: Write, tmp_path: Path) -> None:
-    """Exit code 2 and every mistake; a name that is no file has a suggestion."""
+    """Exit code 2 and every problem; a name that is no file has a suggestion."""
     sweep_file('[grid]\n"gains.alpa" = [1.0]\n"time.T_c_s" = [20]\n')
 
     code, text = invoke("mine.toml")
 
     assert code == 2
-    assert text.startswith("gridpeers: 2 mistakes:\n")
+    assert text.startswith("gridpeers: 2 problems:\n")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
     assert 'no sweep "topologi"; did you mean "topology"?' in invoke("topologi")[1]
     assert "no/such.toml: there is no such file; give the path of a sweep file" in invoke("no/such.toml")[1]

@@ -1,4 +1,4 @@
-"""Sweep files: what they come to, and that every mistake in them is told at once, before anything starts."""
+"""Sweep files: what they come to, and that every problem in them is told at once, before anything starts."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.spec import ScenarioError
+from scenarios.schema import ScenarioError
 from scenarios.sweep.file import read_sweep, sweeps
 from scenarios.sweep.file.paths import PathError, put
 from tests.sweep.conftest import Write
 
 
-def mistakes_of(path: Path) -> list[str]:
-    """All mistakes of a sweep file."""
+def problems_of(path: Path) -> list[str]:
+    """All problems of a sweep file."""
     with pytest.raises(ScenarioError) as caught:
         read_sweep(path)
-    return list(caught.value.mistakes)
+    return list(caught.value.problems)
 
 
 @pytest.mark.parametrize("name", sweeps())
 def test_every_sweep_of_the_catalogue_can_be_run(name: str) -> None:
-    """What comes with gridpeers has no mistake and a title."""
+    """What comes with gridpeers has no problem and a title."""
     plan = read_sweep(name)
 
     assert plan.title
@@ -91,7 +91,7 @@ def test_seeds_follow_that_of_the_scenario(sweep_file: Write) -> None:
     """The key seeds runs every point with n seeds."""
     path = sweep_file("")
     path.write_text("seeds = 3\n" + path.read_text() + '\n"seed" = 7\n[grid]\n"gains.k_p" = [0.0005]\n')
-    mixed = mistakes_of(path)
+    mixed = problems_of(path)
     path.write_text(path.read_text().replace('"seed" = 7\n', ""))
 
     assert [run.scenario.seed for run in read_sweep(path).runs] == [1, 2, 3]
@@ -129,12 +129,12 @@ def test_the_fingerprint_is_of_what_is_run_and_not_of_how_it_is_written(sweep_fi
     assert read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0006, 0.0008]')).fingerprint != plain
 
 
-def test_all_mistakes_of_samples_are_told_at_once_with_their_values(sweep_file: Write) -> None:
+def test_all_problems_of_samples_are_told_at_once_with_their_values(sweep_file: Write) -> None:
     """An unknown key has a suggestion; a bad value, and one that is bad beside another, name key, line and sample."""
     path = sweep_file('[grid]\n"gains.alpa" = [1.0]\n"time.T_c_s" = [0.02, 20]\n"time.record_s" = [0.01, 0.008]\n')
     line = path.read_text().splitlines().index("[grid]") + 1
 
-    found = mistakes_of(path)
+    found = problems_of(path)
 
     assert len(found) == 3
     assert found[0].startswith(f'mine.toml:{line + 1}: grid.gains.alpa: unknown key; did you mean "alpha"?')
@@ -176,18 +176,18 @@ BAD: list[tuple[str, str]] = [
 
 
 @pytest.mark.parametrize(("text", "told"), BAD)
-def test_a_mistake_is_told_by_its_key(sweep_file: Write, text: str, told: str) -> None:
-    """Each mistake of a sweep file has its sentence."""
-    assert any(told in mistake for mistake in mistakes_of(sweep_file(text))), mistakes_of(sweep_file(text))
+def test_a_problem_is_told_by_its_key(sweep_file: Write, text: str, told: str) -> None:
+    """Each problem of a sweep file has its sentence."""
+    assert any(told in problem for problem in problems_of(sweep_file(text))), problems_of(sweep_file(text))
 
 
-def test_a_scenario_beside_the_sweep_is_found_and_its_mistakes_are_told(sweep_file: Write, tmp_path: Path) -> None:
-    """A relative path starts at the sweep file, and the mistakes of both files come together."""
+def test_a_scenario_beside_the_sweep_is_found_and_its_problems_are_told(sweep_file: Write, tmp_path: Path) -> None:
+    """A relative path starts at the sweep file, and the problems of both files come together."""
     (tmp_path / "base.toml").write_text("[time]\nend_s = 1.0\nT_c = 0.02\n")
-    found = mistakes_of(sweep_file('scenario = "base.toml"\nseeds = 0'))
+    found = problems_of(sweep_file('scenario = "base.toml"\nseeds = 0'))
 
-    assert any("base.toml:3: time.T_c: unknown key; write T_c_s" in mistake for mistake in found)
-    assert any("seeds: must be from 1" in mistake for mistake in found)
+    assert any("base.toml:3: time.T_c: unknown key; write T_c_s" in problem for problem in found)
+    assert any("seeds: must be from 1" in problem for problem in found)
 
 
 def test_any_key_of_a_tree_can_be_set_that_a_later_version_may_know() -> None:

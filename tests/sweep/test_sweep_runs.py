@@ -25,8 +25,8 @@ from plant.dynamics.reduction import Reduction
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
-from scenarios.spec.configs import configs
-from scenarios.spec.loading import load_scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.loading import load_scenario
 from scenarios.sweep.file import read_sweep
 from scenarios.sweep.study import Summary, study
 from scenarios.sweep.sweep_case import plant_at_start
@@ -161,7 +161,7 @@ def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_pa
 def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_path: Path) -> None:
     """A sweep's sample, written as a scenario, has the history and the indexes of its row, with unit and parameters."""
     from scenarios.run import Request, run
-    from scenarios.spec.scenario_writing import to_toml
+    from scenarios.schema.scenario_writing import to_toml
 
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0011]\n')
     summary = done(path, tmp_path / "sweep")

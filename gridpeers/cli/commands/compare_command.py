@@ -33,7 +33,7 @@ def compare(
 
     from gridpeers.studies.comparison import compare as compare_runs
     from scenarios.results.run_files import FolderError, refusal, shown
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
 
     try:
         found = compare_runs(first, second, names=_names(first, second))

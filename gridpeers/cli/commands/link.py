@@ -178,9 +178,9 @@ def _give(
     wait: float,
 ) -> None:
     """Check a link command, give it, and print the receivers' answers."""
-    from netem.spec.change import Heal
-    from netem.spec.fault import Fault
-    from netem.spec.pattern import parse
+    from netem.schema.change import Heal
+    from netem.schema.fault import Fault
+    from netem.schema.pattern import parse
     from scenarios.emulation.link_command import LinkCommand
     from scenarios.live.run_address import UsageError
     from scenarios.live.run_requests import check_link_command, command_links, links_of_run

@@ -34,7 +34,7 @@ def predict(
 
     from gridpeers.studies.prediction import predictions
     from scenarios.run import BrokenRunError
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
 
     if not feeder.inverters:
         fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)

@@ -76,7 +76,7 @@ def run(
     from datetime import datetime
 
     from gridpeers.runs.choices import Pace, check_how
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
 
     spec, feeder = load(scenario)
     spec = chosen(spec, case, seed)

@@ -39,12 +39,12 @@ def list_() -> None:
 def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help="Path of a scenario file, or a name from the catalogue.")],
 ) -> None:
-    """Check a scenario file and its feeder for mistakes.
+    """Check a scenario file and its feeder for problems.
 
-    All mistakes are told at once. A file without any is tried: whether its feeder has an operating point to start from.
+    All problems are told at once. A file without any is tried: whether its feeder has an operating point to start from.
     Notes tell what its events de-energise.
 
-    Exit code: 0 it can be run, 2 it has mistakes.
+    Exit code: 0 it can be run, 2 it has problems.
 
     Example:  gridpeers check my-islanding.toml
     """
@@ -52,7 +52,7 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from scenarios.operating_point import start_problem
-    from scenarios.spec.supply import supply_notes
+    from scenarios.schema.supply import supply_notes
 
     if problem := start_problem(spec, feeder):
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)

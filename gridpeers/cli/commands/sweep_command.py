@@ -39,7 +39,7 @@ def sweep(
 
     Example:  gridpeers sweep topology --jobs 2
     """
-    from scenarios.spec import ScenarioError
+    from scenarios.schema import ScenarioError
     from scenarios.sweep.file import read_sweep
 
     try:

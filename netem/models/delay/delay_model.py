@@ -27,7 +27,7 @@ from netem.models.chain import Chain
 from wire.plausible import Plausible, in_percent
 
 LONGEST_DELAY = 10.0
-"""Delays above this (s) are taken for milliseconds by mistake: control over such a link is not what netem is for."""
+"""Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
 
 DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
 """Delay of one message (s)."""

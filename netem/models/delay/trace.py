@@ -13,8 +13,8 @@ MOST_SHOWN = 5
 class Trace(DelayModel, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model", tag="trace"):
     """Message n has delay number (n + start) mod length of the trace.
 
-    In a scenario `file` names a CSV file with a column `delay_s`; `netem.spec.trace_file` reads it into `delays_s`, so
-    that what agents are told needs no file.
+    In a scenario `file` names a CSV file with a column `delay_s`; `netem.schema.trace_file` reads it into `delays_s`,
+    so that an agent's configuration needs no file.
     """
 
     file: str = ""

@@ -16,11 +16,11 @@ from gridpeers.measures import (
     STEADY,
     Floats,
     History,
-    Plates,
+    Nameplates,
     Settling,
     Window,
     mean_frequency,
-    plates_of,
+    nameplates_of,
     settling,
 )
 from gridpeers.theory import (
@@ -50,25 +50,25 @@ class CaseData:
     """By case."""
 
     @cached_property
-    def plates(self) -> Plates:
+    def nameplates(self) -> Nameplates:
         """Nameplates in the order of the histories' columns."""
-        return plates_of(self.scenario, self.feeder)
+        return nameplates_of(self.scenario, self.feeder)
 
-    def _plates_in(self, case: str) -> Plates:
+    def _nameplates_in(self, case: str) -> Nameplates:
         """Return the same without those that have no agent in a case, where sharing is meant."""
-        return plates_of(self.scenario, self.feeder, case)
+        return nameplates_of(self.scenario, self.feeder, case)
 
     def f(self, case: str) -> Floats:
         """Return the frequency (Hz), mean of the GFM."""
-        return mean_frequency(self.histories[case], self.plates)
+        return mean_frequency(self.histories[case], self.nameplates)
 
     def MPSI(self, case: str) -> Floats:
         """Return the mean power sharing index, (16)."""
-        return MPSI(self.histories[case], self._plates_in(case))
+        return MPSI(self.histories[case], self._nameplates_in(case))
 
     def MQSI(self, case: str) -> Floats:
         """Return the mean var sharing index, (17)."""
-        return MQSI(self.histories[case], self._plates_in(case))
+        return MQSI(self.histories[case], self._nameplates_in(case))
 
     def t(self, case: str) -> Floats:
         """Return the time of the rows (s)."""
@@ -77,7 +77,7 @@ class CaseData:
     def settling(self, case: str, start: float, end: float) -> Settling:
         """Return how a case settled from a time to another (s)."""
         return settling(
-            self.histories[case], self._plates_in(case), Window(label="", start=start, end=end), self.feeder.f_nom
+            self.histories[case], self._nameplates_in(case), Window(label="", start=start, end=end), self.feeder.f_nom
         )
 
     def mean(self, x: Floats, case: str, end: float) -> float:

@@ -88,7 +88,7 @@ def _reproduce(
             )
             write(whole, work, folder)
     except gp.ScenarioError as error:
-        set_broken(folder, "; ".join(error.mistakes))
+        set_broken(folder, "; ".join(error.problems))
         refuse(error)
     except (RuntimeError, OSError) as error:
         why = refusal(folder, error) if isinstance(error, OSError) else str(error)

@@ -18,8 +18,8 @@ from scenarios.live.show.events import line_of
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import Window, windows
 from scenarios.results.steadiness import STEADY
-from scenarios.spec import Scenario
-from scenarios.spec.netem_tables import netem_of
+from scenarios.schema import Scenario
+from scenarios.schema.netem_tables import netem_of
 from wire.messages import PlantEvent
 
 

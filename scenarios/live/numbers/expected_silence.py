@@ -6,11 +6,11 @@ import re
 from math import inf
 
 from netem.models.loss.bernoulli import Bernoulli
-from netem.spec.fault import Span
-from netem.spec.pattern import Link
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
 from plant.equipment import Feeder
-from scenarios.spec import Scenario
-from scenarios.spec.netem_tables import netem_of, setup_of
+from scenarios.schema import Scenario
+from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.messages import PLANT, PlantEvent
 
 _NOTICED = 1.0

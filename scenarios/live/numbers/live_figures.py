@@ -14,7 +14,7 @@ from scenarios.results.drawing import Drawing, Mark, drawing_of
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
 from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.spec import Scenario
+from scenarios.schema import Scenario
 from wire.messages import PlantEvent
 
 PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
@@ -41,8 +41,8 @@ def drawing_by_hand(
     """
     reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    taken, plates = taken_part(scenario, feeder, history)
-    drawing = drawing_of(compared.happened, feeder, plates, {case: taken}, came)
+    taken, nameplates = taken_part(scenario, feeder, history)
+    drawing = drawing_of(compared.happened, feeder, nameplates, {case: taken}, came)
     marks = [*drawing.events, *_by_hand(compared.departures)]
     return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
 

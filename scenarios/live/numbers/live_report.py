@@ -56,9 +56,11 @@ class LiveReport:
         """
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
-        history, plates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
+        history, nameplates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
         windows = {case: compared.opened.measured}
-        found, saved = measure_run(compared.happened, ran.feeder, plates, {case: history}, windows, {case: recorded})
+        found, saved = measure_run(
+            compared.happened, ran.feeder, nameplates, {case: history}, windows, {case: recorded}
+        )
         report = RunReport(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},

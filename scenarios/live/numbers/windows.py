@@ -8,8 +8,8 @@ from itertools import groupby
 
 from scenarios.results.metrics import Window, windows
 from scenarios.results.steadiness import STEADY
-from scenarios.spec import Scenario
-from scenarios.spec.scenario_model import Event
+from scenarios.schema import Scenario
+from scenarios.schema.scenario_model import Event
 from wire.messages import PlantEvent
 
 NEAR = 1e-9

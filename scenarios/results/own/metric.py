@@ -3,7 +3,7 @@
     @gridpeers.metric("nadir_Hz")
     def nadir(window):
         '''Lowest frequency of a grid-forming inverter (Hz).'''
-        return window.f[:, window.plates.GFM].min()
+        return window.f[:, window.nameplates.GFM].min()
 
 A metric returns a number, or several by name. A name ends in the unit, as a key does. A class with parameters
 (annotated attributes, `docs/plugins.md`) and a method `__call__(self, window)` is a metric too.

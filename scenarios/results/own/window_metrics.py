@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant.equipment import Feeder
-from scenarios.results.history import Floats, History, Plates, read_only
+from scenarios.results.history import Floats, History, Nameplates, read_only
 from scenarios.results.metrics import Steady, Window, between, measure
 from scenarios.results.own.metric import Measured, make_metrics, measured
 from scenarios.results.settling import Settling, settling
-from scenarios.spec import Scenario
-from scenarios.spec.agentless import without_agent
-from scenarios.spec.own_modules import metrics_of
+from scenarios.schema import Scenario
+from scenarios.schema.agentless import without_agent
+from scenarios.schema.own_modules import metrics_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ class WindowData:
     """Label of the event, its time and the end of its window (s)."""
     whole: History
     """All rows of the case, those before the event too."""
-    plates: Plates
+    nameplates: Nameplates
     """Nameplates, in the order of the columns: s (W), V_nom (V), m_p, m_q (pu), GFM, shares."""
     f_nom: float
     """Nominal frequency (Hz)."""
@@ -112,12 +112,12 @@ class WindowData:
     @cached_property
     def steady(self) -> Steady:
         """Measures that every run has in metrics.json, with the reason of each that is no steady value."""
-        return measure(self.whole, self.plates, self.window, self.f_nom)
+        return measure(self.whole, self.nameplates, self.window, self.f_nom)
 
     @cached_property
     def settled(self) -> Settling:
         """How frequency and sharing settled, and what still swings."""
-        return settling(self.whole, self.plates, self.window, self.f_nom)
+        return settling(self.whole, self.nameplates, self.window, self.f_nom)
 
 
 def f_error_Hz(window: WindowData) -> float:
@@ -183,7 +183,7 @@ def messages_saved(window: WindowData) -> float:
 def own_measures(
     scenario: Scenario,
     feeder: Feeder,
-    plates: Plates,
+    nameplates: Nameplates,
     histories: Mapping[str, History],
     windows: Mapping[str, Sequence[Window]],
     saved: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
@@ -194,7 +194,7 @@ def own_measures(
     ----------
     scenario, feeder : Scenario, Feeder
         What was run.
-    plates : Plates
+    nameplates : Nameplates
         Nameplates in the order of the histories' columns.
     histories, windows : Mapping
         By case: what was recorded, and where it is measured.
@@ -206,7 +206,7 @@ def own_measures(
         return {}
     found: dict[str, dict[str, Measured]] = {}
     for case, history in histories.items():
-        mine, whole = read_only(plates.without(without_agent(scenario, case))), read_only(history)
+        mine, whole = read_only(nameplates.without(without_agent(scenario, case))), read_only(history)
         with np.errstate(all="ignore"):  # what is no number is told as such
             found[case] = {
                 window.label: measured(
@@ -215,7 +215,7 @@ def own_measures(
                         case=case,
                         window=window,
                         whole=whole,
-                        plates=mine,
+                        nameplates=mine,
                         f_nom=feeder.f_nom,
                         T_c=scenario.time.T_c_s,
                         messages_saved=saved.get(case, {}).get(window.label, 0.0),

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from scenarios.results import metrics
 from scenarios.results.drawing import Drawing
-from scenarios.results.history import Floats, History, Plates
+from scenarios.results.history import Floats, History, Nameplates
 from scenarios.results.island_membership import RowMeasure, worst
 from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import (
@@ -27,22 +27,22 @@ from scenarios.results.plots.style import (
 )
 
 
-def _where_shared(index: Floats, x: Floats, history: History, plates: Plates) -> Floats:
+def _where_shared(index: Floats, x: Floats, history: History, nameplates: Nameplates) -> Floats:
     """Return an index where the total of x (W or var) is at least `NO_LOAD` of the ratings: below, it divides dust."""
-    sharing = history.present & plates.shares
+    sharing = history.present & nameplates.shares
     total = np.abs(np.where(sharing, x, 0.0).sum(axis=1))
-    rated = np.where(sharing, plates.s, 0.0).sum(axis=1)
+    rated = np.where(sharing, nameplates.s, 0.0).sum(axis=1)
     return np.where(total < metrics.NO_LOAD * rated, np.nan, index)
 
 
-def _MPSI(history: History, plates: Plates) -> Floats:
+def _MPSI(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean power sharing index of each row, (16); not a number without a load."""
-    return _where_shared(metrics.MPSI(history, plates), history.P, history, plates)
+    return _where_shared(metrics.MPSI(history, nameplates), history.P, history, nameplates)
 
 
-def _MQSI(history: History, plates: Plates) -> Floats:
+def _MQSI(history: History, nameplates: Nameplates) -> Floats:
     """Return the mean var sharing index of each row, (17); not a number without vars."""
-    return _where_shared(metrics.MQSI(history, plates), history.Q, history, plates)
+    return _where_shared(metrics.MQSI(history, nameplates), history.Q, history, nameplates)
 
 
 class PlotMeasure(NamedTuple):
@@ -116,7 +116,7 @@ def curves(axes: Axes, drawing: Drawing, measure: RowMeasure) -> list[Floats]:
     drawn = []
     for (case, history), style in zip(drawing.histories.items(), case_styles(drawing.histories).values(), strict=True):
         colour, dashes, width = style
-        drawn.append(measure(history, drawing.plates_in(case)))
+        drawn.append(measure(history, drawing.nameplates_in(case)))
         label = words(drawing, case)
         axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=label)
     time_axis(axes, drawing)

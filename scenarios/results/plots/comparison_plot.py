@@ -57,7 +57,7 @@ def _draw(axes: Axes, drawings: Mapping[str, Drawing], measure: PlotMeasure, *, 
     for (name, drawing), (colour, dashes, width) in zip(drawings.items(), _STYLES, strict=True):
         ((case, history),) = drawing.histories.items()
         measured = worst(measure.of_row, drawing.f_nom if measure.bounds is None else 0.0, drawing.island_intervals)
-        drawn.append(measured(history, drawing.plates_in(case)))
+        drawn.append(measured(history, drawing.nameplates_in(case)))
         axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=name)
         colours |= {mark: BLACK if colours[mark] else colour for mark in dict.fromkeys(drawing.events)}
     if measure.bounds is not None:

@@ -36,9 +36,11 @@ def plug_and_play(drawing: Drawing) -> Figure:
         for (top, middle, bottom), (case, history) in zip(grid.T, drawing.histories.items(), strict=True):
             alone = replace(drawing, histories={case: history})
             present = history.present
-            for i, name in enumerate(drawing.plates.names):
-                colour, dashes, width = MOVER if not present[:, i].all() else STAYERS[drawing.plates.GFM[i]]
-                top.plot(history.t, history.P[:, i] / drawing.plates.s[i], dashes, color=colour, lw=width, label=name)
+            for i, name in enumerate(drawing.nameplates.names):
+                colour, dashes, width = MOVER if not present[:, i].all() else STAYERS[drawing.nameplates.GFM[i]]
+                top.plot(
+                    history.t, history.P[:, i] / drawing.nameplates.s[i], dashes, color=colour, lw=width, label=name
+                )
             top.set_title(case_title(drawing, case), loc="left")
             curves(middle, alone, metrics.mean_frequency)
             middle.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
@@ -53,9 +55,11 @@ def plug_and_play(drawing: Drawing) -> Figure:
             grid[:, 0], ("P (pu of rating)", "f, mean of the GFM (Hz)", "mean V (pu)"), strict=True
         ):
             panel.set_ylabel(label)
-        lines = {line.get_color(): line for line in grid[0, 0].get_lines() if line.get_label() in drawing.plates.names}
+        lines = {
+            line.get_color(): line for line in grid[0, 0].get_lines() if line.get_label() in drawing.nameplates.names
+        }
         on = np.all([history.present.all(axis=0) for history in drawing.histories.values()], axis=0)
-        movers = ", ".join(name for name, stays in zip(drawing.plates.names, on.tolist(), strict=True) if not stays)
+        movers = ", ".join(name for name, stays in zip(drawing.nameplates.names, on.tolist(), strict=True) if not stays)
         kinds = {MOVER[0]: movers, STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
         shown = [(line, kinds[str(colour)]) for colour, line in lines.items()]
         handles, labels = [line for line, _ in shown], [label for _, label in shown]
@@ -71,17 +75,17 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
     size = (3.7 * columns + (2.0 if count == 1 else 0.0), 2.0 * rows + 0.6)
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    chosen = np.flatnonzero(drawing.plates.GFM == GFM)
+    chosen = np.flatnonzero(drawing.nameplates.GFM == GFM)
     widths = np.linspace(2.4, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
     for panel, (case, history) in zip(grid.flat, drawing.histories.items(), strict=False):
         for number, i in enumerate(chosen):
             colour = OTHER_STYLES[number % len(OTHER_STYLES)][0]
             panel.plot(
                 history.t,
-                history.P[:, i] / drawing.plates.s[i],
+                history.P[:, i] / drawing.nameplates.s[i],
                 color=colour,
                 linewidth=widths[number],
-                label=drawing.plates.names[i],
+                label=drawing.nameplates.names[i],
             )
         panel.set_title(case_title(drawing, case), loc="left")
         time_axis(panel, drawing)
@@ -107,8 +111,8 @@ LOST = 0.3
 def available_power(drawing: Drawing) -> Figure:
     """Draw P of the first limited inverter and the mean of the others, f, and P_set - P of the limited one, by case."""
     first = drawing.limited[0]
-    at = drawing.plates.names.index(first)
-    others = np.array([name not in drawing.limited for name in drawing.plates.names])
+    at = drawing.nameplates.names.index(first)
+    others = np.array([name not in drawing.limited for name in drawing.nameplates.names])
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 4.8), layout="constrained")
         grid = figure.subplots(2, 2, sharex=True)
@@ -116,8 +120,8 @@ def available_power(drawing: Drawing) -> Figure:
         styles = case_styles(drawing.histories)
         for case, history in drawing.histories.items():
             colour, dashes, width = styles[case]
-            share = history.P / drawing.plates.s
-            ahead = history.P_set[:, at] / drawing.plates.s[at] - share[:, at]
+            share = history.P / drawing.nameplates.s
+            ahead = history.P_set[:, at] / drawing.nameplates.s[at] - share[:, at]
             for panel, y in ((top, share[:, at]), (beside, share[:, others].mean(axis=1)), (last, ahead)):
                 panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width)
         beside.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
@@ -142,7 +146,7 @@ def available_power(drawing: Drawing) -> Figure:
 
 def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
     """Let a frequency that falls for good leave the frame instead of flattening all others."""
-    ends = {case: float(history.f[-1, drawing.plates.GFM].mean()) for case, history in drawing.histories.items()}
+    ends = {case: float(history.f[-1, drawing.nameplates.GFM].mean()) for case, history in drawing.histories.items()}
     lost = [case for case, f in ends.items() if abs(f - drawing.f_nom) > LOST]
     if lost and len(lost) < len(ends):
         low, high = axes.get_ylim()
@@ -158,13 +162,13 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
         grid = figure.subplots(2, 2, sharex=True)
         width = widths(len(drawing.islands))
         for number, (name, members) in enumerate(drawing.islands.items()):
-            history, plates = part_of(drawing.histories[case], drawing.plates, members)
+            history, nameplates = part_of(drawing.histories[case], drawing.nameplates, members)
             colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
             values = (
                 history.P.sum(axis=1) / 1e3,
                 history.Q.sum(axis=1) / 1e3,
-                metrics.mean_frequency(history, plates),
-                metrics.mean_voltage(history, plates),
+                metrics.mean_frequency(history, nameplates),
+                metrics.mean_voltage(history, nameplates),
             )
             label = drawing.island_titles.get(name, f"island of {name}")
             for panel, y in zip(grid.flat, values, strict=True):

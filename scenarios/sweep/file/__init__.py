@@ -1,4 +1,4 @@
-"""The sweep file: its types, its axes, and its reading with every mistake at once into a plan of runs."""
+"""The sweep file: its types, its axes, and its reading with every problem at once into a plan of runs."""
 
 from scenarios.sweep.file.plan import Plan, Run
 from scenarios.sweep.file.sweep_reading import read_sweep, sweeps

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeGuard
 
 import msgspec
 
-from scenarios.spec.scenario_errors import Mistakes
+from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
 from scenarios.sweep.file.paths import flatten
 from scenarios.sweep.file.sweep_model import GraphAxis
@@ -107,46 +107,46 @@ def of_graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -
     return points
 
 
-def values_of(table: Mapping[str, Any], where: str, mistakes: Mistakes) -> dict[str, list[Any]]:
-    """Values of each key of `[grid]` or `[zip]`, mistakes noted."""
+def values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict[str, list[Any]]:
+    """Values of each key of `[grid]` or `[zip]`, problems noted."""
     found = {}
     for path, value in flatten(table, _is_range):
         at = f"{where}.{path}"
         if isinstance(value, Mapping) and _is_range(value):
-            values = _spread(value, at, mistakes)
+            values = _spread(value, at, problems)
         elif isinstance(value, list):
             values = value
             if not value:
-                mistakes.add(at, "has no value; list at least one")
+                problems.add(at, "has no value; list at least one")
             elif where == "grid" and (twice := _twice(value)) is not None:
-                mistakes.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+                problems.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
         else:
-            mistakes.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
+            problems.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
             values = []
         found[path] = values
     return found
 
 
-def check_zip(values: Mapping[str, Sequence[Any]], mistakes: Mistakes) -> None:
+def check_zip(values: Mapping[str, Sequence[Any]], problems: Problems) -> None:
     """Keys that go together have equally many values."""
     counts = {path: len(items) for path, items in values.items()}
     if len(set(counts.values())) > 1 and all(counts.values()):
         listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
-        mistakes.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
+        problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
     elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
-        mistakes.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+        problems.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
 
 
-def check_graph(axis: GraphAxis, inverters: Sequence[str], mistakes: Mistakes) -> None:
+def check_graph(axis: GraphAxis, inverters: Sequence[str], problems: Problems) -> None:
     """Each number of links can join the inverters, and is no more than all pairs."""
     n = len(inverters)
     low, high = n - 1, n * (n - 1) // 2
     for i, links in enumerate(axis.links):
         if not low <= links <= high:
             why = "fewer cannot join them" if links < low else "there are no more pairs"
-            mistakes.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
+            problems.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
         elif links in axis.links[:i]:
-            mistakes.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
+            problems.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
 
 
 def _twice(items: Sequence[Any]) -> Any:
@@ -168,13 +168,13 @@ def _is_range(value: Any) -> bool:
     return isinstance(value, Mapping) and any(key in value for key in _RANGE)
 
 
-def _spread(value: Mapping[str, Any], at: str, mistakes: Mistakes) -> list[float]:
+def _spread(value: Mapping[str, Any], at: str, problems: Problems) -> list[float]:
     """Return the values of a range, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
-    spread, problems = read_table(Spread, value)
-    problems = problems or problems_of(spread)
-    for path, text in problems:
-        mistakes.add(f"{at}.{path}" if path else at, text)
-    if problems:
+    spread, wrong = read_table(Spread, value)
+    wrong = wrong or problems_of(spread)
+    for path, text in wrong:
+        problems.add(f"{at}.{path}" if path else at, text)
+    if wrong:
         return []
     low, high = spread.low, spread.high
     fractions = [i / (spread.count - 1) for i in range(spread.count)]

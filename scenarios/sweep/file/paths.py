@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from scenarios.spec.scenario_model import Scenario
+from scenarios.schema.scenario_model import Scenario
 from wire.suggestion import suggestion
 
 _STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"

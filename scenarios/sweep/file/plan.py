@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder
-from scenarios.spec import Scenario
+from scenarios.schema import Scenario
 
 SECONDS_PER_SECOND = 0.05
 """Roughly what a second of the nine-inverter feeder costs (s on one core, bench/sweep_speed.py); only for saying "2

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.spec.scenario_errors import Mistakes
+from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Axis, is_number, of_values
 from scenarios.sweep.file.paths import flatten
 from scenarios.sweep.file.sweep_model import RandomAxis
@@ -41,8 +41,8 @@ class Law:
         return float(f"{raw:.12g}")
 
 
-def laws_of(axis: RandomAxis, mistakes: Mistakes) -> dict[str, Law]:
-    """Law of each key of `[random.keys]`, mistakes noted."""
+def laws_of(axis: RandomAxis, problems: Problems) -> dict[str, Law]:
+    """Law of each key of `[random.keys]`, problems noted."""
     found = {}
     for path, value in flatten(
         axis.keys, lambda value: not any(isinstance(below, Mapping) for below in value.values())
@@ -51,29 +51,29 @@ def laws_of(axis: RandomAxis, mistakes: Mistakes) -> dict[str, Law]:
         if not isinstance(value, Mapping) or len(value) != 1 or next(iter(value)) not in LAWS:
             wrong = next((key for key in value if key not in LAWS), "") if isinstance(value, Mapping) else ""
             hint = suggestion(wrong, LAWS, "laws") if wrong else f"the laws are {', '.join(LAWS)}"
-            mistakes.add(at, f"must be one law such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}")
+            problems.add(at, f"must be one law such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}")
             continue
         ((name, of),) = value.items()
         if name == "choice":
             if not isinstance(of, list) or not of:
-                mistakes.add(at, f"choice needs a list of values, got {of!r}")
+                problems.add(at, f"choice needs a list of values, got {of!r}")
                 continue
         elif not (isinstance(of, list) and len(of) == 2 and all(map(is_number, of)) and of[0] < of[1]):
-            mistakes.add(at, f"{name} needs [low, high], two numbers in this order, got {of!r}")
+            problems.add(at, f"{name} needs [low, high], two numbers in this order, got {of!r}")
             continue
         elif name == "loguniform" and of[0] <= 0:
-            mistakes.add(at, f"loguniform needs bounds above 0, got {of!r}; or use uniform")
+            problems.add(at, f"loguniform needs bounds above 0, got {of!r}; or use uniform")
             continue
         found[path] = Law(name, of)
     return found
 
 
-def check_random(axis: RandomAxis, mistakes: Mistakes) -> None:
+def check_random(axis: RandomAxis, problems: Problems) -> None:
     """Samples and keys come together."""
-    if axis.keys and not axis.samples and not mistakes.touch("random.samples"):
-        mistakes.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
+    if axis.keys and not axis.samples and not problems.touch("random.samples"):
+        problems.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
     elif axis.samples and not axis.keys:
-        mistakes.add("random", "samples are asked for, but no key is drawn; write a table [random.keys]")
+        problems.add("random", "samples are asked for, but no key is drawn; write a table [random.keys]")
 
 
 def of_laws(axis: RandomAxis, laws: Mapping[str, Law]) -> Axis:

@@ -13,19 +13,19 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.tables import read_feeder
-from scenarios.spec import Scenario
-from scenarios.spec.loading import check_tables
-from scenarios.spec.scenario_errors import Mistakes
+from scenarios.schema import Scenario
+from scenarios.schema.loading import check_tables
+from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Setting
 from scenarios.sweep.file.paths import PathError, Tree, put, steps
 from scenarios.sweep.file.plan import Run
 
 MOST_TOLD = 20
-"""Most mistakes of samples that are told: the rest is more of the same."""
+"""Most problems of samples that are told: the rest is more of the same."""
 
 
-class _Noted(Mistakes):
-    """Mistakes of one sample, by key."""
+class _Noted(Problems):
+    """Problems of one sample, by key."""
 
     def __init__(self) -> None:
         super().__init__("")
@@ -71,14 +71,14 @@ class Samples:
                 made += [Run(i, case, scenario, setting.shown) for case in scenario.cases]
         return made
 
-    def tell(self, origin: Mapping[str, str], mistakes: Mistakes, count: int) -> None:
+    def tell(self, origin: Mapping[str, str], problems: Problems, count: int) -> None:
         """Note everything that is wrong at the key of the sweep file that it comes from.
 
         Parameters
         ----------
         origin : Mapping[str, str]
             Key of the sweep file by key of the scenario.
-        mistakes : Mistakes
+        problems : Problems
             Those of the sweep file.
         count : int
             How many samples were checked.
@@ -86,9 +86,9 @@ class Samples:
         for (path, text), where in list(self._wrong.items())[:MOST_TOLD]:
             at = _origin(path, origin)
             inside = f"{path}: " if path and not at.endswith(path) else ""
-            mistakes.add(at, inside + text + _in_samples(where, count))
+            problems.add(at, inside + text + _in_samples(where, count))
         if len(self._wrong) > MOST_TOLD:
-            mistakes.add("", f"and {len(self._wrong) - MOST_TOLD} more mistakes of this kind in other samples")
+            problems.add("", f"and {len(self._wrong) - MOST_TOLD} more problems of this kind in other samples")
 
     def _checked(self, i: int, setting: Setting, reader: Any) -> Scenario | None:
         tree, noted = copy.deepcopy(self._tree), _Noted()
@@ -127,7 +127,7 @@ def _begins(way: list[str | int], key: str) -> bool:
 
 
 def _in_samples(where: Sequence[tuple[int, Mapping[str, Any]]], count: int) -> str:
-    """Which samples a mistake is in, with the values of the first."""
+    """Which samples a problem is in, with the values of the first."""
     if len(where) == count:
         return f" (in all {count} samples)" if count > 1 else ""
     number, values = where[0]

@@ -16,8 +16,8 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.ports import endpoint
 from scenarios.results.record import Recorded, Recorder
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 FILE = Path(__file__).parent / "hashes.toml"
 """The pins."""

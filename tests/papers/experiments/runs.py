@@ -7,15 +7,15 @@ from typing import Any
 
 import msgspec
 
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History
 from scenarios.results.record import Recorder
-from scenarios.spec import Scenario, load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import Scenario, load_scenario
+from scenarios.schema.configs import configs
 from scenarios.sweep.sweep_case import plant_at_start, run_one
 
 ALL = "* <-> *"

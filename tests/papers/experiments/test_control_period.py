@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from scenarios.sweep.sweep_case import run_one
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from netem.spec.fault import Fault
+from netem.schema.fault import Fault
 from papers.singhal2022.experiments.outage_experiments import predicted
 from plant.equipment import F_NOM
 from scenarios.predict.times import predicted_times

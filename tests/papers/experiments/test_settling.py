@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics import Window
 from scenarios.results.settling import settling
 
-PLATES = Plates(
+PLATES = Nameplates(
     names=("leader", "follower"),
     GFM=np.array([True, False]),
     s=np.full(2, 1.0),

@@ -20,7 +20,7 @@ from papers.singhal2022.tables import TABLES, Cell, tables_of
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from scenarios.sweep.file.graph_axis import algebraic_connectivity
 
 ISLANDING: Part = PARTS[0]

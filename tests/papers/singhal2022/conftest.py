@@ -7,8 +7,8 @@ import pytest
 from papers.singhal2022.claims import CLAIMS
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings, SteadyValues, find
-from scenarios.results.history import History, Plates
-from scenarios.spec import load_scenario
+from scenarios.results.history import History, Nameplates
+from scenarios.schema import load_scenario
 from tests.golden.catalogue.pins import ran
 
 
@@ -16,7 +16,7 @@ from tests.golden.catalogue.pins import ran
 class Experiment:
     """Results of all cases of one scenario."""
 
-    plates: Plates
+    nameplates: Nameplates
     histories: dict[str, History]
     found: Findings
 
@@ -74,13 +74,13 @@ def wind_up() -> Experiment:
 def experiment(name: str) -> Experiment:
     """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)
-    plates = Plates.of(feeder.inverters)
+    nameplates = Nameplates.of(feeder.inverters)
     events = [(event.label, event.t_s) for event in scenario.events]
     histories = {}
     for case in scenario.cases:
         recorded, outcome = ran(name, case)
         assert not outcome.broke
         assert outcome.reproducible
-        histories[case] = History.of(plates.names, recorded.rows)
-    found = find(scenario, feeder, plates, histories, dict.fromkeys(histories, events))
-    return Experiment(plates, histories, found)
+        histories[case] = History.of(nameplates.names, recorded.rows)
+    found = find(scenario, feeder, nameplates, histories, dict.fromkeys(histories, events))
+    return Experiment(nameplates, histories, found)

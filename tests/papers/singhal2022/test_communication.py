@@ -4,8 +4,8 @@ import pytest
 
 from agents.topology import adjacency
 from scenarios.results import metrics
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 
 from .conftest import Experiment, expected
 
@@ -46,12 +46,12 @@ def test_the_gains_of_the_full_graph_share_vars_worse_over_few_links(communicati
 
 def test_an_adaptive_alpha_is_better_in_both_at_once(communication: Experiment) -> None:
     """Two seconds after islanding V_error and MQSI are below those of the re-tuned constant alpha. Section 4, (15)."""
-    plates = communication.plates
+    nameplates = communication.nameplates
     at: dict[str, list[float]] = {}
     for case in ("reduced", "adaptive"):
         history = communication.histories[case]
         rows = (history.t > 2.9) & (history.t <= 3.1)
-        at[case] = [float(of(history, plates)[rows].mean()) for of in (metrics.V_error, metrics.MQSI)]
+        at[case] = [float(of(history, nameplates)[rows].mean()) for of in (metrics.V_error, metrics.MQSI)]
 
     assert at["adaptive"][0] < at["reduced"][0]
     assert at["adaptive"][1] < at["reduced"][1]

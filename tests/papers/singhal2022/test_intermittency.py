@@ -33,7 +33,7 @@ def test_the_less_is_available_the_worse_power_is_shared(intermittency: Experime
 def test_below_200_kW_nothing_is_left_to_take_over_with(intermittency: Experiment) -> None:
     """At 175 kW all others are at their rating and the frequency falls on and on. Section 4."""
     history = intermittency.histories["175kW"]
-    f = history.f[:, intermittency.plates.GFM].mean(axis=1)
+    f = history.f[:, intermittency.nameplates.GFM].mean(axis=1)
     last = history.t > history.t[-1] - 1.0
 
     assert np.all(np.diff(f[last]) < 0.0)
@@ -42,8 +42,8 @@ def test_below_200_kW_nothing_is_left_to_take_over_with(intermittency: Experimen
 
 def test_the_set_point_of_a_saturated_inverter_goes_on_with_the_others(intermittency: Experiment) -> None:
     """P_set of GFL 2 follows the consensus while its power stays at the limit: wind-up, which is accepted. Remark 2."""
-    history, plates = intermittency.histories["200kW"], intermittency.plates
-    P_set, P = history.P_set[-1] / plates.s, history.P[-1] / plates.s
+    history, nameplates = intermittency.histories["200kW"], intermittency.nameplates
+    P_set, P = history.P_set[-1] / nameplates.s, history.P[-1] / nameplates.s
 
     assert P_set[INV2] == pytest.approx(P_set[0], abs=0.002)
     assert P_set[INV2] - P[INV2] > 0.4

@@ -109,7 +109,7 @@ def test_grid_connected_nothing_moves(islanding: Experiment) -> None:
 
 def test_the_mean_voltage_returns_to_nominal_with_secondary_control(islanding: Experiment) -> None:
     """At the end mean V is within 0.002 pu of 1 in cases II to IV, and below it in case I. Figure of mean V."""
-    mean = {case: float((h.V[-1] / islanding.plates.V_nom).mean()) for case, h in islanding.histories.items()}
+    mean = {case: float((h.V[-1] / islanding.nameplates.V_nom).mean()) for case, h in islanding.histories.items()}
 
     assert mean["I"] < 0.996
     assert [mean[case] for case in ("II", "III", "IV")] == pytest.approx([1.0] * 3, abs=0.002)
@@ -125,4 +125,4 @@ def test_the_indices_fall_to_what_is_left_and_stay_there(islanding: Experiment) 
     history = islanding.histories["IV"]
     last_second = (history.t > 3.0) & (history.t < 4.0)
 
-    assert metrics.MPSI(history, islanding.plates)[last_second].max() < 0.001
+    assert metrics.MPSI(history, islanding.nameplates)[last_second].max() < 0.001

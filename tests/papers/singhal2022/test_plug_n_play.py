@@ -32,7 +32,7 @@ def test_the_others_take_its_load_at_once(plug_n_play: Experiment) -> None:
 
 def test_it_comes_back_at_no_load_and_without_a_step(plug_n_play: Experiment) -> None:
     """Inverter 2 gives next to nothing at first; the others go to the new level only, and once they hear of it."""
-    history, s = plug_n_play.histories["IV"], plug_n_play.plates.s
+    history, s = plug_n_play.histories["IV"], plug_n_play.nameplates.s
     k = int(np.searchsorted(history.t, 3.0 - 1e-9))
     others = [i for i in range(9) if i != INV2]
     p_set = history.P_set[:, others] / s[others]
@@ -71,7 +71,7 @@ def test_mean_sharing_is_that_of_eight_while_one_is_away(plug_n_play: Experiment
     history = plug_n_play.histories["IV"]
     away = (history.t > 2.8) & (history.t <= 3.0)
 
-    assert metrics.MPSI(history, plug_n_play.plates)[away].max() < 0.001
+    assert metrics.MPSI(history, plug_n_play.nameplates)[away].max() < 0.001
 
 
 def test_every_claim_holds(plug_n_play: Experiment) -> None:

@@ -6,8 +6,8 @@ from msgspec.structs import replace
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History
-from scenarios.spec import load_scenario
-from scenarios.spec.configs import configs
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 from wire.messages import Telemetry
 
 from .conftest import Experiment, expected
@@ -17,12 +17,12 @@ INV1, INV2 = 0, 1
 
 def overshoot(history: History, experiment: Experiment) -> float:
     """How far the frequency goes above nominal after the sun is back (Hz)."""
-    return float((history.f[history.t > 5.0][:, experiment.plates.GFM] - 60.0).max())
+    return float((history.f[history.t > 5.0][:, experiment.nameplates.GFM] - 60.0).max())
 
 
 def test_without_limits_set_points_grow_as_long_as_power_is_short(wind_up: Experiment) -> None:
     """P_set of GFM 1 grows all through the clouds, beyond twice its rating, while it gives half of that. Remark 2."""
-    history, s = wind_up.histories["none"], wind_up.plates.s
+    history, s = wind_up.histories["none"], wind_up.nameplates.s
     short = (history.t > 3.0) & (history.t < 5.0)
 
     assert np.all(np.diff(history.P_set[short, INV1][::2]) > 0.0)
@@ -32,7 +32,7 @@ def test_without_limits_set_points_grow_as_long_as_power_is_short(wind_up: Exper
 
 def test_a_gfl_holds_its_rating_when_it_is_told_more(wind_up: Experiment) -> None:
     """Its agent winds up as the others do, but GFL 2 clips P_set in place, as GridLAB-D does; it gives half of it."""
-    history, s = wind_up.histories["none"], wind_up.plates.s
+    history, s = wind_up.histories["none"], wind_up.nameplates.s
     wound = (history.t > 4.0) & (history.t < 5.0)
 
     assert np.all(history.P_set[wound, INV2] == s[INV2])
@@ -57,7 +57,7 @@ def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far(wind_up: 
 
     run_inprocess(*configs(replace(scenario, plant=plant), feeder, "none"), take)
 
-    assert overshoot(History.of(wind_up.plates.names, rows), wind_up) == pytest.approx(0.384, abs=0.005)
+    assert overshoot(History.of(wind_up.nameplates.names, rows), wind_up) == pytest.approx(0.384, abs=0.005)
     assert overshoot(wind_up.histories["none"], wind_up) == pytest.approx(0.121, abs=0.005)
 
 

@@ -13,7 +13,7 @@ from agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
 from agents.topology import adjacency, in_neighbours, is_pairwise
 from tests.toy.toy_configs import agent_config
 from wire.messages import Measurement
-from wire.plugin import Plugin, plugin_of, problems
+from wire.plugin import Plugin, plugin_of, plugin_problems
 from wire.registry import PluginError
 
 MODULE = '''
@@ -56,7 +56,7 @@ def control(use: str, folder: str, **parameters: int) -> Control:
     return Control(secondary="all", graph=plugin.use, own_graph=plugin)
 
 
-def plates(n: int) -> dict[str, object]:
+def nameplates(n: int) -> dict[str, object]:
     """Nameplates of n agents, the last first: a rule gets them in order all the same."""
     return {f"inv{i}": Agent(agent_config(f"inv{i}")).nameplate for i in range(n, 0, -1)}
 
@@ -64,7 +64,7 @@ def plates(n: int) -> dict[str, object]:
 def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
     """A rule need not be symmetric, is never taken for pairwise, and `without` still takes links out."""
     star, following = control("my_graphs:star", folder), control("my_graphs:Next", folder, k=2)
-    members = plates(4)
+    members = nameplates(4)
 
     assert not is_pairwise(star)
     assert in_neighbours(star, "inv3", members) == ("inv1",)  # type: ignore[arg-type]
@@ -96,7 +96,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
     folder: str, use: str, parameters: dict[str, int], said: str
 ) -> None:
     """What was asked for, and what there is."""
-    (wrong,) = problems(GRAPHS, plugin_of({"use": use, **parameters}, folder))
+    (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use, **parameters}, folder))
     make_graph(Plugin(use="my_graphs:star", folder=folder))
 
     assert said in wrong[1]
@@ -118,7 +118,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
 def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
     """Whom it concerns, and what was returned or raised."""
     with pytest.raises(GraphError) as caught:
-        neighbours_by(rule, plates(2), "mine", strict=True)  # type: ignore[arg-type]
+        neighbours_by(rule, nameplates(2), "mine", strict=True)  # type: ignore[arg-type]
 
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -174,6 +174,6 @@ def test_two_modules_of_one_name_are_not_taken_for_each_other(folder: str, tmp_p
     other.mkdir()
     (other / "my_graphs.py").write_text("def star(members):\n    return {}\n", encoding="utf-8")
     make_graph(Plugin(use="my_graphs:star", folder=folder))
-    ((_, said),) = problems(GRAPHS, Plugin(use="my_graphs:star", folder=str(other)))
+    ((_, said),) = plugin_problems(GRAPHS, Plugin(use="my_graphs:star", folder=str(other)))
 
     assert "Python has another module my_graphs, from " in said

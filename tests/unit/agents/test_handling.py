@@ -15,7 +15,7 @@ from agents.agent_config import Control, Gains, Handling
 from agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
 from agents.island_detector import IslandDetector
 from agents.realtime.realtime_agent import RealtimeAgent
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from scenarios.sweep.sweep_case import run_one
 from tests.toy.toy_configs import agent_config
 from wire.actions import Publish

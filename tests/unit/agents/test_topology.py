@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.agent_config import Control, GraphRule
-from agents.topology import adjacency, in_neighbours, is_pairwise, laplacian, link_mistakes, natural_order
+from agents.topology import adjacency, in_neighbours, is_pairwise, laplacian, link_problems, natural_order
 
 PAPER = {
     f"inv{i}": SimpleNamespace(kind="GFM" if i in (1, 4, 7) else "GFL", microgrid=f"mg{(i + 2) // 3}")
@@ -121,10 +121,10 @@ def test_mixed_names_sort_naturally() -> None:
 
 
 def test_all_wrong_links_are_told_at_once() -> None:
-    """Unknown ends and links to oneself are mistakes that name the link and what would be right."""
+    """Unknown ends and links to oneself are problems that name the link and what would be right."""
     control = Control(secondary="all", graph="links", links=(("inv1", "inv2"), ("inv2", "inv9"), ("inv1", "inv1")))
 
-    assert link_mistakes(control, ("inv1", "inv2")) == (
+    assert link_problems(control, ("inv1", "inv2")) == (
         'links[1]: no inverter "inv9"; inverters are inv1, inv2',
         "links[2]: inv1 is linked to itself; a link joins two inverters",
     )

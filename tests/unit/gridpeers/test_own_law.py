@@ -11,7 +11,7 @@ import pytest
 
 import gridpeers as gp
 from agents.carriers.law_registry import LAWS
-from scenarios.spec.law_choice import law_of
+from scenarios.schema.law_choice import law_of
 
 MINE = '''
 from typing import Annotated
@@ -119,7 +119,7 @@ def test_a_law_under_a_name_is_written_by_its_module(monkeypatch: pytest.MonkeyP
     assert law.use == f"{__name__}:Mine"
 
 
-def test_mistakes_in_an_own_law_are_told_with_its_key(tmp_path: Path) -> None:
+def test_problems_in_an_own_law_are_told_with_its_key(tmp_path: Path) -> None:
     """A parameter out of range, an unknown one, a missing module: with the unit and what would be right."""
     (tmp_path / "mine.py").write_text(MINE)
     scenario = gp.Scenario(

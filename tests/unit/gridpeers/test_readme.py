@@ -14,7 +14,7 @@ import typer
 
 from gridpeers.cli.app import app
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.command_line import invoke
 
 README = Path(__file__).parents[3] / "README.md"

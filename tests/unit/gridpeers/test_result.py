@@ -11,7 +11,7 @@ import pytest
 import gridpeers as gp
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
-from scenarios.spec.configs import configs
+from scenarios.schema.configs import configs
 
 
 @pytest.fixture(scope="module")

@@ -24,12 +24,12 @@ TABLES = {
 }
 
 
-def test_one_slip_is_one_mistake() -> None:
+def test_one_slip_is_one_problem() -> None:
     """What is wrong with the end of the run is not told again of each link; what replace writes is told as its own."""
     case = {"IV": {"secondary": "all", "graph": "full", "link": [{"on": "* <-> *", "loss": 0.1}]}}
     with pytest.raises(gp.ScenarioError) as caught:
         gp.Scenario(time={"end_s": "7"}, case=case)
-    assert caught.value.mistakes == ('Scenario(...): time.end_s: must be a number, got "7"; write 7',)
+    assert caught.value.problems == ('Scenario(...): time.end_s: must be a number, got "7"; write 7',)
     with pytest.raises(gp.ScenarioError, match=r'^replace: gain: unknown key; did you mean "gains"'):
         gp.load("islanding").replace({"gain.k_p": 0.001})
     with pytest.raises(
@@ -47,18 +47,18 @@ def test_a_scenario_of_keyword_tables_is_the_scenario_of_the_same_file(tmp_path:
     assert gp.load(file) == built
 
 
-def test_every_mistake_of_a_change_comes_at_once_and_names_its_key() -> None:
+def test_every_problem_of_a_change_comes_at_once_and_names_its_key() -> None:
     """Paths that lead nowhere, wrong types and values out of range are told together, without a line of the file."""
     with pytest.raises(gp.ScenarioError) as caught:
         gp.load("islanding").replace({"case.VI.graph": "ring", "gains.k_p": "much", "time.T_c_s": 20, "gians": {}})
 
-    assert [line.partition(": ")[0] for line in caught.value.mistakes] == ["replace"] * 4
+    assert [line.partition(": ")[0] for line in caught.value.problems] == ["replace"] * 4
     assert all(
         key in str(caught.value) for key in ("case.VI", "gains.k_p: must be", "time.T_c_s", "gians: unknown key")
     )
 
 
-def test_a_mistake_that_a_change_makes_elsewhere_keeps_its_line() -> None:
+def test_a_problem_that_a_change_makes_elsewhere_keeps_its_line() -> None:
     """A key that was not changed is found in the file."""
     with pytest.raises(gp.ScenarioError, match=r"islanding\.toml:\d+: event\[1\]\.t_s"):
         gp.load("islanding").replace({"time.end_s": 2.0})
@@ -93,7 +93,7 @@ def test_numpy_values_and_classes_become_what_a_file_would_hold() -> None:
 
 
 def test_what_no_file_can_hold_is_refused_with_its_key() -> None:
-    """An object without a value, and a class that nobody can import, are mistakes as all others."""
+    """An object without a value, and a class that nobody can import, are problems as all others."""
 
     class Inside:
         pass

@@ -73,7 +73,7 @@ def test_a_sweep_in_python_is_that_of_the_same_file(scenario: gp.Scenario, tmp_p
     assert table["history_sha256"].tolist() == [run_one(0, run.scenario, run.case).sha256]
 
 
-def test_all_mistakes_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario) -> None:
+def test_all_problems_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario) -> None:
     """Keys, values and metrics are told with what would be right."""
     with pytest.raises(gp.ScenarioError) as caught:
         gp.sweep(scenario, {"gains.kp": [1.0], "time.T_c_s": ["x", 0.02]})

@@ -133,7 +133,7 @@ def test_the_memory_of_the_plant_is_bounded() -> None:
 
 @pytest.mark.parametrize("argument", ["", "x", "-1", "1" * 30, "٣"])
 def test_a_question_that_makes_no_sense_is_answered_and_changes_nothing(argument: str) -> None:
-    """Somebody else's mistake is theirs."""
+    """Somebody else's problem is theirs."""
     lab = running(end=None)
     lab.step(50)
     lab.take(Telemetry)

@@ -28,11 +28,11 @@ def edit(folder: Path, file: str, row: int, **cells: str) -> None:
         writer.writerows(table)
 
 
-def mistakes(folder: Path, load_set: str = "main") -> tuple[str, ...]:
+def problems(folder: Path, load_set: str = "main") -> tuple[str, ...]:
     """What reading a broken feeder tells."""
     with pytest.raises(FeederError) as caught:
         read_feeder(str(folder), load_set)
-    return caught.value.mistakes
+    return caught.value.problems
 
 
 def zone_powers(feeder: Feeder) -> dict[str, complex]:
@@ -172,35 +172,35 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
 
 
 @pytest.mark.parametrize(("file", "row", "cells", "told"), MISTAKES, ids=[f"{m[0]}-{m[3][:40]}" for m in MISTAKES])
-def test_mistake_is_told(folder: Path, file: str, row: int, cells: dict[str, str], told: str) -> None:
-    """Every kind of mistake is told once, with file, row, value and what would be right, and drags no others behind."""
+def test_problem_is_told(folder: Path, file: str, row: int, cells: dict[str, str], told: str) -> None:
+    """Every kind of problem is told once, with file, row, value and what would be right, and drags no others behind."""
     edit(folder, file, row, **cells)
 
-    found = mistakes(folder)
+    found = problems(folder)
 
     assert len(found) == 1, found
     assert found[0].startswith(f"{file} row {row}: {told}")
 
 
-def test_all_mistakes_come_at_once(folder: Path) -> None:
-    """Mistakes in several tables are raised together, in one exception whose text lists them."""
+def test_all_problems_come_at_once(folder: Path) -> None:
+    """Problems in several tables are raised together, in one exception whose text lists them."""
     edit(folder, "lines.csv", 4, length_m="-5", config="13")
     edit(folder, "loads_main.csv", 12, bus="47x", model="PQ")
     edit(folder, "inverters.csv", 2, bus="")
 
-    with pytest.raises(FeederError, match="has 5 mistakes") as caught:
+    with pytest.raises(FeederError, match="has 5 problems") as caught:
         read_feeder(str(folder))
 
-    assert len(caught.value.mistakes) == 5
-    assert all(mistake in str(caught.value) for mistake in caught.value.mistakes)
+    assert len(caught.value.problems) == 5
+    assert all(problem in str(caught.value) for problem in caught.value.problems)
 
 
 def test_missing_file_is_told_alone(folder: Path) -> None:
-    """A missing table is one mistake, not one for every reference into it."""
+    """A missing table is one problem, not one for every reference into it."""
     (folder / "buses.csv").unlink()
     (folder / "line_configs.csv").unlink()
 
-    assert [mistake.split(";")[0] for mistake in mistakes(folder)] == [
+    assert [problem.split(";")[0] for problem in problems(folder)] == [
         "buses.csv: no such file",
         "line_configs.csv: no such file",
     ]
@@ -214,45 +214,45 @@ def test_missing_column_is_told_alone(folder: Path) -> None:
     assert (
         'lines.csv: no column "length_m"; did you mean "length"? '
         "The columns are line, from_bus, to_bus, phases, config, length, origin, note"
-    ) in mistakes(folder)
+    ) in problems(folder)
 
 
 def test_misnamed_file_is_told(folder: Path) -> None:
-    """A file that is no table of a feeder is a mistake, for optional tables would else be missed silently."""
+    """A file that is no table of a feeder is a problem, for optional tables would else be missed silently."""
     (folder / "inverters.csv").rename(folder / "inverter.csv")
 
-    assert mistakes(folder) == (
+    assert problems(folder) == (
         'inverter.csv: not a table of a feeder; did you mean "inverters.csv"? The tables are buses.csv, lines.csv, '
         "line_configs.csv, switches.csv, regulators.csv, transformers.csv, capacitors.csv, inverters.csv, source.csv",
     )
 
 
 def test_surplus_cells_are_told(folder: Path) -> None:
-    """A row longer than the header, as an unquoted comma makes it, is a mistake."""
+    """A row longer than the header, as an unquoted comma makes it, is a problem."""
     with (folder / "transformers.csv").open("a") as stream:
         stream.write("XFM2,61,610,D-D,150,1.27,2.72,no load, or little\n")
 
-    assert mistakes(folder)[0].startswith("transformers.csv row 3: 1 cells more than the header has columns")
+    assert problems(folder)[0].startswith("transformers.csv row 3: 1 cells more than the header has columns")
 
 
 def test_unreadable_file_is_told(folder: Path) -> None:
-    """A file that is not UTF-8 text is a mistake of the feeder, not an exception of another kind."""
+    """A file that is not UTF-8 text is a problem of the feeder, not an exception of another kind."""
     (folder / "loads_main.csv").write_bytes(b"\xff\xfe\x00bus")
 
-    assert mistakes(folder)[0].startswith("loads_main.csv: not a CSV file in UTF-8")
+    assert problems(folder)[0].startswith("loads_main.csv: not a CSV file in UTF-8")
 
 
 def test_incomplete_matrix_is_told(folder: Path) -> None:
-    """A line configuration that lacks an element of its matrix is a mistake."""
+    """A line configuration that lacks an element of its matrix is a problem."""
     text = (folder / "line_configs.csv").read_text()
     (folder / "line_configs.csv").write_text("".join(x for x in text.splitlines(True) if not x.startswith("1,A,B")))
 
-    assert mistakes(folder)[0].endswith('config "1" lacks element A-B; give the whole upper triangle')
+    assert problems(folder)[0].endswith('config "1" lacks element A-B; give the whole upper triangle')
 
 
 def test_unknown_load_set_is_told_with_the_choice(folder: Path) -> None:
     """An unknown load set is told with those that exist."""
-    assert mistakes(folder, "man") == ('load set "man": no such set; there are event2, main',)
+    assert problems(folder, "man") == ('load set "man": no such set; there are event2, main',)
 
 
 def test_feeder_without_load_sets_is_told(folder: Path) -> None:
@@ -260,7 +260,7 @@ def test_feeder_without_load_sets_is_told(folder: Path) -> None:
     for path in folder.glob("loads_*.csv"):
         path.unlink()
 
-    assert mistakes(folder)[0].startswith("loads_main.csv: no such file; a feeder needs it, with the columns bus,")
+    assert problems(folder)[0].startswith("loads_main.csv: no such file; a feeder needs it, with the columns bus,")
 
 
 def test_unknown_feeder_is_told_with_the_choice() -> None:
@@ -291,8 +291,8 @@ def test_feeder_fed_by_inverters_only_needs_no_source(folder: Path) -> None:
         ("f_nom_Hz 50", "feeder.toml: not valid TOML"),
     ],
 )
-def test_a_manifest_with_a_mistake_is_told(folder: Path, text: str, told: str) -> None:
+def test_a_manifest_with_a_problem_is_told(folder: Path, text: str, told: str) -> None:
     """File, key, value with its unit, and what would be right."""
     (folder / "feeder.toml").write_text(text, encoding="utf-8")
 
-    assert mistakes(folder)[0].startswith(told)
+    assert problems(folder)[0].startswith(told)

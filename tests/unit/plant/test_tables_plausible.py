@@ -38,11 +38,11 @@ def drop(folder: Path, file: str, start: str) -> None:
     (folder / file).write_text("".join(kept))
 
 
-def mistakes(folder: Path) -> tuple[str, ...]:
+def problems(folder: Path) -> tuple[str, ...]:
     """What reading a broken feeder tells."""
     with pytest.raises(FeederError) as caught:
         read_feeder(str(folder))
-    return caught.value.mistakes
+    return caught.value.problems
 
 
 IMPLAUSIBLE: list[tuple[str, int, dict[str, str], str]] = [
@@ -75,7 +75,7 @@ def test_a_number_off_by_its_unit_is_refused_with_what_was_meant(
     """A number that is a thousand times too large or small is refused where it stands, not found by a solver later."""
     edit(folder, file, row, **cells)
 
-    found = [mistake for mistake in mistakes(folder) if "between buses of" not in mistake]
+    found = [problem for problem in problems(folder) if "between buses of" not in problem]
 
     assert len(found) == 1, found
     assert told in found[0]
@@ -87,7 +87,7 @@ def test_a_name_that_cannot_go_on_the_wire_is_refused_in_the_table(folder: Path,
     """An inverter's name is a part of keys, and neither the plant's nor that of the grid's island."""
     edit(folder, "inverters.csv", 3, name=name)
 
-    (found,) = mistakes(folder)
+    (found,) = problems(folder)
 
     assert found.startswith(f'inverters.csv row 3: name "{name}"'), found
 
@@ -96,7 +96,7 @@ def test_control_characters_in_a_name_are_refused(folder: Path) -> None:
     """A name is printed to terminals, so it has no escape sequences in it."""
     edit(folder, "inverters.csv", 3, microgrid="MG\x1b[31m1")
 
-    (found,) = mistakes(folder)
+    (found,) = problems(folder)
 
     assert found.startswith("inverters.csv row 3: microgrid ")
     assert "\x1b" not in found
@@ -106,7 +106,7 @@ def test_a_missing_line_is_told_with_the_buses_it_cuts_off(folder: Path) -> None
     """A feeder is one network when all its switches are closed; what hangs on nothing is named."""
     drop(folder, "lines.csv", "L67_72,")
 
-    (found,) = mistakes(folder)
+    (found,) = problems(folder)
 
     assert found.startswith("buses.csv: 23 buses are not connected with the substation at bus 150: 72 phase B, C, 73, ")
     assert "(with inv4, inv5, inv6)" in found
@@ -119,7 +119,7 @@ def test_a_line_that_lacks_a_phase_is_told(folder: Path) -> None:
     assert "L29_30,29,30,ABC,2," in lines
     (folder / "lines.csv").write_text(lines.replace("L29_30,29,30,ABC,2,", "L29_30,29,30,A,9,"))
 
-    (found,) = mistakes(folder)
+    (found,) = problems(folder)
 
     assert "2 buses are not connected with the substation at bus 150: 30 phase B, C, 250 phase B, C;" in found
 
@@ -133,10 +133,10 @@ def test_the_feeders_that_come_with_the_package_are_plausible(feeder: str) -> No
 
 
 def test_a_feeder_without_buses_is_told_once(folder: Path) -> None:
-    """An empty table of buses is one mistake, not one for every reference into it."""
+    """An empty table of buses is one problem, not one for every reference into it."""
     (folder / "buses.csv").write_text("bus,phases,V_nom_kV_LL\n")
 
-    assert mistakes(folder) == ("buses.csv: has no rows; a feeder needs at least one bus",)
+    assert problems(folder) == ("buses.csv: has no rows; a feeder needs at least one bus",)
 
 
 def test_a_column_given_twice_is_told_once(folder: Path) -> None:
@@ -144,7 +144,7 @@ def test_a_column_given_twice_is_told_once(folder: Path) -> None:
     text = (folder / "lines.csv").read_text().replace("origin,note", "length_m,note", 1)
     (folder / "lines.csv").write_text(text)
 
-    assert mistakes(folder) == ('lines.csv: column "length_m" stands there twice; keep one',)
+    assert problems(folder) == ('lines.csv: column "length_m" stands there twice; keep one',)
 
 
 def test_a_folder_in_the_place_of_a_table_is_told(folder: Path) -> None:
@@ -152,14 +152,14 @@ def test_a_folder_in_the_place_of_a_table_is_told(folder: Path) -> None:
     (folder / "capacitors.csv").unlink()
     (folder / "capacitors.csv").mkdir()
 
-    assert mistakes(folder) == ("capacitors.csv: is no file",)
+    assert problems(folder) == ("capacitors.csv: is no file",)
 
 
 def test_a_number_with_an_underscore_is_none(folder: Path) -> None:
     """1_00 is 100 in Python and a typing error in a table."""
     edit(folder, "lines.csv", 4, length_m="1_00")
 
-    assert mistakes(folder) == ('lines.csv row 4: length_m must be a number, got "1_00"',)
+    assert problems(folder) == ('lines.csv row 4: length_m must be a number, got "1_00"',)
 
 
 def test_one_inverter_on_one_bus_has_an_operating_point(folder: Path) -> None:

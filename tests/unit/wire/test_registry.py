@@ -7,7 +7,7 @@ import pytest
 
 from agents.graphs import GRAPHS, ring
 from wire import registry
-from wire.plugin import Plugin, made, problems
+from wire.plugin import Plugin, made, plugin_problems
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(e
     """One line; the page of what there is still prints."""
     from scenarios.results.reference import page
 
-    ((_, said),) = problems(GRAPHS, Plugin(use="broken"))
+    ((_, said),) = plugin_problems(GRAPHS, Plugin(use="broken"))
 
     assert said.startswith('agents.graphs:nowhere: module agents.graphs has no "nowhere"')
     assert "Cannot be used: agents.graphs:nowhere" in page("graphs")

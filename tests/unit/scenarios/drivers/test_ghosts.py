@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulated_links import links_of

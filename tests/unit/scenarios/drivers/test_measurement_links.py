@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig
 from tests.toy.toy_configs import Moves, toy_configs

@@ -14,11 +14,11 @@ from msgspec.structs import replace
 
 from agents.realtime.link_command_receiver import LinkCommandReceiver
 from agents.realtime.realtime_agent import RealtimeAgent
-from netem.spec.change import Heal, schedule_of
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.node_fault import NodeFault
-from netem.spec.pattern import Link, links_among
+from netem.schema.change import Heal, schedule_of
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.pattern import Link, links_among
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers import fault_injector
@@ -28,9 +28,9 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.emulation.link_reports import decode_statuses
 from scenarios.live.link_log import replay_of
-from scenarios.spec import load_scenario
-from scenarios.spec.netem_tables import netem_of, setup_of
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema import load_scenario
+from scenarios.schema.netem_tables import netem_of, setup_of
+from scenarios.schema.scenario_writing import to_toml
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant

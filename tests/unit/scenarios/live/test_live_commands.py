@@ -13,7 +13,7 @@ from gridpeers.cli.commands import options
 from plant.plant_config import PlantConfig
 from scenarios.live import run_address
 from scenarios.live.live_options import LiveOptions, configure
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.command_line import invoke
 
 COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "stop", "event")

@@ -9,21 +9,21 @@ from typing import Any
 import msgspec
 import pytest
 
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.node_fault import NodeFault, Skew
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault, Skew
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_report import LiveReport
 from scenarios.results.findings import find
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
-from scenarios.spec import Scenario, load_scenario
-from scenarios.spec.configs import configs
-from scenarios.spec.scenario_model import Event
+from scenarios.schema import Scenario, load_scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_model import Event
 from wire.messages import PlantEvent
 
 
@@ -242,7 +242,7 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     run_inprocess(plant, agents, recorder)
     history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
     found = find(
-        scenario, feeder, Plates.of(feeder.inverters), {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]}
+        scenario, feeder, Nameplates.of(feeder.inverters), {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]}
     )
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
@@ -326,7 +326,7 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     )
     history = History.of(switched.inverters, switched.rows)
     came = {"IV": [(event.label, event.t_s) for event in events]}
-    found = find(whole, feeder, Plates.of(feeder.inverters), {"IV": history}, came)
+    found = find(whole, feeder, Nameplates.of(feeder.inverters), {"IV": history}, came)
     ran = RunMetrics(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)

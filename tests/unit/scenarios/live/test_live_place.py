@@ -34,7 +34,7 @@ def test_a_run_name_that_zenoh_does_not_allow_is_refused(run: str) -> None:
     ],
 )
 def test_what_is_no_endpoint_is_told_with_what_would_be(text: str, said: str) -> None:
-    """The mistake, the value, and the form that is right."""
+    """The problem, the value, and the form that is right."""
     with pytest.raises(UsageError) as told:
         address_of("lab", [text])
 

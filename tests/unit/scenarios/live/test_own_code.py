@@ -8,8 +8,8 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent_config import Control, LawChoice
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live import live_processes as hand
 from scenarios.live.own_code import own_code

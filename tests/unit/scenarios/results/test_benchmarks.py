@@ -12,10 +12,10 @@ from scenarios.results.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import RunReport, plain
-from scenarios.spec import ScenarioError, load_scenario
-from scenarios.spec.loading import check_tables
-from scenarios.spec.scenario_errors import Mistakes
-from scenarios.spec.scenario_writing import to_toml
+from scenarios.schema import ScenarioError, load_scenario
+from scenarios.schema.loading import check_tables
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_writing import to_toml
 
 MODULE = """
 from scenarios.results.benchmark_registry import Benchmark
@@ -51,7 +51,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     """Its number is in the table with its source, its claim has a verdict, its summary follows."""
     spec, _ = load_scenario(scenario(tmp_path, "my_benchmark:MINE"))
     benchmark = benchmark_of(spec.paper)
-    again, _ = check_tables(tomllib.loads(to_toml(spec, {})), tmp_path / "elsewhere" / "again.toml", Mistakes("again"))
+    again, _ = check_tables(tomllib.loads(to_toml(spec, {})), tmp_path / "elsewhere" / "again.toml", Problems("again"))
     assert again.paper == {"use": "my_benchmark:MINE", "folder": str(tmp_path)}
     steady = Steady(f_error_Hz=0.0, MPSI=0.09, V_error=0.0, MQSI=0.0, t_restore_s=None, p={})
     found = Findings(results={"IV": {"event1": steady}})
@@ -79,8 +79,8 @@ def test_a_benchmark_that_is_none_is_told_before_anything_runs(tmp_path: Path, p
     with pytest.raises(ScenarioError) as error:
         load_scenario(scenario(tmp_path, paper))
 
-    assert len(error.value.mistakes) == 1
-    assert said in error.value.mistakes[0]
+    assert len(error.value.problems) == 1
+    assert said in error.value.problems[0]
 
 
 def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:

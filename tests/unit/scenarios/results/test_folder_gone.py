@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.run import BrokenRunError, Request, run
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 from tests.scenario_files import written
 
 SHORT = '[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'

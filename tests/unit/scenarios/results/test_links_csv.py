@@ -10,8 +10,8 @@ from netem.ledger import LinkCounts
 from netem.models.corrupt import Corrupt
 from netem.models.duplicate import Duplicate
 from netem.receiver import Receiver
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from scenarios.emulation.link_reports import report_data
 from scenarios.results.link_accounts import LinkAccounts
 from scenarios.results.link_records import COLUMNS, LinkRecord

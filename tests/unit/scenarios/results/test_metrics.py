@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.results import metrics
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics import Window
 
 F_NOM = 60.0
-PLATES = Plates(
+PLATES = Nameplates(
     names=("inv1", "inv2", "inv3"),
     GFM=np.array([True, False, False]),
     s=np.array([600e3, 350e3, 350e3]),
@@ -147,7 +147,7 @@ def test_restored_means_frequency_and_sharing_both_and_for_good(
 
 def test_every_GFM_must_be_restored() -> None:
     """Two GFM that are off to either side are not restored, though their mean is 60 Hz."""
-    both = Plates(
+    both = Nameplates(
         names=PLATES.names,
         GFM=np.array([True, True, False]),
         s=PLATES.s,

@@ -13,12 +13,12 @@ import pytest
 from scenarios.results.benchmark_registry import CLAIMS
 from scenarios.results.claims import Claim, judged
 from scenarios.results.findings import Findings
-from scenarios.results.history import History, Plates, read_only
+from scenarios.results.history import History, Nameplates, read_only
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own.metric import ALWAYS, METRICS, make_metrics, measured, name_of
 from scenarios.results.own.window_metrics import WindowData
 from scenarios.sweep.column_labels import unit_of
-from wire.plugin import Plugin, problems
+from wire.plugin import Plugin, plugin_problems
 from wire.registry import PluginError
 
 NAMES = ("inv1", "inv2")
@@ -32,10 +32,16 @@ def window_data() -> WindowData:
     whole = read_only(
         History(inverters=NAMES, t=t, f=f, P=5e5 * ones, Q=1e4 * ones, V=277.0 * ones, P_set=ones, V_set=ones)
     )
-    plates = Plates(names=NAMES, GFM=np.array([True, False]), s=np.array([1e6, 1e6]), V_nom=np.array([277.0, 277.0]),
-                    m_p=np.array([0.01, 0.01]), m_q=np.array([0.05, 0.05]))  # fmt: skip
+    nameplates = Nameplates(
+        names=NAMES,
+        GFM=np.array([True, False]),
+        s=np.array([1e6, 1e6]),
+        V_nom=np.array([277.0, 277.0]),
+        m_p=np.array([0.01, 0.01]),
+        m_q=np.array([0.05, 0.05]),
+    )
     event = Window(label="event1", start=1.0, end=2.0)
-    return WindowData(case="IV", window=event, whole=whole, plates=plates, f_nom=60.0, T_c=0.02)
+    return WindowData(case="IV", window=event, whole=whole, nameplates=nameplates, f_nom=60.0, T_c=0.02)
 
 
 class Unlisted(Mapping[str, float]):
@@ -59,7 +65,7 @@ def of(metric: Callable[[WindowData], Any]) -> tuple[dict[str, float | None], di
 
 def test_a_metric_gets_the_windows_rows_as_arrays_and_as_a_table() -> None:
     """Rows between the events, columns by inverter; numbers of numpy and pandas are numbers."""
-    assert of(lambda window: window.f[:, window.plates.GFM].min()) == ({"mine": 59.5}, {})
+    assert of(lambda window: window.f[:, window.nameplates.GFM].min()) == ({"mine": 59.5}, {})
     assert of(lambda window: window.history["inv1"]["f"].min()) == ({"mine": 59.5}, {})
     assert of(lambda window: len(window.t)) == ({"mine": 100.0}, {})
     assert of(lambda window: {"low": window.f.min(), "high": True}) == ({"mine.low": 58.5, "mine.high": 1.0}, {})
@@ -113,14 +119,14 @@ def test_the_metrics_that_every_run_has_are_those_of_its_file() -> None:
 
 def test_what_is_no_metric_and_no_claim_is_refused() -> None:
     """One line with what would be right; a name of ours is never taken over."""
-    (wrong,) = problems(METRICS, Plugin(use="math:pi"))
-    (other,) = problems(CLAIMS, Plugin(use="math:pi"))
+    (wrong,) = plugin_problems(METRICS, Plugin(use="math:pi"))
+    (other,) = plugin_problems(CLAIMS, Plugin(use="math:pi"))
 
     assert wrong[1] == (
         "math:pi is no metric: write a function of the window, or a class with a method __call__(self, window)"
     )
     assert "is no claim: write a function of the findings" in other[1]
-    assert "called with one argument" in problems(METRICS, Plugin(use="shutil:copyfileobj"))[0][1]
+    assert "called with one argument" in plugin_problems(METRICS, Plugin(use="shutil:copyfileobj"))[0][1]
     with pytest.raises(PluginError, match='there is a metric "MPSI" already'):
         METRICS.register("MPSI")(lambda window: 0.0)
     assert name_of(Plugin(use="mine.more:nadir_Hz")) == "nadir_Hz"

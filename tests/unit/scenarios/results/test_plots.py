@@ -10,37 +10,37 @@ from matplotlib.image import imread
 
 from plant.tables import read_feeder
 from scenarios.results.drawing import Mark
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval
 from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
 from scenarios.results.plots.inverters_plot import powers
 from scenarios.results.plots.marks import GAP, LETTER, placed
 from scenarios.results.plots.style import Format, save
-from scenarios.spec import catalogue, load_scenario
+from scenarios.schema import catalogue, load_scenario
 
 
 def drawing(*cases: str) -> Drawing:
     """Made-up curves of all nine inverters."""
-    plates = Plates.of(read_feeder("microgrid123").inverters)
+    nameplates = Nameplates.of(read_feeder("microgrid123").inverters)
     t = np.arange(0.0, 7.01, 0.05)
     level = np.where(t > 1.0, 0.87, 0.65)[:, None] * np.ones(9)
     histories = {
         case: History(
-            inverters=plates.names,
+            inverters=nameplates.names,
             t=t,
             f=np.full((t.size, 9), 60.0 - 0.01 * number),
-            P=level * plates.s * (1 + 0.01 * np.arange(9)),
-            Q=0.1 * plates.s * np.ones((t.size, 9)),
-            V=plates.V_nom * np.ones((t.size, 9)),
-            P_set=0.65 * plates.s * np.ones((t.size, 9)),
-            V_set=plates.V_nom * np.ones((t.size, 9)),
+            P=level * nameplates.s * (1 + 0.01 * np.arange(9)),
+            Q=0.1 * nameplates.s * np.ones((t.size, 9)),
+            V=nameplates.V_nom * np.ones((t.size, 9)),
+            P_set=0.65 * nameplates.s * np.ones((t.size, 9)),
+            V_set=nameplates.V_nom * np.ones((t.size, 9)),
         )
         for number, case in enumerate(cases)
     }
     return Drawing(
         histories=histories,
         titles=dict.fromkeys(cases, "made up"),
-        plates=plates,
+        nameplates=nameplates,
         events=[Mark("event1", 1.0, "13-152 opens"), Mark("event2", 4.0, "60-160 opens")],
         f_nom=60.0,
     )

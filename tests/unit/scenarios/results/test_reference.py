@@ -9,14 +9,14 @@ import pytest
 
 from agents.agent_config import Gains, Handling
 from gridpeers.cli.commands.show import Topic
-from netem.spec.fault import Fault
-from netem.spec.netem import Netem
-from netem.spec.node_fault import NodeFault
-from netem.spec.partition import Partition
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import field_docs
 from scenarios.results.reference import TOPICS, page
-from scenarios.spec.scenario_model import Case, Event, PlantTable, Processes, Scenario, Time
+from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, Scenario, Time
 from wire import keys, messages
 from wire.table_schema import fields_of
 

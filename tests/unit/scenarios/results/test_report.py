@@ -16,7 +16,7 @@ from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.report import RunReport, plain, show
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> RunReport:

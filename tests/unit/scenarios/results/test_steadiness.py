@@ -11,13 +11,13 @@ from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
 from scenarios.results.claims import judge
 from scenarios.results.findings import Findings
-from scenarios.results.history import History, Plates
+from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics import Steady, Window, measure
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.report import RunReport, plain
-from scenarios.spec import load_scenario
+from scenarios.schema import load_scenario
 
-PLATES = Plates(
+PLATES = Nameplates(
     names=("inv1", "inv2"),
     GFM=np.array([True, False]),
     s=np.array([600e3, 350e3]),

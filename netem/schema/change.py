@@ -1,0 +1,93 @@
+"""What is changed while a run goes on, and the schedule that a run with changes amounts to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from netem.fault_schedule import Schedule
+from netem.models.cut import Cut
+from netem.schema.fault import Fault, Span
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link, links_among, parse
+from wire.plugin import Plugin
+
+
+class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Faults end on some links: those that hold at `from_s`; what a scenario has for later still comes."""
+
+    on: str
+    """Which links; see `netem.schema.pattern`."""
+    from_s: float
+    """From when on (s of run time)."""
+    kinds: tuple[str, ...] = ()
+    """Kinds that end, e.g. ("cut",); empty is all."""
+
+
+Change = Fault | Heal
+"""What can be done live. A `Fault` takes precedence over what the scenario has of its kinds, until it ends."""
+
+
+def changed(schedule: Schedule, change: Change, link: Link, microgrids: Mapping[str, str]) -> Schedule:
+    """The schedule of a link after a change, the same object if the change does not concern it."""
+    if isinstance(change, Fault):
+        spans = change.spans(*link, microgrids)
+        return schedule.with_spans(spans) if spans else schedule
+    if not parse(change.on).matches(*link, microgrids):
+        return schedule
+    return schedule.healed(change.from_s, change.kinds or None)
+
+
+def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids: Mapping[str, str]) -> Schedule:
+    """Everything about one link: the scenario's entries, and what was changed since, in that order."""
+    schedule = Schedule(netem.spans(link, microgrids))
+    for change in changes:
+        schedule = changed(schedule, change, link, microgrids)
+    return schedule
+
+
+def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Netem:
+    """A scenario's entries, without a change, that do what the scenario with the changes did.
+
+    Links of one receiver that fared alike share an entry. A partition becomes a cut.
+    """
+    names = tuple(microgrids)
+    alike: dict[tuple[str, tuple[Span, ...]], list[str]] = {}
+    for link in links_among(names):
+        spans = schedule_of(link, netem, changes, microgrids).flat()
+        if spans:
+            alike.setdefault((link.dst, spans), []).append(link.src)
+    faults = []
+    for (dst, spans), sources in alike.items():
+        on = f"{sources[0]} -> {dst}" if len(sources) == 1 else f"{{{', '.join(sources)}}} -> {dst}"
+        faults += [
+            Fault(
+                on=on,
+                from_s=span.from_s,
+                to_s=None if math.isinf(span.to_s) else span.to_s,
+                **_entry(span),
+            )
+            for span in _cuts_joined(spans)
+        ]
+    islands = tuple(part for part in netem.partitions if part.by == "island")
+    return msgspec.structs.replace(netem, links=tuple(faults), partitions=islands)
+
+
+def _entry(span: Span) -> dict[str, Any]:
+    """What an entry says of one fault."""
+    if isinstance(span.model, Plugin):
+        return {"own": (span.model,)}
+    return {"cut" if span.kind == "partition" else span.kind: span.model}
+
+
+def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
+    """Cuts and partitions as one kind, so that no two entries of a link overlap."""
+    both = [span for span in spans if span.kind in ("cut", "partition")]
+    rest = [span for span in spans if span.kind not in ("cut", "partition")]
+    # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence
+    both.sort(key=lambda span: not span.model.hold)
+    joined = Schedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()
+    return [*rest, *joined]

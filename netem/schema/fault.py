@@ -1,0 +1,158 @@
+"""An entry `[[link]]`: on which links, when, and what they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+
+from netem.models.corrupt import Corrupt
+from netem.models.cut import Cut
+from netem.models.delay import AnyDelay, Constant
+from netem.models.duplicate import Duplicate
+from netem.models.flap import Flap
+from netem.models.loss import AnyLoss, Bernoulli
+from netem.models.own_fault import FAULTS
+from netem.models.rate import Rate
+from netem.models.slots import Slots
+from netem.schema.pattern import parse
+from netem.schema.profiles import PROFILES
+from wire.path_text import is_no_path
+from wire.plausible import Plausible, Unit
+from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
+from wire.suggestion import suggestion
+from wire.table_reading import shown
+from wire.table_schema import Example, OtherKeys, Problem, Shorthand, below, fields_of, problems_of
+
+LONGEST_RUN = 86_400.0
+"""A day (s): no schedule is longer."""
+
+RunTime = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
+RunTimeOrNone = Annotated[float | None, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
+
+KINDS = ("cut", "flap", "loss", "rate", "slots", "delay", "duplicate", "corrupt")
+"""What an entry may do to a link, in the order in which it is done."""
+
+
+class Span(NamedTuple):
+    """One fault on one link, for a time."""
+
+    kind: str
+    """One of `KINDS`, or "partition", which is a cut by another name; of somebody's own fault its name."""
+    from_s: float
+    """From when (s of run time), that instant included."""
+    to_s: float
+    """Until when (s), that instant not included; infinity is the whole run."""
+    model: Any
+    """The struct of `netem.models`, or the `Plugin` of somebody's own fault."""
+
+
+def _is_own(key: str) -> bool:
+    """Return whether a key names a fault of the user's own."""
+    return ":" in key or key in FAULTS.names
+
+
+def _read_own(name: str, raw: Any, found: list[Problem]) -> tuple[Plugin, ...]:
+    """Convert the value under the name of a fault of the user's own: a table of its parameters, or true."""
+    if raw is False:
+        return ()
+    table = {} if raw is True else raw
+    if not isinstance(table, Mapping):
+        text = f"must be true or a table of its parameters such as {{ p = 0.1 }}, got {shown(raw)}"
+        found.append(Problem(name, text))
+        return ()
+    wrong = [Problem(f"{name}.{key}", text) for key, value in table.items() if (text := scalar_objection(value))]
+    if not wrong and (not isinstance(table.get("folder", ""), str) or is_no_path(table.get("folder", ""))):
+        wrong = [Problem(f"{name}.folder", f"must be the path of a folder, got {shown(table['folder'])}")]
+    found += wrong
+    return () if wrong else (plugin_of({**table, "use": name}),)
+
+
+class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What some links do for a time. A message is judged by the entries that hold at the time it was sent."""
+
+    on: Annotated[str, Example('"inv4 <-> inv7"')]
+    """Which links, e.g. "inv4 <-> inv7"; see `netem.schema.pattern`."""
+    from_s: RunTime = 0.0
+    """From when (s of run time)."""
+    to_s: RunTimeOrNone = None
+    """Until when (s); without it, to the end of the run."""
+    profile: str = ""
+    """Name of a profile; keys given beside it take the place of the profile's."""
+    delay: Annotated[AnyDelay | float | None, Shorthand(Constant, "delay_s")] = None
+    """Delay; a number is a constant one (s)."""
+    loss: Annotated[AnyLoss | float | None, Shorthand(Bernoulli, "p")] = None
+    """Loss; a number is an independent probability."""
+    duplicate: Annotated[Duplicate | float | None, Shorthand(Duplicate, "p")] = None
+    """Duplicates; a number is their probability."""
+    corrupt: Annotated[Corrupt | float | None, Shorthand(Corrupt, "p")] = None
+    """Flipped bits; a number is their probability."""
+    rate: Annotated[Rate | float | None, Shorthand(Rate, "bytes_per_s")] = None
+    """Finite rate; a number is bytes per second."""
+    slots: Slots | None = None
+    """Time slots."""
+    cut: Cut | bool | None = None
+    """Whether the link is down."""
+    flap: Flap | None = None
+    """Up and down in turn."""
+    own: Annotated[tuple[Plugin, ...], OtherKeys(_is_own, _read_own)] = ()
+    """Faults of your own, each under its name: "mine:Jammer" = { share = 0.2 } (`gridpeers doc faults`)."""
+
+    @property
+    def end(self) -> float:
+        """Until when it holds (s), infinity if to the end of the run."""
+        return math.inf if self.to_s is None else self.to_s
+
+    def models(self) -> dict[str, Any]:
+        """What the entry does, by kind, shorthands and profile resolved, in the order of `KINDS`; then its own faults.
+
+        Examples
+        --------
+        >>> Fault(on="* <-> *", delay=0.1, loss=0.02).models()
+        {'loss': Bernoulli(p=0.02), 'delay': Constant(fifo=False, delay_s=0.1)}
+        """
+        profile = PROFILES.get(self.profile)
+        found: dict[str, Any] = {}
+        for kind in KINDS:
+            value = getattr(self, kind)
+            if value is None:
+                value = getattr(profile, kind, None)
+            if kind == "cut" and isinstance(value, bool):
+                value = Cut() if value else None
+            elif isinstance(value, (int, float)):
+                value = _SHORTHANDS[kind].of(float(value))
+            if value is not None:
+                found[kind] = value
+        return found | {plugin.name: plugin for plugin in self.own}
+
+    def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
+        """What the entry does to one link."""
+        if not parse(self.on).matches(src, dst, microgrids):
+            return []
+        return [Span(kind, self.from_s, self.end, model) for kind, model in self.models().items()]
+
+    def problems(self) -> list[Problem]:
+        """Return the values that cannot be meant; `on` is judged where the names are known."""
+        found = problems_of(self) + times_problems(self.from_s, self.to_s)
+        if self.profile and self.profile not in PROFILES:
+            text = f'there is no profile "{self.profile}"; {suggestion(self.profile, PROFILES, "profiles")}'
+            found.append(Problem("profile", text))
+        if not self.models() and not found:
+            text = "does nothing; give it one of profile, " + ", ".join(KINDS)
+            found.append(Problem("cut" if self.cut is False else "", text))
+        for plugin in self.own:
+            found += below(plugin.name, [Problem(*wrong) for wrong in plugin_problems(FAULTS, plugin)])
+        return found
+
+
+_SHORTHANDS = {field.name: field.mark(Shorthand) for field in fields_of(Fault)}
+"""By kind: what a number alone stands for."""
+
+
+def times_problems(from_s: float, to_s: float | None) -> list[Problem]:
+    """Return whether an entry ends before it begins."""
+    if to_s is None or to_s > from_s:
+        return []
+    return [Problem("to_s", f"{to_s:g} s is not after from_s = {from_s:g} s, so that the entry never holds")]

@@ -1,0 +1,137 @@
+"""All entries of a scenario about links and nodes, and everything that is wrong with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Annotated
+
+import msgspec
+
+from netem.schema.fault import Fault, Span
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
+from netem.schema.pattern import Link, links_among, objections
+from wire.table_schema import NO_KEY, Problem, below
+
+
+class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What the links and nodes of a run do. Every agent is told all of it, and uses what concerns the links to it."""
+
+    seed: Annotated[int, NO_KEY] = 1
+    """Seed of everything drawn at random."""
+    links: tuple[Fault, ...] = msgspec.field(default=(), name="link")
+    """Entries `[[link]]`."""
+    partitions: tuple[Partition, ...] = msgspec.field(default=(), name="partition")
+    """Entries `[[partition]]`."""
+    nodes: tuple[NodeFault, ...] = msgspec.field(default=(), name="node")
+    """Entries `[[node]]`."""
+
+    def spans(self, link: Link, microgrids: Mapping[str, str]) -> tuple[Span, ...]:
+        """What all entries do to one link.
+
+        Parameters
+        ----------
+        link : Link
+            Who sends and who receives.
+        microgrids : Mapping[str, str]
+            Microgrid of every inverter, in the order of their table.
+        """
+        found = [span for fault in self.links for span in fault.spans(*link, microgrids)]
+        return (*found, *(span for part in self.partitions for span in part.spans(*link, microgrids)))
+
+    def over(self, timeline: Sequence[tuple[float, Mapping[str, str]]]) -> Netem:
+        """The same with partitions by island resolved; see `Partition.over`."""
+        parts = tuple(part for entry in self.partitions for part in entry.over(timeline))
+        return msgspec.structs.replace(self, partitions=parts)
+
+    def problems(
+        self, names: Sequence[str] | None, microgrids: Mapping[str, str], end_s: float, noted: Collection[str] = ()
+    ) -> list[Problem]:
+        """Return everything that is wrong, each with the path of its key, e.g. `link[2].loss.p`.
+
+        Parameters
+        ----------
+        names : Sequence[str] or None
+            All inverters that are or may come, in the order of their table; None if they are not known, as the feeder
+            could not be read: then what does not depend on them is checked.
+        microgrids : Mapping[str, str]
+            The microgrid of each.
+        end_s : float
+            End of the run (s).
+        noted : Collection[str], optional
+            Paths of the problems that the reader found: values that it has replaced by defaults are not judged.
+        """
+        found: list[Problem] = []
+        for i, fault in enumerate(self.links):
+            wrong = [Problem("on", text) for text in objections(fault.on, names, microgrids)]
+            found += below(f"link[{i}]", wrong + fault.problems() + _too_late(fault.from_s, end_s))
+        for i, partition in enumerate(self.partitions):
+            wrong = partition.problems(names, microgrids)
+            found += below(f"partition[{i}]", wrong + _too_late(partition.from_s, end_s))
+        for i, node in enumerate(self.nodes):
+            found += below(f"node[{i}]", node.problems(names) + _too_late(node.from_s, end_s))
+        if noted:
+            entries = {_entry_of(path) for path in noted}
+            hidden = {*noted, *entries}  # an entry as a whole is judged only when all of its keys are right
+            return [it for it in found if it.path not in hidden and _entry_of(it.path) not in noted]
+        if names is None:
+            return found or self._contradictions_of_nodes()
+        return found or self._contradictions(names, microgrids)
+
+    def _contradictions(self, names: Sequence[str], microgrids: Mapping[str, str]) -> list[Problem]:
+        """Pairs of entries that say two things of one link at one time, each with the first such link."""
+        found: dict[tuple[str, str], Problem] = {}
+        entries = [(f"link[{i}]", entry) for i, entry in enumerate(self.links)]
+        parts = [(f"partition[{i}]", entry) for i, entry in enumerate(self.partitions)]
+        for link in links_among(names):
+            placed = [(path, span) for path, entry in entries for span in entry.spans(*link, microgrids)]
+            placed += [(path, span) for path, entry in parts for span in entry.spans(*link, microgrids)]
+            for j, (path, span) in enumerate(placed):
+                for other, before in placed[:j]:
+                    if other != path and (other, path) not in found and _contradict(before, span):
+                        found[other, path] = _contradiction(link, path, span, other, before)
+        return list(found.values()) + self._contradictions_of_nodes()
+
+    def _contradictions_of_nodes(self) -> list[Problem]:
+        found = []
+        for j, node in enumerate(self.nodes):
+            for i, before in enumerate(self.nodes[:j]):
+                if before.name == node.name and _overlap(before.from_s, before.to_s, node.from_s, node.to_s):
+                    text = f"overlaps node[{i}], also of {node.name}; write one entry, or times that do not meet"
+                    found.append(Problem(f"node[{j}]", text))
+        return found
+
+
+def _entry_of(path: str) -> str:
+    return path.partition("]")[0] + "]"
+
+
+def _too_late(from_s: float, end_s: float) -> list[Problem]:
+    if from_s < end_s:
+        return []
+    return [Problem("from_s", f"{from_s:g} s is not before the end of the run at {end_s:g} s; move it, or raise end_s")]
+
+
+def _overlap(from_s: float, to_s: float | None, other_from_s: float, other_to_s: float | None) -> bool:
+    ends = (math.inf if to_s is None else to_s, math.inf if other_to_s is None else other_to_s)
+    return from_s < ends[1] and other_from_s < ends[0]
+
+
+def _contradict(one: Span, other: Span) -> bool:
+    """Whether two faults of a link cannot both be meant: two of one kind, or a cut that keeps and one that loses."""
+    if not _overlap(one.from_s, one.to_s, other.from_s, other.to_s):
+        return False
+    if "partition" in (one.kind, other.kind):
+        return {one.kind, other.kind} <= {"cut", "partition"} and one.model.hold != other.model.hold
+    return one.kind == other.kind
+
+
+def _contradiction(link: Link, path: str, span: Span, other: str, before: Span) -> Problem:
+    start = max(span.from_s, before.from_s)
+    key = f"{path}.{span.kind}" if span.kind != "partition" else path
+    if span.kind == before.kind and span.kind != "partition":
+        text = f"{other} gives {link} a {span.kind} as well, both at {start:g} s; change on, or the times"
+    else:
+        text = f"{other} cuts {link} as well at {start:g} s, and only one of them has hold = true; give it to both"
+    return Problem(key, text)

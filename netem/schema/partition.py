@@ -1,0 +1,139 @@
+"""An entry `[[partition]]`: groups of agents that do not hear each other for a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import msgspec
+
+from netem.models.cut import Cut
+from netem.schema.fault import RunTime, RunTimeOrNone, Span, times_problems
+from wire.messages import PLANT
+from wire.suggestion import suggestion
+from wire.table_schema import Example, Problem, problems_of
+
+_REST = "the rest"
+
+
+class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Cuts, both ways, every link between two groups. Who is in no group belongs to one more group, of the rest.
+
+    The plant is cut off from nobody unless a group names it.
+    """
+
+    groups: Annotated[tuple[tuple[str, ...], ...], Example('[["inv1", "inv2"], ["MG2"]]')] = ()
+    """Groups of inverters or microgrids, e.g. [["inv1", "inv2"], ["MG2"]]."""
+    by: Literal["", "microgrid", "island", "halves"] = ""
+    """Instead of groups: each microgrid one, each electrical island one, or the first half of the inverters' table
+    and the second."""
+    alone: str = ""
+    """Instead of groups: this inverter's agent, from everybody else."""
+    from_s: RunTime = 0.0
+    """From when (s of run time)."""
+    to_s: RunTimeOrNone = None
+    """Until when (s); without it, to the end of the run."""
+    hold: bool = False
+    """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
+
+    def group(self, name: str, microgrids: Mapping[str, str]) -> str | None:
+        """In which group somebody is; None for the plant, unless a group names it.
+
+        Parameters
+        ----------
+        name : str
+            An inverter, or the plant.
+        microgrids : Mapping[str, str]
+            Microgrid of every inverter, in the order of their table.
+        """
+        microgrid = microgrids.get(name, "").lower()
+        for i, group in enumerate(self.groups):
+            if name in group or (microgrid and microgrid in (other.lower() for other in group)):
+                return str(i)
+        if name == PLANT:
+            return None
+        if self.by == "microgrid":
+            return microgrid
+        if self.by == "halves":
+            order = list(microgrids)
+            return "first" if name in order and 2 * order.index(name) < len(order) else "second"
+        if self.alone:
+            return "alone" if name == self.alone else _REST
+        return _REST
+
+    def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
+        """What the partition does to one link."""
+        one, other = self.group(src, microgrids), self.group(dst, microgrids)
+        if one is None or other is None or one == other:
+            return []
+        return [Span("partition", self.from_s, math.inf if self.to_s is None else self.to_s, Cut(hold=self.hold))]
+
+    def over(self, timeline: Sequence[tuple[float, Mapping[str, str]]]) -> tuple[Partition, ...]:
+        """By island, the partitions of listed groups that this one amounts to; any other is what it is.
+
+        Parameters
+        ----------
+        timeline : Sequence[tuple[float, Mapping[str, str]]]
+            From when on (s of run time, rising) each inverter stands in which island.
+
+        Examples
+        --------
+        >>> split = Partition(by="island", from_s=1.0)
+        >>> [(part.from_s, part.to_s, part.groups) for part in split.over([(0.0, {"inv1": "grid", "inv4": "grid"}),
+        ...                                                                 (2.0, {"inv1": "inv1", "inv4": "inv4"})])]
+        [(2.0, None, (('inv1',), ('inv4',)))]
+        """
+        if self.by != "island":
+            return (self,)
+        end = math.inf if self.to_s is None else self.to_s
+        found = []
+        for (since, island_of), (until, _) in pairwise((*timeline, (math.inf, {}))):
+            start, stop = max(since, self.from_s), min(until, end)
+            islands: dict[str, list[str]] = {}
+            for name, island in island_of.items():
+                islands.setdefault(island, []).append(name)
+            if start < stop and len(islands) > 1:
+                found.append(
+                    Partition(
+                        groups=tuple(tuple(names) for names in islands.values()),
+                        from_s=start,
+                        to_s=None if math.isinf(stop) else stop,
+                        hold=self.hold,
+                    )
+                )
+        return tuple(found)
+
+    def problems(self, names: Sequence[str] | None, microgrids: Mapping[str, str]) -> list[Problem]:
+        """Return values that cannot be meant, names that nobody has, and that the partition parts nobody.
+
+        Without names of agents any may be one.
+        """
+        found = problems_of(self) + times_problems(self.from_s, self.to_s)
+        given = [key for key in ("groups", "by", "alone") if getattr(self, key)]
+        if len(given) != 1:
+            got = f"got {' and '.join(given)}" if given else "got none"
+            found.append(Problem("", f'a partition needs one of groups, by = "microgrid" or alone = "inv1"; {got}'))
+        if names is None:
+            return found
+        known = [*names, *dict.fromkeys(microgrids.values())]
+        lower = {name.lower() for name in microgrids.values()} | {*names, PLANT}
+        if self.alone and self.alone not in names:
+            found.append(Problem("alone", f'no agent "{self.alone}"; {suggestion(self.alone, names, "agents")}'))
+        seen: dict[str, int] = {}
+        for i, group in enumerate(self.groups):
+            for name in group:
+                if name not in lower and name.lower() not in lower:
+                    text = f'nobody is called "{name}"; {suggestion(name, known, "names")}'
+                    found.append(Problem(f"groups[{i}]", text))
+                elif name in seen:
+                    text = f'"{name}" is in groups[{seen[name]}] already; nobody is on both sides'
+                    found.append(Problem(f"groups[{i}]", text))
+                seen.setdefault(name, i)
+        if not found and self.by != "island" and not self._parts(names, microgrids):
+            found.append(Problem("", "parts nobody: all agents are in one group"))
+        return found
+
+    def _parts(self, names: Sequence[str], microgrids: Mapping[str, str]) -> bool:
+        return len({self.group(name, microgrids) for name in (*names, PLANT)} - {None}) > 1

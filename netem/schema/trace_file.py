@@ -1,0 +1,88 @@
+"""Reading measured delays from CSV files: the one part of the message layer that looks at files."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import TextIO
+
+import msgspec
+
+from netem.models.delay import Trace
+from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
+from netem.schema.netem import Netem
+from wire.suggestion import suggestion
+from wire.table_schema import Problem
+
+COLUMN = "delay_s"
+"""Column that is read; others are free."""
+
+MOST_ROWS = 20
+"""So many bad rows of a file are named; the others are counted."""
+
+
+def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
+    """Delays (s) of a CSV file with a column `delay_s`, one message a row; and what is wrong with it, row by row."""
+    try:
+        if path.exists() and not path.is_file():  # a device or a pipe may never end
+            return (), [f"{path}: cannot be read: it is no file"]
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            return _rows(stream, path.name)
+    except FileNotFoundError:
+        return (), [f'there is no file "{path}"; the path is seen from the scenario']
+    except OSError as error:
+        return (), [f"{path}: cannot be read: {error.strerror}"]
+    except (UnicodeDecodeError, csv.Error) as error:
+        return (), [f"{path.name}: not a CSV file in UTF-8 ({error})"]
+    except ValueError:  # a name with a zero byte
+        return (), [f'there is no file "{path}"; the path is seen from the scenario']
+
+
+def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
+    reader = csv.reader(stream, strict=True)
+    header = [name.strip() for name in next(reader, [])]
+    if COLUMN not in header:
+        return (), [f'{file}: no column "{COLUMN}" in its first line; {suggestion(COLUMN, header, "columns")}']
+    column = header.index(COLUMN)
+    delays, wrong = [], []
+    for cells in reader:
+        if not any(cell.strip() for cell in cells):
+            continue
+        text = cells[column].strip() if column < len(cells) else ""
+        try:
+            delay_s = float(text)
+        except ValueError:
+            wrong.append(f'{file} row {reader.line_num}: {COLUMN} must be a number of seconds, got "{text}"')
+            continue
+        if text := DELAY.objection(delay_s, "s"):
+            wrong.append(f"{file} row {reader.line_num}: {text}")
+        delays.append(delay_s)
+    if wrong and len(wrong) == len(delays) and all(math.isfinite(d) and d > LONGEST_DELAY for d in delays):
+        return (), [f"{file}: all {len(delays)} delays are above {LONGEST_DELAY:g} s; are they in milliseconds?"]
+    if not delays and not wrong:
+        wrong.append(f"{file}: no row under the header; a trace needs at least one delay")
+    if len(wrong) > MOST_ROWS:
+        wrong[MOST_ROWS:] = [f"{file}: {len(wrong) - MOST_ROWS} more rows like these"]
+    return tuple(delays), wrong
+
+
+def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Problem]]:
+    """The same with the delays of every trace read, and what is wrong with the files.
+
+    Parameters
+    ----------
+    netem : Netem
+        As a scenario has it.
+    folder : Path
+        The scenario's, from which paths are seen.
+    """
+    found: list[Problem] = []
+    faults = list(netem.links)
+    for i, fault in enumerate(faults):
+        delay = fault.delay
+        if isinstance(delay, Trace) and delay.file and not delay.delays_s:
+            delays_s, wrong = read_delays(folder / delay.file)
+            found += [Problem(f"link[{i}].delay.file", text) for text in wrong]
+            faults[i] = msgspec.structs.replace(fault, delay=msgspec.structs.replace(delay, delays_s=delays_s))
+    return msgspec.structs.replace(netem, links=tuple(faults)), found

@@ -1,1 +1,0 @@
-"""What a scenario file says about links and nodes: entries, patterns, profiles, and all of their mistakes at once."""

@@ -1,0 +1,7 @@
+"""The scenario file: its types, its reading with every problem at once, and what it starts processes with."""
+
+from scenarios.schema.loading import catalogue, find_scenario, load_scenario
+from scenarios.schema.scenario_errors import ScenarioError
+from scenarios.schema.scenario_model import Case, Event, Scenario
+
+__all__ = ["Case", "Event", "Scenario", "ScenarioError", "catalogue", "find_scenario", "load_scenario"]

@@ -1,0 +1,227 @@
+"""What the keys of a scenario ask of each other and of the feeder."""
+
+from __future__ import annotations
+
+import re
+
+from plant.equipment import Feeder
+from plant.trip_settings import DEFAULTS, defaults
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_model import Scenario
+from wire.plugin import plugin_of
+from wire.suggestion import suggestion
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
+"""Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
+
+TRIPS = "protection.trips"
+
+LONGEST_CLEARING_TIME = 3600.0
+"""Longest clearing time (s)."""
+
+_RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
+"""What a run folder holds beside the folders of the cases."""
+
+
+def check_names(scenario: Scenario, problems: Problems) -> None:
+    """Note names that cannot become folders, labels that are there twice, and limits out of order."""
+    for path, name in [
+        ("name", scenario.name),
+        *((f"case.{case}", case) for case in scenario.cases),
+        *((f"event[{i}].label", event.label) for i, event in enumerate(scenario.events)),
+    ]:
+        if not problems.touch(path) and not _NAME.fullmatch(name):
+            problems.add(path, f'name "{name}" must be up to 31 letters, digits, "_", "-" or ".", as it names files')
+    labels = [event.label for event in scenario.events]
+    for i, label in enumerate(labels):
+        if label in labels[:i]:
+            problems.add(
+                f"event[{i}].label", f'there is an event "{label}" already; labels name windows of measurement'
+            )
+        elif label == "history_sha256":
+            problems.add(f"event[{i}].label", "this name is taken by a key of metrics.json; choose another")
+    if not scenario.cases and not problems.touch("case"):
+        problems.add("case", "there is no case; write at least one table [case.NAME]")
+    own = {f"case.{name}.gains": case.gains for name, case in scenario.cases.items() if case.gains != scenario.gains}
+    for path, limits in ({"gains": scenario.gains} | own).items():
+        _ordered(path, "P_set_min_pu", limits.P_set_min, "P_set_max_pu", limits.P_set_max, problems)
+        _ordered(path, "V_set_min_pu", limits.V_set_min, "V_set_max_pu", limits.V_set_max, problems)
+        if limits.V_full > 0.0:
+            _ordered(path, "alpha_min", limits.alpha_min, "alpha", limits.alpha, problems)
+    gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
+    _ordered("plant.gfm", "P_min_pu", gfm.P_min, "P_max_pu", gfm.P_max, problems)
+    _ordered("plant.gfm", "Q_min_pu", gfm.Q_min, "Q_max_pu", gfm.Q_max, problems)
+    _ordered("plant.gfm", "E_min_pu", gfm.E_min, "E_max_pu", gfm.E_max, problems)
+    _ordered("plant.gfl", "P_min_pu", gfl.P_min, "P_max_pu", gfl.P_max, problems)
+    _ordered("plant.gfm", "V_set_min_pu", gfm.V_set_min, "V_set_max_pu", gfm.V_set_max, problems)
+    _ordered("plant.gfl", "V_set_min_pu", gfl.V_set_min, "V_set_max_pu", gfl.V_set_max, problems)
+
+
+def check_start(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+    """Note a first set-point that an inverter cannot give: the start would be no equilibrium and move by itself."""
+    plant = scenario.plant
+    gfm, gfl, start = plant.gfm, plant.gfl, plant.P_set0_pu
+    limits = {
+        "GFM": [("gfm.P_max_pu", gfm.P_max), ("gfm.P_set_lim_pu", gfm.P_set_lim), ("gfm.P_min_pu", gfm.P_min)],
+        "GFL": [
+            ("gfl.P_max_pu", gfl.P_max),
+            ("gfl.S_max_pu", gfl.S_max),
+            ("gfl.i_max_pu", gfl.i_max),
+            ("gfl.P_set_lim_pu", gfl.P_set_lim),
+            ("gfl.P_min_pu", gfl.P_min),
+        ],
+    }
+    if problems.touch("plant.P_set0_pu", "plant.gfm", "plant.gfl"):
+        return
+    for kind, keys in limits.items():
+        units = [row for row in feeder.inverters if row.kind == kind]
+        for key, limit in keys:
+            below = key.endswith("P_min_pu")
+            if not units or problems.touch(f"plant.{key}") or (start >= limit if below else start <= limit):
+                continue
+            kW = ", ".join(
+                f"{row.name} {start * row.P_rated / 1e3:g} of {limit * row.P_rated / 1e3:g}" for row in units
+            )
+            problems.add(
+                "plant.P_set0_pu",
+                f"{start:g} pu is {'below' if below else 'above'} plant.{key} = {limit:g} pu, so the start is no "
+                f"equilibrium ({kW} kW); {'raise' if below else 'lower'} P_set0_pu, or change {key}",
+            )
+            break
+    for table, (low, high) in (
+        ("gfm", (gfm.V_set_min, gfm.V_set_max)),
+        ("gfl", (gfl.V_set_min, gfl.V_set_max)),
+    ):
+        V = plant.V_set0_pu
+        if problems.touch("plant.V_set0_pu") or low <= V <= high:
+            continue
+        problems.add(
+            "plant.V_set0_pu",
+            f"{V:g} pu is beyond plant.{table}.V_set_min_pu = {low:g} to V_set_max_pu = "
+            f"{high:g}, which limit every later set-point; choose it within, or change them",
+        )
+
+
+def check_cases(scenario: Scenario, inverters: tuple[str, ...], problems: Problems) -> None:
+    """Note listed links that do not join two known inverters, and links listed for another graph than "links"."""
+    for name, case in scenario.cases.items():
+        if name in _RUN_FOLDER:
+            problems.add(f"case.{name}", f"a case's folder stands beside {', '.join(_RUN_FOLDER)}; name it otherwise")
+        if inverters:
+            _check_links(f"case.{name}.without", case.without, inverters, problems)
+        path = f"case.{name}.links"
+        if problems.touch(path, f"case.{name}.graph"):
+            continue
+        graph = plugin_of(case.graph).use
+        if graph == "links" and not case.links:
+            problems.add(f"case.{name}.graph", 'graph "links" needs the key links, e.g. links = [["inv1", "inv4"]]')
+        if graph != "links" and case.links:
+            problems.add(path, f'links are listed, but the graph is "{graph}"; write graph = "links"')
+        if inverters:
+            _check_links(path, case.links, inverters, problems)
+
+
+def check_events(scenario: Scenario, problems: Problems) -> None:
+    """Note events that do nothing, and cases that name an event that there is not."""
+    for i, event in enumerate(scenario.events):
+        keys = ("open", "close", "leave", "join", "P_max_kW")
+        if not any(getattr(event, key) for key in keys) and not problems.touch(*(f"event[{i}].{key}" for key in keys)):
+            problems.add(
+                f"event[{i}]",
+                f'event "{event.label}" does nothing; give it {", ".join(keys)}, e.g. open = ["13-152"]',
+            )
+        if event.synchronised and not event.close and not problems.touch(f"event[{i}].close"):
+            problems.add(
+                f"event[{i}].synchronised",
+                f'event "{event.label}" closes no switch that could wait for synchronism; give it close',
+            )
+    labels = [event.label for event in scenario.events]
+    for name, case in scenario.cases.items():
+        for label in case.P_max_kW:
+            if label not in labels:
+                problems.add(f"case.{name}.P_max_kW", f'no event "{label}"; {suggestion(label, labels, "events")}')
+
+
+def check_switches(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+    """Note switches that there are not, and those that are in the position already into which an event brings them."""
+    position = {switch.name: switch.closed for switch in feeder.switches}
+    canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
+    buses = {bus.name for bus in feeder.buses}
+    for i, event in enumerate(scenario.events):
+        named: set[str] = set()
+        for action, closed, names in (("open", False, event.open), ("close", True, event.close)):
+            for name in names:
+                path = f"event[{i}].{action}"
+                if name not in canonical:
+                    problems.add(path, _unknown_switch(name, [s.alias or s.name for s in feeder.switches], buses))
+                    continue
+                switch = canonical[name]
+                if switch in named:
+                    problems.add(path, f'switch "{name}" is named twice in event "{event.label}"; name it once')
+                elif position[switch] == closed:
+                    problems.add(
+                        path,
+                        f'switch "{name}" is {"closed" if closed else "open"} already at {event.t_s:g} s; '
+                        f"leave it out, or {'open' if closed else 'close'} it before",
+                    )
+                named.add(switch)
+                position[switch] = closed
+
+
+def check_protection(scenario: Scenario, f_nom: float, problems: Problems) -> None:
+    """Note settings of unknown functions, on the wrong side of nominal, and second stages within their first."""
+    given = scenario.protection.trips
+    if problems.touch("protection", TRIPS):
+        return
+    names = DEFAULTS["III"]
+    for name, (threshold, time) in given.items():
+        if name not in names:
+            problems.add(TRIPS, f'no trip function "{name}"; {suggestion(name, names, "functions")}')
+            continue
+        nominal, unit = (f_nom, "Hz") if name[1] == "F" else (1.0, "pu")
+        low, high = (nominal, 2.0 * nominal) if name[0] == "O" else (0.0, nominal)
+        if not low < threshold < high:
+            problems.add(TRIPS, f"{name} must be between {low:g} and {high:g} {unit}, got {threshold:g} {unit}")
+        if not 0.0 < time <= LONGEST_CLEARING_TIME:
+            problems.add(
+                TRIPS,
+                f"{name}: the clearing time must be above 0 and at most {LONGEST_CLEARING_TIME:g} s, got {time:g} s",
+            )
+    if problems.touch(TRIPS) or scenario.protection.category == "off":
+        return
+    in_force = defaults(scenario.protection.category, f_nom) | given
+    for kind in ("OV", "UV", "OF", "UF"):
+        (first, _), (second, _) = in_force[f"{kind}1"], in_force[f"{kind}2"]
+        if second < first if kind[0] == "O" else second > first:
+            unit = "Hz" if kind[1] == "F" else "pu"
+            problems.add(
+                TRIPS,
+                f"{kind}2 = {second:g} {unit} must be farther from nominal than {kind}1 = {first:g} {unit}; "
+                f"set both, or leave {kind}2 as it is",
+            )
+
+
+def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, problems: Problems) -> None:
+    if not problems.touch(f"{path}.{low_key}", f"{path}.{high_key}") and low >= high:
+        problems.add(f"{path}.{low_key}", f"{low:g} must be below {high_key} = {high:g}; swap them or set both")
+
+
+def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple[str, ...], problems: Problems) -> None:
+    seen: set[frozenset[str]] = set()
+    for i, pair in enumerate(links):
+        for name in pair:
+            if name not in inverters:
+                problems.add(f"{path}[{i}]", f'no inverter "{name}"; {suggestion(name, inverters, "inverters")}')
+        if pair[0] == pair[1]:
+            problems.add(f"{path}[{i}]", f'a link joins two inverters, got "{pair[0]}" twice')
+        elif frozenset(pair) in seen:
+            problems.add(f"{path}[{i}]", f"{pair[0]} - {pair[1]} is listed already; links have no direction")
+        seen.add(frozenset(pair))
+
+
+def _unknown_switch(name: str, known: list[str], buses: set[str]) -> str:
+    """Return a sentence on a switch that does not exist, or whose bus does not."""
+    ends = name.split("-")
+    strange = [end for end in ends if end[:1].isdigit() and end not in buses]
+    why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
+    return f'no switch "{name}"{why}; {suggestion(name, known, "switches")}'

@@ -1,0 +1,215 @@
+"""From a name or a path to a scenario that can be run, or to all that is wrong with it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from plant.equipment import F_NOM, Feeder
+from plant.tables import FeederError, feeders, is_folder, read_feeder
+from scenarios.catalogue_files import CATALOGUE, names_in
+from scenarios.schema.agent_schedule import check_moves, inverters_of
+from scenarios.schema.agentless import check_agentless
+from scenarios.schema.checks import (
+    check_cases,
+    check_events,
+    check_names,
+    check_protection,
+    check_start,
+    check_switches,
+)
+from scenarios.schema.file_lookup import find_file
+from scenarios.schema.graph import check_graphs, with_graph_folders
+from scenarios.schema.law_choice import check_laws, with_law_folders
+from scenarios.schema.netem_tables import check_netem, with_delays
+from scenarios.schema.own_modules import check_benchmark, check_own, with_benchmark_folder, with_own_folders
+from scenarios.schema.power_limits import check_limits
+from scenarios.schema.scenario_changes import as_in, check_changes
+from scenarios.schema.scenario_errors import Problems, ScenarioError
+from scenarios.schema.scenario_model import AS_RUN, Scenario
+from scenarios.schema.supply import check_supply
+from scenarios.schema.time_checks import check_step, check_times
+
+ReadFeeder = Callable[[str, str], Feeder]
+"""Reads a feeder, given its name or path and its load set."""
+
+
+def catalogue() -> tuple[str, ...]:
+    """Names of the scenarios that come with gridpeers."""
+    return names_in(CATALOGUE)
+
+
+def find_scenario(name: str) -> Path:
+    """Path of a scenario named as in the catalogue or given as a path.
+
+    Raises
+    ------
+    ScenarioError
+        If there is neither.
+    """
+    return find_file(name, CATALOGUE, "scenario")
+
+
+def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
+    """Read and check a scenario and its feeder before anything is started.
+
+    Parameters
+    ----------
+    name : str or Path
+        A scenario of the catalogue, or the path of a file.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem of the file and of its feeder.
+
+    Examples
+    --------
+    >>> scenario, feeder = load_scenario("islanding")
+    >>> list(scenario.cases), len(feeder.inverters)
+    (['I', 'II', 'III', 'IV'], 9)
+    """
+    path = find_scenario(str(name))
+    text, data = read_toml(path)
+    problems = Problems(path.name, text)
+    scenario, feeder = check_tables(data, path, problems)
+    problems.raise_if_any()
+    assert feeder is not None
+    return scenario, feeder
+
+
+def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text and tables of a file.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read or is no TOML.
+    """
+    text = _text_of(path)
+    try:
+        return text, tomllib.loads(text)
+    except ValueError as error:  # no TOML, or a whole number of more digits than Python reads
+        raise ScenarioError([_malformed(path.name, text, str(error))]) from None
+    except RecursionError:
+        raise ScenarioError([f"{path.name}: brackets or names are nested too deeply to be read"]) from None
+
+
+def read_tables(data: Mapping[str, Any], problems: Problems) -> Scenario:
+    """Return the scenario of parsed TOML; it is of use only while no problem is noted."""
+    return problems.read(Scenario, {key: value for key, value in data.items() if key != AS_RUN})
+
+
+def check_tables(
+    data: Mapping[str, Any], path: Path, problems: Problems, read_feeder: ReadFeeder = read_feeder
+) -> tuple[Scenario, Feeder | None]:
+    """Read the tables of a scenario and note every problem in them.
+
+    Parameters
+    ----------
+    data : Mapping[str, Any]
+        Parsed TOML.
+    path : Path
+        Its file: a relative path of a feeder starts there, and a scenario without a name has its name.
+    problems : Problems
+        Takes the problems; the scenario is of use only when it stays empty.
+    read_feeder : Callable[[str, str], Feeder], optional
+        Reads a feeder by name or path and load set; who checks many scenarios keeps what was read.
+    """
+    scenario = read_tables(data, problems)
+    if not scenario.name:
+        scenario = msgspec.structs.replace(scenario, name=path.stem)
+    check_times(scenario, problems)
+    check_step(scenario, problems)
+    check_names(scenario, problems)
+    scenario = with_benchmark_folder(scenario, path.parent)
+    check_benchmark(scenario, problems)
+    scenario = with_graph_folders(with_law_folders(scenario, path.parent), path.parent)
+    scenario = with_own_folders(scenario, path.parent)
+    check_own(scenario, problems)
+    check_laws(scenario, problems)
+    scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, problems)
+    feeder = _feeder_of(scenario, problems, read_feeder)
+    check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
+    check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), problems)
+    check_graphs(scenario, feeder, problems)
+    check_events(scenario, problems)
+    check_netem(scenario, feeder, problems)
+    if feeder:
+        check_changes(scenario, feeder, problems)
+        check_agentless(scenario, feeder, problems)
+        check_switches(scenario, feeder, problems)
+        check_moves(scenario, feeder, problems)
+        check_limits(scenario, feeder, problems)
+        check_start(scenario, feeder, problems)
+        check_supply(scenario, feeder, problems)
+    return scenario, feeder
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ScenarioError([f"{path.name}: byte {error.start} is not UTF-8; save the file as UTF-8 text"]) from None
+    except OSError as error:
+        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
+
+
+def _malformed(file: str, text: str, reason: str) -> str:
+    """Problem of a text that is no TOML, with its line, which `tomllib` tells in a parenthesis."""
+    if reason.startswith("Exceeds the limit"):
+        return f"{file}: not valid TOML: a whole number has thousands of digits"
+    match = re.search(r"\(at line (\d+), column (\d+)\)", reason)
+    last = max(len(text.rstrip().splitlines()), 1)
+    line = int(match[1]) if match else last
+    lines = text.splitlines()
+    quoted = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+    return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {quoted}"
+
+
+def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
+    """Resolve a feeder's path that is relative to the file: processes may start elsewhere."""
+    feeder = scenario.plant.feeder
+    if feeder not in feeders() and is_folder(folder / feeder):
+        plant = msgspec.structs.replace(scenario.plant, feeder=str((folder / feeder).resolve()))
+        return msgspec.structs.replace(scenario, plant=plant)
+    return scenario
+
+
+def _feeder_of(scenario: Scenario, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:
+    """The feeder's tables, or None after noting what is wrong with them."""
+    if problems.touch("plant.feeder"):
+        return None
+    name, load_set = scenario.plant.feeder, scenario.plant.load_set
+    try:
+        feeder = read_feeder(name, load_set)
+    except FeederError as error:
+        keys = [_note(problem, Path(name).name, problems) for problem in error.problems]
+        return _any_load_set(name) if keys == ["plant.load_set"] else None
+    if not feeder.inverters:
+        problems.add("plant.feeder", f'feeder "{feeder.name}" has no inverters, so there is nothing to control')
+        return None
+    return as_in(scenario, feeder)
+
+
+def _note(problem: str, feeder: str, problems: Problems) -> str:
+    """Note a problem of a feeder; return the scenario's key that caused it, or "" when the feeder itself did."""
+    key = {"load set": "plant.load_set", "feeder": "plant.feeder"}.get(problem.partition(' "')[0], "")
+    if key:
+        problems.add(key, problem)
+    else:
+        problems.add_plain(f'feeder "{feeder}": {problem}')
+    return key
+
+
+def _any_load_set(feeder: str) -> Feeder | None:
+    """The feeder with another load set than the one that does not exist, to check the rest of the scenario on."""
+    try:
+        return read_feeder(feeder)
+    except FeederError:
+        return None

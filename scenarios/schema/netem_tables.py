@@ -1,0 +1,150 @@
+"""The faults of links and agents in a scenario: checked, and put together for one case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from pathlib import Path
+
+import msgspec
+
+from netem.models.own_fault import FAULTS
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.trace_file import with_traces
+from plant.equipment import Feeder
+from plant.plant_config import Move
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.plugins import placed_plugin
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_model import Scenario
+from wire.table_schema import Problem
+
+
+def netem_of(scenario: Scenario, case: str) -> Netem:
+    """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
+    common, own = scenario.netem, scenario.cases[case].netem
+    return Netem(
+        seed=scenario.seed,
+        links=(*common.links, *own.links),
+        partitions=(*common.partitions, *own.partitions),
+        nodes=(*common.nodes, *own.nodes),
+    )
+
+
+def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
+    """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
+    if any(partition.by == "island" for partition in netem.partitions):
+        netem = netem.over(_islands_over_time(scenario, feeder))
+    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
+    return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
+
+
+def deaths_of(netem: Netem) -> tuple[Move, ...]:
+    """Return the agents that die on schedule."""
+    return tuple(Move(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
+
+
+def _islands_over_time(scenario: Scenario, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
+    """Return from when on (s) each inverter stands in which island."""
+    from plant.network import Network  # scipy: only for who parts by island
+
+    network = Network(feeder)
+    closed = set(network.closed0)
+    timeline = []
+    for t_s, opened, shut in [(0.0, (), ()), *((event.t_s, event.open, event.close) for event in scenario.events)]:
+        closed.difference_update(map(network.switch_name, opened))
+        closed.update(map(network.switch_name, shut))
+        islands = network.islands(frozenset(closed))
+        rows = (*feeder.inverters, *feeder.spares)
+        of = {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows}
+        timeline.append((t_s, of))
+    return timeline
+
+
+def is_calm(netem: Netem) -> bool:
+    """Return whether there is no entry at all."""
+    return not (netem.links or netem.partitions or netem.nodes)
+
+
+def with_delays(scenario: Scenario, folder: Path, problems: Problems) -> Scenario:
+    """Return the scenario with the delays of its trace files, whose paths start in its folder."""
+
+    def read(netem: Netem, path: str) -> Netem:
+        netem, wrong = with_traces(_with_folders(netem, folder), folder)
+        _add(wrong, path, problems)
+        return netem
+
+    cases = {
+        name: msgspec.structs.replace(case, netem=read(case.netem, f"case.{name}."))
+        for name, case in scenario.cases.items()
+    }
+    return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
+
+
+def _with_folders(netem: Netem, folder: Path) -> Netem:
+    """Return the entries with the folder of each user's fault that stands beside the file."""
+    if not any(fault.own for fault in netem.links):
+        return netem
+    replace = msgspec.structs.replace
+    own = [tuple(placed_plugin(it, FAULTS, folder) for it in fault.own) for fault in netem.links]
+    return replace(netem, links=tuple(replace(fault, own=it) for fault, it in zip(netem.links, own, strict=True)))
+
+
+def check_netem(scenario: Scenario, feeder: Feeder | None, problems: Problems) -> None:
+    """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
+
+    Without a feeder, which could not be read, nobody's name is known, and the rest is checked.
+    """
+    rows = inverters_of(scenario, feeder) if feeder else ()
+    names = tuple(row.name for row in rows) if feeder else None
+    microgrids = {row.name: row.microgrid for row in rows}
+    T_c = scenario.time.T_c_s
+    end_s = inf if problems.touch("time.end_s", "time") else scenario.time.end_s
+
+    def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
+        nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
+        return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
+
+    common = wrong_in(scenario.netem, problems.paths_below(""))
+    _add(common, "", problems)
+    for name, case in scenario.cases.items():
+        path = f"case.{name}."
+        own = wrong_in(case.netem, problems.paths_below(path))
+        _add(own, path, problems)
+        if not (common or own or problems.paths_below("") or problems.paths_below(path)) and not is_calm(case.netem):
+            where = _paths_in(scenario.netem, path)
+            for problem in wrong_in(netem_of(scenario, name), set()):
+                problems.add(where(problem.path), problem.text)
+
+
+def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
+    """Return what a run asks of an entry beyond what it says by itself."""
+    found = []
+    ticks = node.from_s / T_c
+    if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
+        near = max(1, round(ticks)) * T_c
+        text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; write {near:g}"
+        found.append(Problem(f"{path}.from_s", text))
+    if node.skew is not None and (node.from_s or node.to_s is not None):
+        found.append(Problem(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
+    return found
+
+
+def _add(wrong: list[Problem], path: str, problems: Problems) -> None:
+    for problem in wrong:
+        problems.add(path + problem.path, problem.text)
+
+
+def _paths_in(common: Netem, case: str) -> Callable[[str], str]:
+    """Return a function from the path of an entry among all of a case to where it is written."""
+    before = {"link": len(common.links), "partition": len(common.partitions), "node": len(common.nodes)}
+
+    def where(path: str) -> str:
+        kind, _, rest = path.partition("[")
+        index, _, rest = rest.partition("]")
+        place = int(index) - before[kind]
+        return f"{case}{kind}[{place}]{rest}" if place >= 0 else path
+
+    return where

@@ -1,0 +1,143 @@
+"""The problems of a scenario file: all of them at once, each with its line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, TypeVar
+
+import msgspec
+
+from wire.printable import printable
+from wire.table_reading import read_table
+
+T = TypeVar("T", bound=msgspec.Struct)
+
+_TABLE = re.compile(r"^\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
+_ENTRY = re.compile(r"^\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
+_KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be run, with everything that is wrong with it.
+
+    Attributes
+    ----------
+    problems : tuple[str, ...]
+        One sentence each, with file, line, key, value and what would be right; what a file has that cannot be printed
+        is spelt out.
+    """
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = tuple(map(printable, problems))
+        super().__init__("\n".join(self.problems))
+
+
+class Problems:
+    """Collects what is wrong with one file while it is read.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file as the user gave it.
+    text : str
+        Its text, to find the lines of the keys.
+    changed : Collection[str], optional
+        Keys that were changed since, in Python; a problem in or below one of them has no line, nor has one in a table
+        around it that the file does not write.
+    """
+
+    def __init__(self, file: str, text: str = "", changed: Collection[str] = ()) -> None:
+        self.file = file
+        self._changed = changed
+        self._lines = lines_of_keys(text)
+        self._found: list[tuple[int, str]] = []
+        self._paths: set[str] = set()
+
+    def add(self, path: str, text: str) -> None:
+        """Note a problem at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
+        self._paths.add(path)
+        within = any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed)
+        around = path not in self._lines and any(key.startswith((f"{path}.", f"{path}[")) for key in self._changed)
+        if within or around:
+            self._found.append((0, f"replace: {path}: {text}"))
+            return
+        line = self._line_of(path)
+        where = f"{self.file}:{line}" if line else self.file
+        self._found.append((line, f"{where}: {path}: {text}" if path else f"{where}: {text}"))
+
+    def add_plain(self, text: str) -> None:
+        """Note a problem that says itself where it is, as a feeder's do."""
+        self._found.append((0, text))
+
+    def touch(self, *paths: str) -> bool:
+        """Whether a problem was noted at one of these keys, which makes a check that relates them idle."""
+        return any(path in self._paths for path in paths)
+
+    def below(self, path: str) -> bool:
+        """Whether a problem was noted anywhere in a table."""
+        return any(noted.startswith(f"{path}.") for noted in self._paths)
+
+    def paths_below(self, prefix: str) -> set[str]:
+        """Return the keys of entries `[[link]]`, `[[partition]]`, `[[node]]` with a problem, seen from a table."""
+        entries = tuple(f"{prefix}{entry}[" for entry in ("link", "partition", "node"))
+        return {path.removeprefix(prefix) for path in self._paths if path.startswith(entries)}
+
+    def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
+        """Return a file's tables as a struct, of use only while nothing is noted."""
+        table, problems = read_table(struct, data)
+        for problem in problems:
+            self.add(*problem)
+        return table
+
+    @property
+    def any(self) -> bool:
+        """Whether anything was noted."""
+        return bool(self._found)
+
+    def raise_if_any(self) -> None:
+        """Raise `ScenarioError` with all problems in the order of their lines."""
+        if self._found:
+            raise ScenarioError(text for _, text in sorted(self._found, key=lambda item: item[0]))
+
+    def _line_of(self, path: str) -> int:
+        """Line of a key, or of the nearest table around it; 0 when neither is written in the file."""
+        while path:
+            if path in self._lines:
+                return self._lines[path]
+            shorter = re.sub(r"(\.[^.\[]+|\[\d+\]|^[^.\[]+)$", "", path)
+            path = shorter if shorter != path else path[:-1]  # a quoted key may have any sign in it
+        return 0
+
+
+def lines_of_keys(text: str) -> dict[str, int]:
+    r"""Line number of each key and table of a TOML text, by path; `event[1].t_s` is in the second `[[event]]`.
+
+    It reads the usual layout, one key a line. A key inside an inline table gets no line of its own, which costs the
+    reader of a problem a moment and nothing else: `tomllib` alone decides what the text means.
+
+    Examples
+    --------
+    >>> lines_of_keys("seed = 1\n[time]\nT_c_s = 0.02\n[[event]]\nt_s = 1\n[[event]]\nt_s = 4")
+    {'seed': 1, 'time': 2, 'time.T_c_s': 3, 'event[0]': 4, 'event[0].t_s': 5, 'event[1]': 6, 'event[1].t_s': 7}
+    """
+    found: dict[str, int] = {}
+    entries: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _ENTRY.match(line):
+            name = _plain(match[1])
+            entries[name] = entries.get(name, -1) + 1
+            table = f"{name}[{entries[name]}]"
+            found.setdefault(table, number)
+        elif match := _TABLE.match(line):
+            table = _plain(match[1])
+            found.setdefault(table, number)
+        elif match := _KEY.match(line):
+            key = _plain(match[1])
+            found.setdefault(f"{table}.{key}" if table else key, number)
+    return found
+
+
+def _plain(name: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in name.split("."))

@@ -1,0 +1,113 @@
+"""Islands that neither the substation nor a grid-forming inverter feeds, at the start and after every event."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+from plant.connectivity import Connectivity, Node
+from plant.equipment import Feeder
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_model import Event, Scenario
+
+_SHOWN = 6
+"""So many buses of a dead part are named."""
+
+
+class _State(NamedTuple):
+    """Who feeds what from some time on."""
+
+    event: Event | None
+    """The event from which on it is so; None at t = 0."""
+    dead: frozenset[Node]
+    """Nodes that nothing feeds."""
+    new: frozenset[Node]
+    """Those of them that were fed until then."""
+    islands: tuple[frozenset[Node], ...]
+    """Parts that inverters feed alone."""
+    inverters: frozenset[str]
+    """Inverters that are on the network."""
+
+
+def check_supply(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+    """Note as a problem what a run would begin with and nothing feeds: load, and inverters without a leader."""
+    start = next(_states(scenario, feeder))
+    if what := _what(start.dead, start.inverters, feeder):
+        problems.add(
+            "plant.feeder",
+            f"at t = 0 nothing feeds {what}: neither the substation nor a grid-forming inverter is connected to them; "
+            "close a switch in switches.csv, add a source.csv, or make an inverter there a GFM",
+        )
+
+
+def supply_notes(scenario: Scenario, feeder: Feeder) -> tuple[str, ...]:
+    """Sentences on what each event of a checked scenario de-energises or overloads; it may be meant, so is no problem.
+
+    Switches and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where it is.
+    """
+    notes, rows = [], inverters_of(scenario, feeder)
+    for state in _states(scenario, feeder):
+        event = state.event
+        when = f'event "{event.label}" at {event.t_s:g} s' if event else "the start"
+        if event and (what := _what(state.new, state.inverters, feeder)):
+            notes.append(
+                f"{when} de-energises {what}: no substation and no grid-forming inverter is connected to them any more"
+            )
+        for part in state.islands:
+            there = [row for row in rows if (row.bus, "A") in part]
+            rated = sum(row.P_rated for row in there if row.name in state.inverters)
+            load = _load(part, feeder)
+            if load > rated:
+                names = ", ".join(row.name for row in there if row.name in state.inverters)
+                notes.append(
+                    f"{when} leaves {load / 1e3:.0f} kW of load to an island of {names}, rated "
+                    f"{rated / 1e3:.0f} kW together: more than they can feed"
+                )
+    return tuple(notes)
+
+
+def _states(scenario: Scenario, feeder: Feeder) -> Iterator[_State]:
+    """Who feeds what at t = 0 and after each event."""
+    graph = Connectivity(feeder)
+    closed = graph.closed_at_start()
+    names = {name: switch.name for switch in feeder.switches for name in switch.names}
+    forming = {row.name: row.bus for row in inverters_of(scenario, feeder) if row.kind == "GFM"}
+    present = frozenset(row.name for row in feeder.inverters)
+    source = (feeder.source.bus, "A") if feeder.source else None
+    before: frozenset[Node] = frozenset()
+    for event in (None, *scenario.events):
+        if event is not None:  # names that there are not are told elsewhere
+            closed = closed - {names.get(name, "") for name in event.open}
+            closed = closed | {names[name] for name in event.close if name in names}
+            present = (present - set(event.leave)) | set(event.join)
+        fed, dead = graph.fed(closed, (bus for name, bus in forming.items() if name in present))
+        nodes = frozenset(node for part in dead for node in part)
+        islands = tuple(part for part in fed if source not in part)
+        yield _State(event, nodes, nodes - before, islands, present)
+        before = nodes
+
+
+def _load(nodes: Collection[Node], feeder: Feeder) -> float:
+    """Real power (W) of the loads at some nodes; of a delta load every branch that has one of its ends there."""
+    pairs = ("AB", "BC", "CA")
+    return sum(
+        power.real
+        for load in feeder.loads
+        for branch, power in zip(("A", "B", "C") if load.connection == "Y" else pairs, load.S, strict=True)
+        if any((load.bus, phase) in nodes for phase in branch)
+    )
+
+
+def _what(nodes: frozenset[Node], inverters: frozenset[str], feeder: Feeder) -> str:
+    """Buses with their load and inverters; "" where there is nothing that would miss its voltage."""
+    buses = [bus.name for bus in feeder.buses if any((bus.name, phase) in nodes for phase in bus.phases)]
+    lost = _load(nodes, feeder)
+    idle = [
+        row.name for row in (*feeder.inverters, *feeder.spares) if row.name in inverters and (row.bus, "A") in nodes
+    ]
+    if not lost and not idle:
+        return ""
+    some = ", ".join(buses[:_SHOWN]) + (", ..." if len(buses) > _SHOWN else "")
+    count = "a bus" if len(buses) == 1 else f"{len(buses)} buses"
+    return f"{count} ({some}) with {lost / 1e3:.0f} kW of load" + (f" and {', '.join(idle)}" if idle else "")

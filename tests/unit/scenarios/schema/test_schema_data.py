@@ -1,0 +1,128 @@
+"""Frequency, droops, ratings, loads, agents: keys of a scenario in place of a copied feeder, and their problems."""
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.catalogue_files import CATALOGUE
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_writing import to_toml
+from tests.scenario_files import problems, written
+
+ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
+CASE = '[case.IV]\ntitle = "fully coordinated"\nsecondary = "all"'
+
+
+def with_plant(keys: str) -> str:
+    """The scenario of islanding with more keys in `[plant]`."""
+    return ISLANDING.replace("V_set0_pu = 1.0", f"V_set0_pu = 1.0\n{keys}")
+
+
+def test_factors_and_an_inverters_own_data_reach_the_plant_and_the_agents(tmp_path: Path) -> None:
+    """A factor acts on every inverter but those with a value of their own; the copy of a run says the same."""
+    keys = "m_p_factor = 0.5\nm_q_factor = 2.0\nload_factor = 0.9\ninverter.inv3 = { m_p_pu = 0.02, P_rated_kW = 450 }"
+    plain, _ = load_scenario("islanding")
+    scenario, feeder = load_scenario(written(tmp_path, with_plant(keys)))
+    plant, agents = configs(scenario, feeder, "IV")
+    of = {agent.name: agent for agent in agents}
+    tables = load_scenario("islanding")[1]
+
+    assert (of["inv1"].m_p, of["inv1"].m_q) == (0.005, 0.1)
+    assert (of["inv3"].m_p, of["inv3"].m_q, of["inv3"].P_rated) == (0.02, 0.1, 450e3)
+    assert feeder.loads[0].S[0] == 0.9 * tables.loads[0].S[0]
+    assert plant.settings.changes.inverters["inv3"].P_rated == 450e3
+    assert configs(plain, tables, "IV")[0].settings.changes.inverters == {}
+    assert load_scenario(written(tmp_path, to_toml(scenario, {}))) == (scenario, feeder)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("f_nom_Hz = 5000", "plant.f_nom_Hz: 5000 Hz is not plausible for a nominal frequency (16 to 400 Hz)"),
+        ('f_nom_Hz = "50 Hz"', 'plant.f_nom_Hz: must be a number, got "50 Hz"'),
+        ("m_p_factor = 0", "plant.m_p_factor: 0 is not plausible for a factor on droops (0.01 to 100)"),
+        ("load_factor = -1", "plant.load_factor: a factor on the loads must not be negative, got -1"),
+        ("inverter.inv33.m_p_pu = 0.02", 'plant.inverter.inv33: no inverter "inv33"; did you mean "inv3"?'),
+        ("inverter.inv3.m_p_pu = 2", "plant.inverter.inv3.m_p_pu: 2 pu is not plausible for a P-f droop"),
+        ("inverter.inv3.m_p = 0.02", "plant.inverter.inv3.m_p: unknown key; write m_p_pu, per unit"),
+        ("inverter.inv3 = {}", "plant.inverter.inv3: changes nothing; give it one of m_p_pu, m_q_pu, P_rated_kW"),
+        ("inverter = 3", "plant.inverter: must be written as tables [plant.inverter.NAME], got 3"),
+    ],
+)
+def test_data_that_cannot_be_meant_are_told_at_their_key(tmp_path: Path, keys: str, said: str) -> None:
+    """Key, value with its unit, and what would be right."""
+    found = problems(tmp_path, with_plant(keys))
+
+    assert len(found) == 1
+    assert said in found[0]
+
+
+def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> None:
+    """What is over-frequency at 50 Hz is under-frequency at 60 Hz."""
+    trips = "\n[protection]\ntrips = { OF2 = [52.0, 0.16] }\n"
+    told = problems(tmp_path, with_plant(trips))
+
+    assert "OF2 must be between 60 and 120 Hz, got 52 Hz" in told[0]
+    assert load_scenario(written(tmp_path, with_plant(f"f_nom_Hz = 50.0{trips}")))[1].f_nom == 50.0
+
+
+def test_named_inverters_run_the_secondary_law_and_others_do_not(tmp_path: Path) -> None:
+    """A list beside the rules "none", "GFM" and "all"."""
+    text = ISLANDING.replace(CASE, CASE.replace('"all"', '["inv1", "inv4"]'))
+    scenario, feeder = load_scenario(written(tmp_path, text))
+    _, agents = configs(scenario, feeder, "IV")
+
+    assert [agent.name for agent in agents if agent.control.acts(agent.name, agent.kind)] == ["inv1", "inv4"]
+    assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
+
+
+def test_an_inverter_without_agent_is_in_the_plant_and_nowhere_else(tmp_path: Path) -> None:
+    """The top of the file names those of every case; a case adds its own."""
+    text = 'without_agent = ["inv9"]\n' + ISLANDING.replace(CASE, CASE + '\nwithout_agent = ["inv2"]')
+    scenario, feeder = load_scenario(written(tmp_path, text))
+    plant, agents = configs(scenario, feeder, "IV")
+    names = [agent.name for agent in agents]
+
+    assert names == ["inv1", "inv3", "inv4", "inv5", "inv6", "inv7", "inv8"]
+    assert plant.agents == tuple(names)
+    assert len(configs(scenario, feeder, "I")[1]) == 8
+    assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"all"', '["inv1", "inv44"]', 'case.IV.secondary: no inverter "inv44"; did you mean "inv4"?'),
+        ('"all"', '["inv1", "inv1"]', 'case.IV.secondary: "inv1" is named twice; name it once'),
+        ('"all"', "[]", 'case.IV.secondary: names no inverter; write secondary = "none"'),
+        ('"all"', '"al"', 'case.IV.secondary: there is no "al"; did you mean "all"?'),
+        ('"all"', "3", 'case.IV.secondary: must be one of "none", "GFM", "all" or a list such as ["inv1", "inv4"]'),
+        ('"all"', '["inv1"]\nwithout_agent = ["inv1"]', "case.IV.secondary: inv1 has no agent that could run the law"),
+        ('"all"', '"all"\nwithout_agent = ["inv0"]', 'case.IV.without_agent: no inverter "inv0"'),
+        ('"all"', '"all"\nwithout_agent = ["inv2", "inv2"]', '"inv2" is named twice; name it once'),
+        (
+            '"all"',
+            '"all"\nwithout_agent = ["inv1","inv2","inv3","inv4","inv5","inv6","inv7","inv8","inv9"]',
+            "case.IV.without_agent: no inverter is left that has an agent",
+        ),
+        (
+            '"all"',
+            '"all"\nwithout_agent = ["inv2"]\n[[case.IV.node]]\nname = "inv2"\nslow_s = 0.01',
+            "case.IV.without_agent: an entry [[node]] befalls the agent of inv2, so it must have one",
+        ),
+        (
+            '"all"',
+            '"all"\nwithout_agent = ["inv2"]\n[[event]]\nlabel = "e3"\nt_s = 5.0\nleave = ["inv2"]',
+            'case.IV.without_agent: event "e3" lets the agent of inv2 leave or join, so it must have one',
+        ),
+    ],
+)
+def test_who_cannot_be_left_without_agent_or_run_the_law_is_told(tmp_path: Path, old: str, new: str, said: str) -> None:
+    """Which name, and what to write."""
+    text = ISLANDING.replace(CASE, CASE.replace(old, new)).replace('graph = "full"', "")
+    text = text.replace("[case.IV]", '[case.IV]\ngraph = "full"')
+    found = problems(tmp_path, text)
+
+    assert len(found) == 1
+    assert said in found[0]

@@ -1,0 +1,117 @@
+"""Events that let agents leave and join: what they mean, and every problem that can be made in them."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from plant.plant_config import Move
+from scenarios.catalogue_files import CATALOGUE
+from scenarios.live.live_options import LiveOptions, configure
+from scenarios.results.joins_and_leaves import as_they_came, late_moves
+from scenarios.schema import load_scenario
+from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.configs import configs
+from scenarios.schema.scenario_writing import to_toml
+from tests.scenario_files import problems, written
+from wire.messages import PlantEvent
+
+PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
+
+
+def test_plug_n_play_is_the_papers_experiment() -> None:
+    """Section 4: inverter 2 leaves at 2 s and returns at 3 s; all nine agents are awaited at the start."""
+    plant, agents = configs(*load_scenario("plug-n-play"), "IV")
+
+    assert plant.moves == (
+        Move(t=2.0, inverter="inv2", action="leave"),
+        Move(t=3.0, inverter="inv2", action="join"),
+    )
+    assert plant.agents == tuple(agent.name for agent in agents)
+    assert len(agents) == 9
+    assert plant.settings.spares == ()
+
+
+def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path) -> None:
+    """Its agent is configured like the others, the plant has its inverter, and begins without it."""
+    scenario, feeder = load_scenario(written(tmp_path, PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')))
+    plant, agents = configs(scenario, feeder, "IV")
+
+    assert plant.settings.spares == ("inv10",)
+    assert agents[-1].name == "inv10"
+    assert "inv10" not in plant.agents
+    assert [row.name for row in inverters_of(scenario, feeder)][-1] == "inv10"
+
+
+def test_by_hand_people_move_the_agents(tmp_path: Path) -> None:
+    """The plant of a run by hand lets nobody leave by itself, and knows each inverter once."""
+    text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
+    plant, agents = configure(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+
+    assert plant.moves == ()
+    assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]
+
+
+def test_moves_survive_the_runs_copy(tmp_path: Path) -> None:
+    """What a run leaves in its folder is the same scenario again."""
+    scenario, _ = load_scenario("plug-n-play")
+
+    assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('leave = ["inv2"]', 'leave = ["inv22"]', r'event\[1\].leave: no inverter "inv22"; did you mean "inv2"\?'),
+        ('leave = ["inv2"]', 'leave = ["inv2", "inv2"]', r'event\[1\].leave: "inv2" is named twice in event "leave"'),
+        ('leave = ["inv2"]', 'leave = "inv2"', r"event\[1\].leave: must be a list such as"),
+        (
+            'leave = ["inv2"]',
+            'leave = ["inv10", "inv2"]',
+            r'event\[1\].leave: "inv10" is not there at 2 s; leave it out',
+        ),
+        ('join = ["inv2"]', 'leave = ["inv2"]', r'event\[2\].leave: "inv2" is not there at 3 s; .* let it join before'),
+        (
+            'join = ["inv2"]',
+            'join = ["inv2", "inv3"]',
+            r'event\[2\].join: "inv3" is there already at 3 s; .* let it leave',
+        ),
+        ('join = ["inv2"]', "", r'event\[2\]: event "return" does nothing; give it open, close, leave, join, P_max_kW'),
+        ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
+        ('join = ["inv2"]', 'joins = ["inv2"]', r'event\[2\].joins: unknown key; did you mean "join"\?'),
+    ],
+)
+def test_each_problem_is_told_with_its_place_and_what_would_be_right(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """A problem names the file, the line, the key, the value, and what to write instead."""
+    assert PLUG.count(old) == 1
+    found = problems(tmp_path, PLUG.replace(old, new))
+
+    assert any(re.search(said, line) for line in found), found
+    assert all(line.startswith("mine.toml:") for line in found)
+
+
+def test_all_problems_come_at_once(tmp_path: Path) -> None:
+    """Who leaves unknown, at no tick, and who joins while present, are told together."""
+    text = PLUG.replace('leave = ["inv2"]', 'leave = ["inv99"]').replace("t_s = 2.0", "t_s = 2.006")
+    found = problems(tmp_path, text)
+
+    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
+        "event[1].t_s",
+        "event[1].leave",
+        "event[2].join",
+    ]
+
+
+def test_an_event_is_measured_from_when_it_came() -> None:
+    """A process that came up late moves the start of its window, which is told; what never came keeps its time."""
+    scenario, _ = load_scenario("plug-n-play")
+    left = PlantEvent(t=2.0, kind="inverter", subject="inv2", text="inv2 disconnected")
+    back = PlantEvent(t=3.32, kind="inverter", subject="inv2", text="inv2 connected")
+    other = PlantEvent(t=3.5, kind="inverter", subject="inv3", text="inv3 disconnected")
+
+    assert as_they_came(scenario, [left, back, other]) == [("islanding", 1.0), ("leave", 2.0), ("return", 3.32)]
+    assert as_they_came(scenario, [left]) == [("islanding", 1.0), ("leave", 2.0), ("return", 3.0)]
+    assert late_moves(scenario, [left]) == []
+    assert late_moves(scenario, [left, back])[0].startswith("return, meant for t = 3 s, came at 3.32 s")

@@ -1,0 +1,276 @@
+"""Scenario files that cannot be run: what is said of each problem."""
+
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from plant.tables.read import DATA
+from scenarios.catalogue_files import CATALOGUE
+from scenarios.schema import ScenarioError, load_scenario
+from tests.scenario_files import problems
+
+ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("seed = 1", "seeed = 1", r'mine.toml:\d+: seeed: unknown key; did you mean "seed"\?'),
+        ("T_c_s = 0.02", "T_c = 0.02", r"time.T_c: unknown key; write T_c_s, in seconds"),
+        ("T_c_s = 0.02", "T_c_ms = 20", r"time.T_c_ms: unknown key; write T_c_s, in seconds"),
+        ("T_c_s = 0.02", "T_c_s = 20", r"time.T_c_s: 20 s is not plausible .* did you mean 0.02 \(20 ms\)\?"),
+        ("T_c_s = 0.02", "T_c_s = 0", r"time.T_c_s: a control period must be above 0, got 0 s"),
+        ("T_c_s = 0.02", "T_c_s = -0.02", r"time.T_c_s: a control period must be above 0, got -0.02 s"),
+        ("T_c_s = 0.02", 'T_c_s = "20 ms"', r'time.T_c_s: must be a number, got "20 ms"; write 0.02'),
+        ("T_c_s = 0.02", "T_c_s = true", r"time.T_c_s: must be a number, got true"),
+        ("T_c_s = 0.02", "T_c_s = nan", r"time.T_c_s: a control period must be a finite number"),
+        (
+            "h_s = 0.002",
+            "h_s = 0.003",
+            r"time.h_s: 0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025",
+        ),
+        (
+            "h_s = 0.002",
+            "h_s = 0.005",
+            r"time.h_s: 0.005 s is too long a step for T_p_s = 0.01 s of \[plant.gfm\]: .*; at most 0.003 s",
+        ),
+        ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
+        ("record_s = 0.01", "record_s = 0.005", r"time.record_s: 0.005 s is not a multiple of h_s = 0.002 s"),
+        ("end_s = 7.0", "end_s = 7.01", r"time.end_s: 7.01 s is not a multiple of T_c_s = 0.02 s"),
+        ("end_s = 7.0", "", r"time.end_s: is missing; write a number"),
+        ("P_set0_pu = 0.647", "P_set0_pu = 64.7", r"plant.P_set0_pu: 64.7 pu .* did you mean 0.647 \(64.7 %\)\?"),
+        ("P_set0_pu = 0.647", "P_set0_pu = 388200", r"plant.P_set0_pu: .* neither kW nor V"),
+        ("P_set0_pu = 0.647", "P_set0_kW = 388", r"plant.P_set0_kW: unknown key; write P_set0_pu, per unit"),
+        ("seed = 1 ", "seed = -1 ", r"seed: a seed must not be negative, got -1"),
+        (
+            'title = "no control"',
+            r'title = "no \u001b[31m"',
+            r"case.I.title: has characters that cannot be printed: 'no \\x1b",
+        ),
+        ("k_p = 0.0007", "k_p = 0", r"gains.k_p: gain k_p must be above 0, got 0"),
+        ("k_q = 0.25", "k_q = -1.0", r"gains.k_q: gain k_q must be above 0, got -1"),
+        ("alpha = 1.0", "alpha = -1.0", r"gains.alpha: gain alpha must not be negative, got -1"),
+        (
+            "[gains]",
+            "[handling]\nmax_age_s = 250\n[gains]",
+            r"handling.max_age_s: 250 s .* did you mean 0.25 \(250 ms\)",
+        ),
+        ("[gains]", "[handling]\nT_age = 0.2\n[gains]", r"handling.T_age: unknown key; write T_age_s, in seconds"),
+        ("[gains]", '[handling]\nstale = "skp"\n[gains]', r'handling.stale: there is no "skp"; did you mean "skip"\?'),
+        ("[gains]", "[gains]\nkappa_c = 9.0", r"gains.kappa_c: unknown key here; it belongs into \[handling\]"),
+        ("[gains]", "[gains]\nT_c_s = 0.02", r"gains.T_c_s: unknown key here; it belongs into \[time\]"),
+        ("t_s = 4.0", "t_s = 9.0", r"event\[1\].t_s: event \"event2\" at 9 s does not come before the end at 7 s"),
+        ("t_s = 4.0", "t_s = 4.001", r"event\[1\].t_s: 4.001 s is not a multiple of h_s = 0.002 s"),
+        ("t_s = 4.0", "t_s = 0.5", r"event\[1\].t_s: .* write events in the order of time"),
+        ("t_s = 4.0", "t_s = 1.002", r"event\[1\].t_s: .* no recorded row lies between"),
+        ('"event2"           #', '"event1"           #', r'event\[1\].label: there is an event "event1" already'),
+        ('"60-160"', '"60-161"', r'event\[1\].open: no switch "60-161"; did you mean "60-160"\?'),
+        ('"60-160"', '"60-999"', r'event\[1\].open: no switch "60-999" \(there is no bus 999\)'),
+        ('"60-160"', '"13-152"', r'event\[1\].open: switch "13-152" is open already at 4 s'),
+        ('["60-160"]', '"60-160"', r'event\[1\].open: must be a list such as \["13-152"\], got "60-160"'),
+        ('open = ["60-160"]', "", r'event\[1\]: event "event2" does nothing'),
+        ('["60-160"]', '["60-160"]\nsynchronised = true', r"event\[1\].synchronised: .* closes no switch"),
+        ("[gains]", "[plant.sync_check]\nangle_deg = 200\n[gains]", r"plant.sync_check.angle_deg: 200 deg is not"),
+        ('graph = "full"', 'graph = "mesh"', r'case.IV.graph: there is no graph "mesh"; the graphs are full, none'),
+        ('graph = "full"', 'graph = "links"', r'case.IV.graph: graph "links" needs the key links'),
+        ('graph = "full"', 'graph = "links"\nlinks = [["inv1", "inv12"]]', r'links\[0\]: no inverter "inv12"; did you'),
+        ('graph = "full"', 'graph = "full"\nlinks = [["inv1", "inv2"]]', r'the graph is "full"; write graph = "links"'),
+        ('secondary = "all"', 'secondary = "GFMs"', r'case.IV.secondary: there is no "GFMs"; did you mean "GFM"\?'),
+        ("[case.IV]", '[case."a/b"]', r'case.a/b: name "a/b" must be up to 31 letters'),
+        ("[case.IV]", "[case.log]", r"case.log: a case's folder stands beside log, plots, .*; name it otherwise"),
+        ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
+        ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
+        ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
+        (
+            'paper = "islanding"',
+            'paper = "islands"',
+            r'paper: there is no benchmark "islands"; did you mean',
+        ),
+        ("[plant]", "[plant.gfm]\nT_p = 0.01\n\n[plant]", r"plant.gfm.T_p: unknown key; write T_p_s, in seconds"),
+        ("[plant]", "[plant.gfm]\nP_max_pu = 100\n\n[plant]", r"plant.gfm.P_max_pu: .* did you mean 1 \(100 %\)\?"),
+        (
+            "[plant]",
+            "[plant.gfm]\nP_max_pu = 0.6\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is above plant.gfm.P_max_pu = 0.6 pu.*inv1 388.2 of 360, .* kW\); lower",
+        ),
+        (
+            "[plant]",
+            "[plant.gfl]\nP_max_pu = 0.6\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is above plant.gfl.P_max_pu = 0.6 pu.*inv2 226.45 of 210, .* kW\)",
+        ),
+        (
+            "[plant]",
+            "[plant.gfm]\nP_min_pu = 0.7\n\n[plant]",
+            r"plant.P_set0_pu: 0.647 pu is below plant.gfm.P_min_pu = 0.7 pu.*raise P_set0_pu",
+        ),
+        (
+            "[plant]",
+            '[protection]\ncategory = "IV"\n\n[plant]',
+            r'protection.category: there is no "IV"; .* II, III, off',
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV3 = [0.5, 0.1] }\n\n[plant]",
+            r'protection.trips: no trip function "UV3"; did you mean "UV[12]"',
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV2 = [1.2, 0.1] }\n\n[plant]",
+            r"protection.trips: UV2 must be between 0 and 1 pu, got 1.2 pu",
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { UV2 = [0.4, 0.0] }\n\n[plant]",
+            r"protection.trips: UV2: the clearing time must be above 0 and at most 3600 s, got 0 s",
+        ),
+        (
+            "[plant]",
+            "[protection]\ntrips = { OF1 = [62.5, 1.0] }\n\n[plant]",
+            r"protection.trips: OF2 = 62 Hz must be farther from nominal than OF1 = 62.5 Hz",
+        ),
+        ("[plant]", "[plant.gfm]\nE_min_pu = 1.5\n\n[plant]", r"plant.gfm.E_min_pu: 1.5 must be below E_max_pu = 1.25"),
+    ],
+)
+def test_each_problem_is_told_with_its_place_and_what_would_be_right(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """A problem names the file, the line, the key, the value with its unit, and what to write instead."""
+    assert ISLANDING.count(old) >= 1
+    found = problems(tmp_path, ISLANDING.replace(old, new, 1))
+
+    assert len(found) == 1, found
+    assert re.search(said, found[0]), found[0]
+
+
+def test_the_line_of_a_problem_is_that_of_its_key(tmp_path: Path) -> None:
+    """The number behind the file's name leads to the key."""
+    text = ISLANDING.replace("t_s = 4.0", "t_s = 4.001")
+
+    (found,) = problems(tmp_path, text)
+
+    line = int(found.split(":")[1])
+    assert text.splitlines()[line - 1] == "t_s = 4.001"
+
+
+def test_all_problems_come_at_once_in_the_order_of_lines(tmp_path: Path) -> None:
+    """Who corrects a file sees everything that is wrong with it the first time."""
+    text = ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20").replace("k_p = 0.0007", "k_p = 0")
+    text = text.replace('"60-160"', '"60-161"').replace('graph = "full"', 'graph = "mesh"')
+
+    found = problems(tmp_path, text)
+
+    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
+        "time.T_c_s",
+        "gains.k_p",
+        "event[1].open",
+        "case.IV.graph",
+    ]
+
+
+def test_an_unknown_feeder_hides_only_what_depends_on_it(tmp_path: Path) -> None:
+    """Links, agents' faults and events are checked without it; whose names are right cannot be known."""
+    text = ISLANDING.replace('feeder = "microgrid123"', 'feeder = "microgrid124"').replace('open = ["60-160"]', "")
+    text += """
+[[case.IV.link]]
+on = "inv1 <-> anybody"
+from_s = 9.0
+delay = 0.1
+[[case.IV.link]]
+on = "inv1"
+delay = 0.1
+[[node]]
+name = "inv2"
+pause = true
+from_s = 1.0
+"""
+
+    found = problems(tmp_path, text)
+
+    assert [re.sub(r".*?: ([^:]*): .*", r"\1", line) for line in found] == [
+        "plant.feeder",
+        "event[1]",
+        "case.IV.link[0].from_s",
+        "case.IV.link[1].on",
+        "node[0].pause",
+    ]
+
+
+def test_an_event_off_the_grid_has_its_place_among_the_others_nevertheless(tmp_path: Path) -> None:
+    """Two problems of one time are told together."""
+    text = ISLANDING.replace("t_s = 4.0", "t_s = 0.9995").replace("end_s = 7.0", "end_s = 0.501")
+
+    found = [re.sub(r".*?: ([^:]*: .*?)[;,(].*", r"\1", line) for line in problems(tmp_path, text)]
+
+    assert found == [
+        "time.end_s: 0.501 s is not a multiple of T_c_s = 0.02 s",
+        'event[0].t_s: event "event1" at 1 s does not come before the end at 0.501 s',
+        "event[1].t_s: 0.9995 s is not a multiple of h_s = 0.002 s",
+        'event[1].t_s: event "event2" at 0.9995 s does not come before the end at 0.501 s',
+        'event[1].t_s: event "event2" at 0.9995 s is written after "event1" at 1 s',
+    ]
+
+
+def test_a_wrong_load_set_does_not_hide_a_wrong_switch(tmp_path: Path) -> None:
+    """The switches are checked on the feeder even where its load set does not exist."""
+    text = ISLANDING.replace('load_set = "event2"', 'load_set = "x"').replace('"60-160"', '"60-161"')
+
+    assert len(problems(tmp_path, text)) == 2
+
+
+def test_a_feeders_problems_are_passed_on(tmp_path: Path) -> None:
+    """Every problem of the feeder is told, with the table and the row."""
+    folder = Path(shutil.copytree(DATA / "microgrid123", tmp_path / "broken"))
+    with (folder / "inverters.csv").open(newline="") as stream:
+        rows = list(csv.reader(stream))
+    rows[1][2], rows[2][2] = "999", rows[3][2]
+    with (folder / "inverters.csv").open("w", newline="") as stream:
+        csv.writer(stream).writerows(rows)
+
+    found = problems(tmp_path, ISLANDING.replace('feeder = "microgrid123"', 'feeder = "broken"'))
+
+    assert len(found) >= 2
+    assert all(line.startswith('feeder "broken": inverters.csv row ') for line in found), found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("seed = 1\nseed 2\n", r"mine.toml:2: not valid TOML: .*: seed 2"),
+        ("seed = ", r"mine.toml:1: not valid TOML"),
+        ("seed = 1\nseed = 2\n", r"mine.toml:2: not valid TOML: Cannot overwrite a value"),
+        ("", r"mine.toml: time: is missing"),
+        ("time = 3\ncase = 4\nevent = 5\n", r"mine.toml:1: time: must be a table"),
+        ("[time]\nend_s = 1.0\n[case]\nIV = 1\n", r"case: must be written as tables \[case.NAME\]"),
+        ("[time]\nend_s = 1.0\n", r"case: is missing; write at least one table \[case.NAME\]"),
+        ("[time]\nend_s = 1.0\n[case]\n", r"case: there is no case; write at least one table"),
+    ],
+)
+def test_a_malformed_file_is_told_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+    """No text whatever ends in anything but problems."""
+    assert any(re.search(said, line) for line in problems(tmp_path, text)), problems(tmp_path, text)
+
+
+def test_a_file_that_is_no_text_is_told(tmp_path: Path) -> None:
+    """Bytes that are not UTF-8 are a problem like others."""
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"seed = 1 # \xff\n")
+
+    with pytest.raises(ScenarioError, match=r"mine.toml: byte 11 is not UTF-8"):
+        load_scenario(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("islandin", r'no scenario "islandin"; did you mean "islanding"\?'),
+        ("no/such.toml", r"no/such.toml: there is no such file"),
+        (".", r"\.: this is a folder"),
+    ],
+)
+def test_a_missing_scenario_is_told(name: str, said: str) -> None:
+    """A name that is neither in the catalogue nor a file names what there is."""
+    with pytest.raises(ScenarioError, match=said):
+        load_scenario(name)
