@@ -107,7 +107,7 @@ def ring(members: Members) -> Mapping[str, Iterable[str]]:
     return {name: {names[i - 1], names[(i + 1) % len(names)]} - {name} for i, name in enumerate(names)}
 
 
-class Links:
+class EdgeList:
     """The pairs that the case lists under the key `links`, both ways."""
 
     links: Annotated[tuple[tuple[str, str], ...], "Pairs; written as the case's own key `links`."] = ()
@@ -138,7 +138,7 @@ GRAPHS: Registry[Any] = Registry(
         "GFM-only": "agents.graphs:GFM_only",
         "clustered": "agents.graphs:clustered",
         "ring": "agents.graphs:ring",
-        "links": "agents.graphs:Links",
+        "links": "agents.graphs:EdgeList",
     },
 )
 """Rules by name; those of gridpeers come first."""

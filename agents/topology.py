@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 
 from agents.agent_config import Control
 from agents.graphs import (
+    EdgeList,
     GFM_only,
     Graph,
-    Links,
     Member,
     clustered,
     full,
@@ -39,7 +39,7 @@ def rule_of(control: Control) -> Graph:
     """
     if control.own_graph is not None:
         return make_graph(control.own_graph)
-    return Links(control.links) if control.graph == "links" else _OURS[control.graph]
+    return EdgeList(control.links) if control.graph == "links" else _OURS[control.graph]
 
 
 def is_pairwise(control: Control) -> bool:

@@ -66,7 +66,7 @@ def law(config: dict, P_set: float, V_set: float, m: dict, near: list) -> tuple[
     return P_set * rated, V_set * config["V_nom"]
 
 
-class Agent:
+class ForeignAgent:
     """One agent of a run; Zenoh's threads put what comes into `inbox`, and `run` takes it out."""
 
     def __init__(self, config: dict, session: zenoh.Session) -> None:
@@ -194,7 +194,7 @@ if __name__ == "__main__":
         while config is None:
             for reply in session.get("gridpeers/{}/config/{}".format(*sys.argv[2:]), timeout=1.0):
                 config = json.loads(reply.ok.payload.to_string()) if reply.ok else None
-        agent = Agent(config, session)
+        agent = ForeignAgent(config, session)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: agent.inbox.put(("leave", None)))
         sys.exit(agent.run())

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from netem.draws import Stream
-from netem.fault_schedule import GATES, Schedule
+from netem.fault_schedule import GATES, FaultSchedule
 from netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
@@ -51,7 +51,7 @@ class Channel:
     link : Link
         Who sends and who receives.
     spans : Iterable[Span]
-        Its faults; see `netem.fault_schedule.Schedule`.
+        Its faults; see `netem.fault_schedule.FaultSchedule`.
     seed : int
         Seed of the run.
 
@@ -71,7 +71,7 @@ class Channel:
 
     def __init__(self, link: Link, spans: Iterable[Span], seed: int) -> None:
         self.link = link
-        self.schedule = Schedule(spans)
+        self.schedule = FaultSchedule(spans)
         self._seed = seed
         self._busy_until = self._last = NEVER
         """Until when the line of finite rate sends, and the latest arrival so far (s of run time)."""
@@ -89,12 +89,12 @@ class Channel:
         """Whether no fault can ever act."""
         return not self.schedule.spans
 
-    def reschedule(self, schedule: Schedule, *, rewind: bool) -> None:
+    def reschedule(self, schedule: FaultSchedule, *, rewind: bool) -> None:
         """Take another schedule, for messages not judged yet.
 
         Parameters
         ----------
-        schedule : Schedule
+        schedule : FaultSchedule
             The new one.
         rewind : bool
             Whether messages that a cut of the old schedule keeps will be judged again, in order and before any other:

@@ -28,7 +28,7 @@ class Segment(NamedTuple):
     """The entry that holds, by kind."""
 
 
-class Schedule:
+class FaultSchedule:
     """Faults of one link.
 
     Parameters
@@ -79,11 +79,11 @@ class Schedule:
                 return until, ""
             t = until
 
-    def with_spans(self, spans: Iterable[Span]) -> Schedule:
+    def with_spans(self, spans: Iterable[Span]) -> FaultSchedule:
         """The schedule with more entries, which take precedence."""
-        return Schedule((*self.spans, *spans))
+        return FaultSchedule((*self.spans, *spans))
 
-    def healed(self, t: float, kinds: Collection[str] | None = None) -> Schedule:
+    def healed(self, t: float, kinds: Collection[str] | None = None) -> FaultSchedule:
         """The schedule without what holds at time t (s), from then on; what is to begin later stays.
 
         Parameters
@@ -91,7 +91,7 @@ class Schedule:
         kinds : Collection[str], optional
             Kinds to be ended; without them, all.
         """
-        return Schedule(
+        return FaultSchedule(
             span._replace(to_s=t)
             if span.from_s <= t + INSTANT < span.to_s and (kinds is None or span.kind in kinds)
             else span

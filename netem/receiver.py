@@ -21,6 +21,7 @@ from netem.schema.change import Change, Heal, changed, schedule_of
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link
+from wire.links import Arrival
 from wire.messages import AnyMessage
 
 MOST_FAILURES = 8
@@ -28,19 +29,6 @@ MOST_FAILURES = 8
 
 NANO = 1e9
 """Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
-
-
-class Arrival(NamedTuple):
-    """A message that has arrived."""
-
-    src: str
-    """Who sent it."""
-    payload: bytes
-    """Its bytes, with a flipped bit if the link has corrupted it."""
-    delay: float
-    """The delay that netem added (s)."""
-    message: AnyMessage | None = None
-    """The message as it was offered; None if the link has corrupted it."""
 
 
 class _Special(NamedTuple):

@@ -13,23 +13,17 @@ REPORT_TICKS = 100
 """Ticks between two reports of a receiver on what the links into it did."""
 
 
-class Arrival(Protocol):
+class Arrival(NamedTuple):
     """A message that a link has let through."""
 
-    @property
-    def src(self) -> str:
-        """The sender."""
-        ...
-
-    @property
-    def payload(self) -> bytes:
-        """The bytes, as the link left them."""
-        ...
-
-    @property
-    def message(self) -> AnyMessage | None:
-        """The message as it was offered; None if the link has corrupted it."""
-        ...
+    src: str
+    """The sender."""
+    payload: bytes
+    """Its bytes, with a flipped bit if the link has corrupted it."""
+    delay: float
+    """The delay that the link added (s)."""
+    message: AnyMessage | None = None
+    """The message as it was offered; None if the link has corrupted it."""
 
 
 class CommandEffect(NamedTuple):

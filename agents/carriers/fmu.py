@@ -15,7 +15,7 @@ from tempfile import mkdtemp
 from msgspec.structs import replace
 
 from agents.agent_config import LawChoice
-from agents.carriers.program import ProgramLaw, Ready
+from agents.carriers.program import ProgramLaw, ProgramReady
 from agents.laws.call import LawError
 from wire.printable import printable
 
@@ -59,7 +59,7 @@ class FmuLaw(ProgramLaw):
         LawError
             If it cannot be.
         """
-        self._ask({"type": "load"}, Ready, 0.0)
+        self._ask({"type": "load"}, ProgramReady, 0.0)
 
     def close(self) -> None:
         """End its process, and remove what was unpacked."""

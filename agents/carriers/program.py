@@ -28,7 +28,7 @@ LONGEST_LINE = 100_000
 EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 
 
-class Ready(msgspec.Struct, frozen=True, kw_only=True):
+class ProgramReady(msgspec.Struct, frozen=True, kw_only=True):
     """Answer to the line "start"."""
 
     type: Literal["ready"] = "ready"
@@ -84,7 +84,7 @@ class ProgramLaw(Law):
 
     def start(self, own: Own) -> None:
         """Send the line "start", and wait until the program is ready."""
-        self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, Ready, own.t)
+        self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, ProgramReady, own.t)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Send the line "step", and take the decision."""

@@ -55,7 +55,7 @@ CLOCK_UPDATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, 
 DESIRED = ctypes.CFUNCTYPE(ctypes.c_ulong, ctypes.c_void_p)
 
 
-class Core:
+class GridlabdCore:
     """GridLAB-D's shared library: its clock, modules and objects' properties by raw pointer."""
 
     def __init__(self) -> None:
@@ -100,10 +100,10 @@ class Core:
         return int(address)
 
 
-class Inverter:
+class GridlabdInverter:
     """Quantities of an inverter, read after every step."""
 
-    def __init__(self, core: Core, name: str, bus: str, kind: str) -> None:
+    def __init__(self, core: GridlabdCore, name: str, bus: str, kind: str) -> None:
         forming = kind == "GFM"
         self._f = core.doubles(name, "freq" if forming else "f_PLL_A")
         self._S = core.doubles(name, "VA_Out", 2)
@@ -133,10 +133,10 @@ class Simulation:
         self._gridlabd = gridlabd.DirectGridLabD()
         if self._gridlabd.load_glm([model]) != gridlabd.GLDErrorCode.SUCCESS:
             raise RuntimeError("the model was not loaded")
-        self.core = Core()
+        self.core = GridlabdCore()
         self._hook(self.core.module("tape"))
         self._gridlabd.setup_after_load()
-        self._inverters = [Inverter(self.core, *inverter) for inverter in inverters]
+        self._inverters = [GridlabdInverter(self.core, *inverter) for inverter in inverters]
         self._go, self._done = threading.Semaphore(0), threading.Semaphore(0)
         self._left = 1
         self._error: Exception | None = None

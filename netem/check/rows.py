@@ -19,7 +19,7 @@ UNSEEN = GATES
 """Reasons of those that never met loss, rate or delay."""
 
 
-class Row(NamedTuple):
+class LinkTest(NamedTuple):
     """One test of one link."""
 
     src: str

@@ -11,7 +11,7 @@ from scipy import stats
 from netem.check.delay_check import check_delay
 from netem.check.loss_check import FEWEST, Finding, check_loss
 from netem.check.own_check import AS_IT_SAYS, added_by, check_own
-from netem.check.rows import Messages, Row, messages
+from netem.check.rows import LinkTest, Messages, messages
 from netem.draws import Stream
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace
@@ -35,7 +35,7 @@ MASKS = {
 class Report(NamedTuple):
     """What was found."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[LinkTest, ...]
     """Every test, by link."""
     warnings: tuple[str, ...]
     """One sentence for each that failed."""
@@ -53,7 +53,7 @@ def verify(
     traces : Iterable[LinkTrace]
         Verdicts of all receivers, as they were taken.
     spans : Mapping[Link, Sequence[Span]]
-        What is configured for each link, without overlaps: `Netem.spans`, or after live changes `Schedule.flat`.
+        What is configured for each link, without overlaps: `Netem.spans`, or after live changes `FaultSchedule.flat`.
     seed : int
         Seed of the run.
 
@@ -65,7 +65,7 @@ def verify(
     for trace in traces:
         by_link.setdefault(Link(trace.src, trace.dst), []).append(trace)
     rows = [
-        Row(link.src, link.dst, *finding)
+        LinkTest(link.src, link.dst, *finding)
         for link in sorted(spans)
         for span in spans[link]
         for finding in _findings(tuple(by_link.get(link, ())), span, spans[link], link, seed)
@@ -74,7 +74,7 @@ def verify(
     return Report(tuple(judged), tuple(_warning(row) for row in judged if row.ok is False))
 
 
-def _warning(row: Row) -> str:
+def _warning(row: LinkTest) -> str:
     """Say what a test that failed means."""
     if row.configured == AS_IT_SAYS:
         return (
@@ -154,7 +154,7 @@ def _gate(sent: Messages, span: Span) -> Finding:
     return (span.kind, "nothing passes", f"{through} passed", n, float(through == 0) if n else None)
 
 
-def _holm(rows: Sequence[Row]) -> list[Row]:
+def _holm(rows: Sequence[LinkTest]) -> list[LinkTest]:
     """Which tests fail when all together may fail by chance with probability `LEVEL`."""
     tested = sorted((i for i, row in enumerate(rows) if row.p is not None), key=lambda i: rows[i].p or 0.0)
     judged = list(rows)

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from netem.fault_schedule import Schedule
+from netem.fault_schedule import FaultSchedule
 from netem.models.cut import Cut
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
@@ -31,7 +31,7 @@ Change = Fault | Heal
 """What can be done live. A `Fault` takes precedence over what the scenario has of its kinds, until it ends."""
 
 
-def changed(schedule: Schedule, change: Change, link: Link, microgrids: Mapping[str, str]) -> Schedule:
+def changed(schedule: FaultSchedule, change: Change, link: Link, microgrids: Mapping[str, str]) -> FaultSchedule:
     """The schedule of a link after a change, the same object if the change does not concern it."""
     if isinstance(change, Fault):
         spans = change.spans(*link, microgrids)
@@ -41,9 +41,9 @@ def changed(schedule: Schedule, change: Change, link: Link, microgrids: Mapping[
     return schedule.healed(change.from_s, change.kinds or None)
 
 
-def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids: Mapping[str, str]) -> Schedule:
+def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids: Mapping[str, str]) -> FaultSchedule:
     """Everything about one link: the scenario's entries, and what was changed since, in that order."""
-    schedule = Schedule(netem.spans(link, microgrids))
+    schedule = FaultSchedule(netem.spans(link, microgrids))
     for change in changes:
         schedule = changed(schedule, change, link, microgrids)
     return schedule
@@ -89,5 +89,5 @@ def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
     rest = [span for span in spans if span.kind not in ("cut", "partition")]
     # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence
     both.sort(key=lambda span: not span.model.hold)
-    joined = Schedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()
+    joined = FaultSchedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()
     return [*rest, *joined]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from netem.receiver import Arrival, Receiver
+from netem.receiver import Receiver
 from netem.schema.change import Change, schedule_of
 from netem.schema.fault import Fault
 from netem.schema.node_fault import NodeFault
@@ -15,7 +15,7 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_descriptions import words
 from scenarios.emulation.link_reports import LinkStatus, encode_statuses, report_data
-from wire.links import CommandEffect
+from wire.links import Arrival, CommandEffect
 from wire.messages import PLANT, Measurement, State
 
 

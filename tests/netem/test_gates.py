@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from netem.channel import Channel
-from netem.fault_schedule import Schedule
+from netem.fault_schedule import FaultSchedule
 from netem.models.cut import Cut
 from netem.models.delay import Constant
 from netem.models.duplicate import Duplicate
@@ -146,11 +146,11 @@ def test_a_flat_schedule_says_at_every_time_what_the_layered_one_says(
     layers: list[tuple[str, float, float, int]], t: float
 ) -> None:
     """Taking precedence away changes nothing that holds, and leaves no two entries of a kind that overlap."""
-    schedule = Schedule(Span(kind, start, end, model) for kind, start, end, model in layers)
+    schedule = FaultSchedule(Span(kind, start, end, model) for kind, start, end, model in layers)
     flat = schedule.flat()
 
-    def holding(spans: Schedule) -> dict[str, object]:
+    def holding(spans: FaultSchedule) -> dict[str, object]:
         return {kind: span.model for kind, span in spans.at(t).active.items()}
 
-    assert holding(Schedule(flat)) == holding(schedule)
+    assert holding(FaultSchedule(flat)) == holding(schedule)
     assert all(one.kind != other.kind or one.to_s <= other.from_s for one, other in pairwise(flat))

@@ -18,11 +18,12 @@ from netem.models.flap import Flap
 from netem.models.loss import GilbertElliott
 from netem.models.rate import Rate
 from netem.models.slots import Slots
-from netem.receiver import Arrival, Receiver
+from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition
 from tests.netem.links import MICROGRIDS, T_C, receiver, steady
+from wire.links import Arrival
 
 PAYLOAD = bytes(range(120))
 
