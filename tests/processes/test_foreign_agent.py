@@ -5,12 +5,9 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
-import msgspec
 import numpy as np
-import pytest
 from msgspec.structs import replace
 
-from plant.realtime.pacer import TOLERATED
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.metrics import sharing_index
 from scenarios.schema import load_scenario
@@ -23,18 +20,16 @@ def test_a_foreign_agent_takes_its_share_in_real_time(tmp_path: Path) -> None:
     """The feeder islands: 60 Hz, MPSI below 0.01 with the foreign one; it leaves, returns, is killed, as ours would."""
     scenario, feeder = load_scenario("islanding")
     scenario = replace(scenario, events=scenario.events[:1])
-    plant, agents = configure(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=7.0), "tcp/127.0.0.1:0")
+    endpoint = "tcp/127.0.0.1:0"
+    plant, agents = configure(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=7.0, speed=0.5), endpoint)
     standing = [agent for agent in agents if agent.name in plant.agents]
     run = Mixed(plant, standing, tmp_path, foreign=("inv2",))
     run.at(2.4, lambda: run.foreigners[0].send_signal(signal.SIGTERM))
     run.at(3.4, lambda: run.start("inv2"))
     run.at(5.6, lambda: run.foreigners[1].kill())
     outcome = run(plant_command=REAL)
+    print(f"pace: {outcome.pacing}")
     assert outcome.broke == ""
-    pacing = outcome.pacing
-    assert pacing is not None
-    if pacing.late > TOLERATED * pacing.steps or pacing.slipped:
-        pytest.skip(f"this machine is too busy for wall-clock time: {msgspec.to_builtins(pacing)}")
     told = [event.text.split(",")[0].split(";")[0] for event in outcome.events if event.subject == "inv2"]
     rows = np.array(run.rows)
     s = np.array([agent.P_rated for agent in standing])

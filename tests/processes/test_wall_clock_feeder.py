@@ -1,6 +1,6 @@
-"""The paper's feeder in wall-clock time, it islands; one inverter leaves and returns, one is new.
+"""The paper's feeder in wall-clock time: it islands, one inverter leaves and returns, one is new.
 
-What is asked of the numbers holds on a machine that keeps pace; one that is too busy for that skips, and says so.
+The run keeps half of real time, so that a machine which does other things beside it still keeps pace.
 """
 
 from __future__ import annotations
@@ -8,11 +8,8 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
-import msgspec
-import pytest
 from msgspec.structs import replace
 
-from plant.realtime.pacer import TOLERATED
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
@@ -30,7 +27,9 @@ class Feeder:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
         self.endpoint = rendezvous()
-        plant, agents = configure(scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end), self.endpoint)
+        plant, agents = configure(
+            scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end, speed=0.5), self.endpoint
+        )
         self.agents = {agent.name: replace(agent, connect=(self.endpoint,)) for agent in agents}
         self.rated = [agent.P_rated for agent in agents]
         standing = [self.agents[name] for name in plant.agents]
@@ -49,13 +48,10 @@ class Feeder:
         self.run.pids.append(child.pid)
 
     def __call__(self) -> Outcome:
-        """Run; skip if the machine was far too busy to keep pace."""
+        """Run to the end, and print the pace for whoever reads of a failure."""
         outcome = self.run(plant_command=REAL)
+        print(f"pace: {outcome.pacing}")
         assert outcome.broke == ""
-        pacing = outcome.pacing
-        assert pacing is not None
-        if pacing.late > TOLERATED * pacing.steps or pacing.slipped:
-            pytest.skip(f"this machine is too busy for wall-clock time: {msgspec.to_builtins(pacing)}")
         return outcome
 
     def restored(self, since: float, of: set[int], until: float = float("inf")) -> float:
