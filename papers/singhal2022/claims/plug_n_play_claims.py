@@ -2,78 +2,59 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-from gridpeers.benchmarks import F_BAND, MPSI_BAND, Claim, Findings, Judge
-from papers.singhal2022.claims.claim_columns import seconds
+from gridpeers.benchmarks import F_BAND, MPSI_BAND, Findings
+from papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
 from papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
 
 LEAVE, RETURN = "leave", "return"
 """Labels of the events in the scenario."""
 
+claims = ExperimentClaims(
+    "plug-n-play", source="section 4, figures of plug-n-play", figure="plug-n-play", cases=("IV",)
+)
+_RESTORED = f"IV: abs(f-60) < {F_BAND:g} Hz and MPSI < {MPSI_BAND:g} within {WITHIN.value:g} s of the "
 
-def _others_carry(found: Findings) -> tuple[bool, str]:
+
+@claims.add(
+    f"IV: the others carry the load of the one that left within {AT_ONCE.value:g} s",
+    events=(LEAVE,),
+)
+def others_carry_its_load(found: Findings) -> tuple[bool, str]:
     t = found.results["IV"][LEAVE].t_load_s
     return t is not None and t <= AT_ONCE.value, f"{LEAVE} {seconds(t)}"
 
 
-def _restored(event: str) -> Judge:
-    def compare(found: Findings) -> tuple[bool, str]:
-        t = found.results["IV"][event].t_restore_s
-        return t is not None and t <= WITHIN.value, seconds(t)
-
-    return compare
+@claims.add(f"{_RESTORED}{LEAVE}", events=(LEAVE,))
+def restored_after_leave(found: Findings) -> tuple[bool, str]:
+    return _restored(found, LEAVE)
 
 
-def _shares_again(found: Findings) -> tuple[bool, str]:
-    """After the return every inverter, the returned one too, is at the same per-unit power."""
-    p = found.results["IV"][RETURN].p.values()
-    spread = max(p) - min(p)
-    return spread < EQUAL.value, f"p from {min(p):.3f} to {max(p):.3f} pu"
+@claims.add(f"{_RESTORED}{RETURN}", events=(RETURN,))
+def restored_after_return(found: Findings) -> tuple[bool, str]:
+    return _restored(found, RETURN)
 
 
-def _voltage(found: Findings) -> tuple[bool, str]:
-    errors = {event: found.results["IV"][event].V_error for event in (LEAVE, RETURN)}
-    shown = ", ".join(f"{event} {error:.4f} pu" for event, error in errors.items())
-    return all(error < V_FIGURE.value for error in errors.values()), shown
+def _restored(found: Findings, event: str) -> tuple[bool, str]:
+    t = found.results["IV"][event].t_restore_s
+    return t is not None and t <= WITHIN.value, seconds(t)
 
 
-SOURCE = "section 4, figures of plug-n-play"
-
-_claim = partial(Claim, source=SOURCE, figure="plug-n-play", cases=("IV",))
-"""What all claims of this experiment have in common."""
-
-PLUG_N_PLAY: tuple[Claim, ...] = (
-    _claim(
-        name="others_carry_its_load",
-        text=f"IV: the others carry the load of the one that left within {AT_ONCE.value:g} s",
-        events=(LEAVE,),
-        judge=_others_carry,
-        measures=(),
-    ),
-    *(
-        _claim(
-            name=f"restored_after_{event}",
-            text=f"IV: abs(f-60) < {F_BAND:g} Hz and MPSI < {MPSI_BAND:g} within {WITHIN.value:g} s of the {event}",
-            events=(event,),
-            judge=_restored(event),
-            measures=(),
-        )
-        for event in (LEAVE, RETURN)
-    ),
-    _claim(
-        name="shares_again",
-        text=f"IV: after the return all powers are equal within {EQUAL.value:g} pu",
-        events=(RETURN,),
-        judge=_shares_again,
-        measures=("p",),
-    ),
-    _claim(
-        name="voltage_likewise",
-        text=f"IV: V_error below {V_FIGURE.value:g} pu after both",
-        events=(LEAVE, RETURN),
-        judge=_voltage,
-        measures=("V_error",),
-    ),
+@claims.add(
+    f"IV: after the return all powers are equal within {EQUAL.value:g} pu",
+    events=(RETURN,),
+    measures=("p",),
 )
-"""Claims of the plug-n-play experiment."""
+def shares_again(found: Findings) -> tuple[bool, str]:
+    p = found.results["IV"][RETURN].p.values()  # the returned inverter's too
+    return max(p) - min(p) < EQUAL.value, f"p from {min(p):.3f} to {max(p):.3f} pu"
+
+
+@claims.add(
+    f"IV: V_error below {V_FIGURE.value:g} pu after both",
+    events=(LEAVE, RETURN),
+    measures=("V_error",),
+)
+def voltage_likewise(found: Findings) -> tuple[bool, str]:
+    errors = {event: found.results["IV"][event].V_error for event in (LEAVE, RETURN)}
+    holds = all(error < V_FIGURE.value for error in errors.values())
+    return holds, listed((event, f"{error:.4f} pu") for event, error in errors.items())

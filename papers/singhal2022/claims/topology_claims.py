@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from statistics import median
 
-from gridpeers.benchmarks import MPSI_BAND, Claim, Findings, Settling, Steady
+from gridpeers.benchmarks import MPSI_BAND, Findings, Settling, Steady
+from papers.singhal2022.claims.experiment_claims import ExperimentClaims
 from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
 
 
@@ -34,10 +34,10 @@ def graph_runs(found: Findings) -> tuple[GraphRun, ...]:
     return found.graphs if isinstance(found, GraphFindings) else ()
 
 
-TREE = 8
-"""Links of a tree of nine inverters: with fewer, no graph is connected."""
+TREE, BEND = 8, int(FEW_LINKS.value)
+"""Links of a tree of nine inverters, with fewer of which no graph is connected; and where the paper's curve bends."""
 
-SOURCE = "section 4, figure of topologies"
+claims = ExperimentClaims("topology", source="section 4, figure of topologies", figure="topology")
 
 
 def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
@@ -54,61 +54,34 @@ def connected(found: Findings) -> tuple[GraphRun, ...]:
     return tuple(run for run in graph_runs(found) if run.connected)
 
 
-def _falls(found: Findings) -> tuple[bool, str]:
+@claims.add("time to MPSI < 0.01 falls with the number of links")
+def more_links_are_faster(found: Findings) -> tuple[bool, str]:
     times = medians(connected(found))
     first, last = min(times), max(times)
-    holds = times[last] < times[int(FEW_LINKS.value)] < times[first]
-    shown = (first, int(FEW_LINKS.value), last)
-    return holds, ", ".join(f"{links} links {times[links]:.2f} s" for links in shown)
+    shown = ", ".join(f"{links} links {times[links]:.2f} s" for links in (first, BEND, last))
+    return times[last] < times[BEND] < times[first], shown
 
 
-def _steepest_at_few(found: Findings) -> tuple[bool, str]:
+@claims.add("it rises slowly from 36 down to about 12 links, and sharply toward 8")
+def steepest_at_few_links(found: Findings) -> tuple[bool, str]:
     times = medians(connected(found))
-    bend, last = int(FEW_LINKS.value), max(times)
-    few = (times[TREE] - times[bend]) / (bend - TREE)
-    many = (times[bend] - times[last]) / (last - bend)
-    return (
-        few > STEEPER.value * many,
-        f"{1e3 * few:.0f} ms a link from {TREE} to {bend}, {1e3 * many:.1f} ms from there to {last}",
-    )
+    last = max(times)
+    few = (times[TREE] - times[BEND]) / (BEND - TREE)
+    many = (times[BEND] - times[last]) / (last - BEND)
+    shown = f"{1e3 * few:.0f} ms a link from {TREE} to {BEND}, {1e3 * many:.1f} ms from there to {last}"
+    return few > STEEPER.value * many, shown
 
 
-def _same_end(found: Findings) -> tuple[bool, str]:
+@claims.add("all connected graphs reach the same steady state")
+def same_steady_state(found: Findings) -> tuple[bool, str]:
     runs = connected(found)
     f_error, MPSI = max(run.steady.f_error_Hz for run in runs), max(run.steady.MPSI for run in runs)
-    text = f"{len(runs)} graphs: abs(f-60) at most {f_error:.4f} Hz, MPSI at most {MPSI:.4f}"
-    return max(f_error, MPSI) < SAME_END.value, text
+    shown = f"{len(runs)} graphs: abs(f-60) at most {f_error:.4f} Hz, MPSI at most {MPSI:.4f}"
+    return max(f_error, MPSI) < SAME_END.value, shown
 
 
-def _none_below(found: Findings) -> tuple[bool, str]:
+@claims.add("below 8 links there is no consensus")
+def none_below_8(found: Findings) -> tuple[bool, str]:
     runs = [run for run in graph_runs(found) if run.links < TREE]
     least = min((run.steady.MPSI for run in runs), default=0.0)
     return bool(runs) and least >= MPSI_BAND, f"{len(runs)} graphs: MPSI at least {least:.3f}"
-
-
-_claim = partial(Claim, source=SOURCE, figure="topology", measures=())
-"""What all claims of this experiment have in common."""
-
-TOPOLOGY: tuple[Claim, ...] = (
-    _claim(
-        name="more_links_are_faster",
-        text="time to MPSI < 0.01 falls with the number of links",
-        judge=_falls,
-    ),
-    _claim(
-        name="steepest_at_few_links",
-        text="it rises slowly from 36 down to about 12 links, and sharply toward 8",
-        judge=_steepest_at_few,
-    ),
-    _claim(
-        name="same_steady_state",
-        text="all connected graphs reach the same steady state",
-        judge=_same_end,
-    ),
-    _claim(
-        name="none_below_8",
-        text="below 8 links there is no consensus",
-        judge=_none_below,
-    ),
-)
-"""Claims of the topologies."""
