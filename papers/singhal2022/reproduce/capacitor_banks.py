@@ -9,14 +9,15 @@ from __future__ import annotations
 import csv
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import gridpeers as gp
 from gridpeers.output_folders import feeder_folder
+from papers.singhal2022.claims.islanding_claims import CASES, EVENTS
 
-CASES = ("I", "II", "III", "IV")
-EVENTS = ("event1", "event2")
+if TYPE_CHECKING:
+    from papers.singhal2022.figures.var_sharing import EventValues
 
 BANKS: dict[str, dict[str, int]] = {
     "300 kvar at 83, 300 at 151 (ours)": {"83": 100, "151": 100},
@@ -27,18 +28,10 @@ BANKS: dict[str, dict[str, int]] = {
 """Variants: kvar a phase, by bus."""
 
 
-@dataclass(frozen=True)
-class BankRun:
-    """MQSI of one case over one variant."""
-
-    variant: str
-    case: str
-    MQSI: Mapping[str, float]
-    """By event."""
-
-
-def study(base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None) -> tuple[BankRun, ...]:
-    """Run all cases over all variants.
+def study(
+    base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None
+) -> dict[str, EventValues]:
+    """Run all cases over all variants, and return their MQSI by variant, case and event.
 
     Parameters
     ----------
@@ -47,7 +40,7 @@ def study(base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], job
     folder : Path
         Takes the variants' feeders.
     tell : Callable[[int, int], None]
-        Told how many runs are done, and of how many.
+        Is called with the number of runs that are done, and of all runs.
     jobs : int or None
         Runs at a time; None is one per core, or one where joblib is not installed.
     """
@@ -59,14 +52,13 @@ def study(base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], job
     tell(0, len(BANKS) * len(CASES))
     varied = {"plant.feeder": list(feeders)}
     rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, progress=tell)
-    found = []
-    for row in rows.to_dict("records"):
+    found: dict[str, dict[tuple[str, str], float]] = {variant: {} for variant in BANKS}
+    for row in rows.fillna(dict.fromkeys((f"{event}.MQSI" for event in EVENTS), 0.0)).to_dict("records"):
         variant = feeders[row["plant.feeder"]]
         if row["status"] == "broke":
             raise RuntimeError(f"capacitor banks, {variant}, case {row['case']}: {row['why']}")
-        MQSI = {event: row[f"{event}.MQSI"] for event in EVENTS}
-        found.append(BankRun(variant, row["case"], {event: 0.0 if x != x else x for event, x in MQSI.items()}))
-    return tuple(found)
+        found[variant] |= {(row["case"], event): row[f"{event}.MQSI"] for event in EVENTS}
+    return dict(found)
 
 
 def _feeder(standard: Path, folder: Path, banks: Mapping[str, int]) -> Path:

@@ -14,7 +14,7 @@ from gridpeers.benchmarks import Findings, judge
 from gridpeers.cli.remaining import Tell
 from gridpeers.theory import Spec
 from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.paper_benchmarks import ISLANDING
+from papers.singhal2022.claims.islanding_claims import CASES, EVENTS
 from papers.singhal2022.reproduce import capacitor_banks as banks
 from papers.singhal2022.reproduce import topology_study as topology
 from papers.singhal2022.reproduce.parts import Part
@@ -102,10 +102,10 @@ class Work:
             return topology.END_S * sum(1 for _ in topology.graphs(9, self.seed))
         scenario = self.spec(part.name)
         if part.name == "var-sharing":
-            return scenario.time.end_s * len(banks.BANKS) * len(banks.CASES)
+            return scenario.time.end_s * len(banks.BANKS) * len(CASES)
         return scenario.time.end_s * len(scenario.cases)
 
-    def _scenario(self, part: Part, tell: Tell, figures: bool) -> _Done:
+    def _scenario(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
         scenario, folder = self._loaded[part.name], self.folder / part.name
         order = list(scenario.cases)
 
@@ -120,7 +120,7 @@ class Work:
                 save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
         return run.findings, run.sha256, run.numbers, folder / "plots"
 
-    def _topology(self, part: Part, tell: Tell, figures: bool) -> _Done:
+    def _topology(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
         folder = self._folder_of(part)
 
         def note(done: int, of: int) -> None:
@@ -134,28 +134,26 @@ class Work:
             save(topologies(found.graphs), folder, part.pictures[0].stem, FORMATS)
         return found, {}, None, folder
 
-    def _banks(self, part: Part, tell: Tell, figures: bool) -> _Done:
+    def _banks(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
         folder, scenario = self._folder_of(part), self._loaded[part.name]
 
         def note(done: int, of: int) -> None:
             tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
 
-        runs = banks.study(scenario, folder, note, self.jobs)
-        paper: dict[tuple[str, str], float] = {}
-        ours: dict[str, dict[tuple[str, str], float]] = {}
-        for one in runs:
-            for event in banks.EVENTS:
-                number = ISLANDING.number(one.case, event, "MQSI")
-                assert number is not None
-                paper[one.case, event] = number.paper
-                ours.setdefault(one.variant, {})[one.case, event] = one.MQSI[event]
+        ours = banks.study(scenario, folder, note, self.jobs)
+        cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
+        paper = {(cell.case, cell.event): cell.paper for cell in cells}
         if figures:
             from gridpeers.figures import save
             from papers.singhal2022.figures.var_sharing import var_sharing
 
-            save(var_sharing(paper, ours, banks.CASES, banks.EVENTS), folder, part.pictures[0].stem, FORMATS)
-        told = [{"variant": one.variant, "case": one.case, "MQSI": dict(one.MQSI)} for one in runs]
-        return Findings(results={}), {}, told, folder
+            save(var_sharing(paper, ours, CASES, EVENTS), folder, part.pictures[0].stem, FORMATS)
+        metrics = [
+            {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
+            for variant, values in ours.items()
+            for case in CASES
+        ]
+        return Findings(results={}), {}, metrics, folder
 
     def _folder_of(self, part: Part) -> Path:
         """Make the folder of a part that is many runs."""
@@ -164,8 +162,8 @@ class Work:
         return folder
 
 
-_Done = tuple[Findings, dict[str, str], Any, Path]
-"""What was found, hashes by case, metrics, and the folder of the figures."""
+_PartOutput = tuple[Findings, dict[str, str], Any, Path]
+"""Findings, hashes by case, metrics, and the folder of the figures."""
 
 _STUDIES = ("topology", "var-sharing")
 """Parts that are many short runs of the islanding, without a folder for each."""
