@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from ping import TICK
 
 from netem.relay import Relay
-from tests.netem_relay.pair import LOST, Pair, free_endpoint, measure
+from tests.processes.relay.relay_pair import LOST, Pair, free_endpoint, measure
 
 P = 0.02
 """Probability that a packet is lost."""

@@ -6,6 +6,7 @@ import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from xdist.remote import Producer
 
 from tests.side_by_side import RealTimeApart, compile_once, give_way
@@ -16,6 +17,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 give_way()
+
+settings.register_profile("gridpeers", deadline=None)
+settings.load_profile("gridpeers")
+"""An example takes the time it takes: a machine that does other things beside it is no defect."""
 
 
 @pytest.fixture

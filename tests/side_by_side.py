@@ -8,14 +8,14 @@ from pathlib import PurePosixPath
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
-REAL_TIME = ("tests/processes", "tests/schedules", "tests/netem_relay")
+REAL_TIME = ("tests/processes/realtime", "tests/schedules", "tests/processes/relay")
 """Folders of tests that keep real time: no two of them run at once, and what runs beside them gives way."""
 
 
 ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022")
 """Folders whose tests look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
-SHORT = ("tests/unit", "tests/netem")
+SHORT = ("tests/unit",)
 """Folders of tests of which each is short: they come last, so that no worker waits for another's long one."""
 
 

@@ -10,7 +10,7 @@ from scenarios.drivers.ports import endpoint
 from scenarios.drivers.process_driver import run_processes
 from scenarios.schema import Event, load_scenario
 from scenarios.schema.configs import configs
-from tests.toy.runs import Rows, first_difference
+from tests.toy.toy_runs import Rows, first_difference
 
 
 @pytest.mark.parametrize(

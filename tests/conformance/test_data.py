@@ -15,8 +15,8 @@ from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
-from tests.toy.runs import FleetRun, first_difference
 from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import FleetRun, first_difference
 from wire.messages import Telemetry
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")

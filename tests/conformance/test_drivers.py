@@ -16,9 +16,9 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
-from tests.toy.runs import FleetRun, Rows, first_difference
 from tests.toy.toy_configs import Moves, toy_configs
 from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_runs import FleetRun, Rows, first_difference
 
 
 @dataclass

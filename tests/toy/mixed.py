@@ -16,7 +16,7 @@ from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Children
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.rendezvous import rendezvous
-from tests.toy.runs import FleetRun
+from tests.toy.toy_runs import FleetRun
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"
 

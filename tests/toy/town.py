@@ -16,8 +16,8 @@ from scenarios.drivers.children import Child
 from scenarios.drivers.rendezvous import rendezvous
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.results.link_records import LinkRecord
-from tests.toy.runs import TOY, exists
 from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import TOY, exists
 from wire.codec import RejectedError, decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys

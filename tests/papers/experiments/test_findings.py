@@ -9,7 +9,7 @@ from papers.singhal2022.experiments.outage_experiments import predicted
 from plant.equipment import F_NOM
 from scenarios.predict.times import predicted_times
 from scenarios.predict.var_response import var_growth
-from tests.papers.experiments.runs import ALL, measured, theory, told
+from tests.papers.experiments.experiment_runs import ALL, measured, theory, told
 
 
 def test_over_late_links_the_graph_with_most_links_restores_f_last_as_predicted() -> None:

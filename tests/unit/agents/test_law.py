@@ -80,7 +80,7 @@ def as_matrix(A: Matrix, leader: NDArray[np.bool_], w: Matrix, T: float, *, kapp
     return np.array([step_all(y, A, leader, np.full(len(A), w @ y), T, kappa_c=kappa_c) for y in unit]).T
 
 
-@settings(deadline=None, max_examples=250)
+@settings(max_examples=250)
 @given(fleets(), PERIODS, st.none() | st.floats(0.0, 3.0).map(lambda x: 10.0**x))
 def test_frequency_and_sharing_are_stable_at_any_period_on_any_connected_graph(
     fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float, kappa_c: float | None
@@ -166,14 +166,14 @@ def nets(draw: st.DrawFn, spread: float) -> Vars:
     return Vars.drawn(A, leader, rating, draw(st.integers(0, 2**32 - 1)), gains)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(nets(spread=3.0), PERIODS)
 def test_voltage_and_vars_are_stable_at_any_period_on_any_connected_graph(net: Vars, T: float) -> None:
     """With ratings up to threefold apart every mode of V_set decays, 1 ms <= T <= 10 s, whatever gains and weights."""
     assert radius(net.affine(T)[0]) < 1.0
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(nets(spread=30.0), PERIODS)
 def test_no_period_makes_vars_grow_where_the_papers_continuous_law_does_not(net: Vars, T: float) -> None:
     """With ratings up to thirtyfold apart every mode of V_set decays that decays in continuous time."""
@@ -182,7 +182,7 @@ def test_no_period_makes_vars_grow_where_the_papers_continuous_law_does_not(net:
     assert slowest < 1e-6 or radius(net.affine(T)[0]) < 1.0
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(nets(spread=3.0), PERIODS, st.floats(0.05, 1.0), st.integers(0, 2**32 - 1))
 def test_voltage_and_vars_rest_where_the_papers_continuous_law_rests(
     net: Vars, T: float, least: float, seed: int
@@ -218,7 +218,7 @@ def test_a_big_inverter_far_from_the_leaders_makes_vars_grow_at_any_period_as_in
         assert [radius(net.affine(T)[0]) < 1.0 for T in (0.002, 0.02, 0.1, 1.0)] == [stable] * 4
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(fleets(), st.integers(0, 2**32 - 1))
 def test_a_short_period_gives_the_papers_derivative(fleet: tuple[Matrix, NDArray[np.bool_], Matrix], seed: int) -> None:
     """For T -> 0 a step is -kappa T (L y + g e), equations (12) and (13)."""
@@ -245,7 +245,7 @@ def test_a_short_period_gives_the_papers_derivative_of_the_voltage_too() -> None
     assert follower == pytest.approx(-(1.5 * d * (z - z_bar)) / 0.5, rel=1e-6)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(fleets(), PERIODS)
 def test_frequency_and_sharing_rest_where_the_papers_law_rests(
     fleet: tuple[Matrix, NDArray[np.bool_], Matrix], T: float

@@ -6,7 +6,7 @@ import random
 from itertools import permutations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.agent import Agent
@@ -138,7 +138,6 @@ def test_a_roster_that_cannot_be_meant_changes_nothing(number: int, roster: dict
     assert lab.take() == []
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_whatever_comes_first_it_is_ready_in_the_end(seed: int, graph: GraphRule) -> None:
     """Tokens and the roster in any order, answers in any order: one Ready, after a proof from each neighbour."""

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from plant.dynamics.inverters import Inverters
-from tests.plant.circuits import GFL_D, GFM_D, S_B, inverter
+from tests.unit.plant.circuits import GFL_D, GFM_D, S_B, inverter
 
 
 @pytest.fixture

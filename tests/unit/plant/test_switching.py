@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from plant.dynamics import Circuit, Dynamics
 from plant.dynamics.inverters import Inverters
-from tests.plant.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, at_rest, loaded, lone, on_stiff_bus, pair
+from tests.unit.plant.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, at_rest, loaded, lone, on_stiff_bus, pair
 
 OMEGA_0 = 2.0 * np.pi * 60.0
 """Nominal speed (rad/s)."""

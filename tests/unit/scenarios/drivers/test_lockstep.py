@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from agents.agent_config import Control, GraphRule
 from plant.lockstep_plant import LockstepPlant
 from scenarios.drivers.inprocess import run_inprocess
-from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_links import Links
 from tests.toy.toy_plant import ToyPlant
 from wire.bounds import LIMIT
 from wire.codec import encode
@@ -46,7 +46,7 @@ def test_a_run_goes_to_its_end() -> None:
     assert rows[-1][1] == pytest.approx(60.0, abs=1e-3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     """Whatever the order in which links deliver, the rows are the same to the last bit, and nothing stalls."""
@@ -59,7 +59,7 @@ def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     assert not run.plant.rejects.counts
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS, st.integers(0, 19), st.sampled_from(["full", "ring", "clustered"]))
 def test_the_run_survives_any_death_at_any_moment(seed: int, steps: int, graph: GraphRule) -> None:
     """An agent that dies once ticks have begun is taken off the roster, which is said; the others go on to the end."""
@@ -121,7 +121,7 @@ def test_who_dies_before_the_start_breaks_the_run() -> None:
     assert not run.agents
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(SEEDS)
 def test_a_second_agent_of_a_name_is_refused(seed: int) -> None:
     """Of two processes that claim a name one takes part; the other is told so by name, and the rows are the same."""
@@ -148,7 +148,7 @@ def test_an_agent_of_an_unknown_name_is_refused() -> None:
     assert run.plant.outcome == ""
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(SEEDS)
 def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
     """Whatever bytes arrive on whatever key, nothing is raised, it is counted, and the rows are the same."""

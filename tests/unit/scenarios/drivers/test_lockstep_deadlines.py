@@ -8,8 +8,8 @@ import msgspec
 
 from agents.lockstep_agent import LockstepAgent
 from plant.lockstep_plant import LockstepPlant
-from tests.toy.links import Links
 from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_links import Links
 from tests.toy.toy_plant import ToyPlant
 from wire.codec import encode
 from wire.messages import State

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.results import metrics
@@ -43,7 +43,6 @@ powers = st.lists(st.floats(min_value=0.01, max_value=1.0), min_size=3, max_size
 droops = st.lists(st.floats(min_value=0.001, max_value=0.1), min_size=3, max_size=3)
 
 
-@settings(deadline=None)
 @given(x=powers, s=powers, m=droops)
 def test_the_sharing_index_is_equation_16_term_by_term(x: list[float], s: list[float], m: list[float]) -> None:
     """The array form equals (16) written as a loop over inverters."""
@@ -57,7 +56,6 @@ def test_the_sharing_index_is_equation_16_term_by_term(x: list[float], s: list[f
     assert index[0] == pytest.approx(total / 3)
 
 
-@settings(deadline=None)
 @given(share=st.floats(min_value=0.01, max_value=1.0), s=powers, m=droops)
 def test_equal_sharing_has_index_zero(share: float, s: list[float], m: list[float]) -> None:
     """Where every m_i x_i / s_i is the same, nothing is left to share, (9)."""
@@ -66,7 +64,6 @@ def test_equal_sharing_has_index_zero(share: float, s: list[float], m: list[floa
     assert metrics.sharing_index(np.array([x]), np.array(s), np.array(m))[0] == pytest.approx(0.0, abs=1e-12)
 
 
-@settings(deadline=None)
 @given(x=powers, factor=st.floats(min_value=1e-3, max_value=1e3))
 def test_the_index_does_not_depend_on_the_unit_of_power(x: list[float], factor: float) -> None:
     """Watts or kilowatts: (16) is the same, as long as ratings are in the same unit."""

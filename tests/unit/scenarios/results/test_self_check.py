@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.commands.test_command import command
+from tests.processes.commands.test_run_command import command
 
 LOSSY = """
 [time]

@@ -132,7 +132,7 @@ def test_switches_may_be_named_by_alias_and_opened_and_closed_again(tmp_path: Pa
 finite = st.floats(min_value=1e-3, max_value=100.0)
 
 
-@settings(max_examples=50, deadline=None)  # each example reads a feeder
+@settings(max_examples=50)  # each example reads a feeder
 @example(k_p=1.0, k_q=1.0, alpha=1.0, seed=0, title='"\\ ä%')
 @given(
     k_p=finite, k_q=finite, alpha=finite, seed=st.integers(0, 2**31), title=st.text(max_size=20).filter(str.isprintable)

@@ -1,0 +1,57 @@
+"""What the theorems of the laws say of agreement, without a plant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from agents.laws.consensus import Consensus
+from agents.laws.event_triggered import EventTriggered
+from agents.laws.finite_time import FiniteTime
+from tests.conformance.laws.agreement import M_P, agreement, laplacian, ring
+
+P_SET = (0.1, 0.9, 0.4, 0.7, 0.2, 0.5)
+
+
+@pytest.mark.parametrize("gamma", [0.3, 0.5, 0.7])
+def test_finite_time_consensus_agrees_before_the_time_of_its_theorem(gamma: float) -> None:
+    """At T* all differences are those of rounding and one step; a linear law of the same gain is far from it."""
+    links, c, T = ring(6), 0.02, 1e-3
+    eigenvalue = np.linalg.eigvalsh(laplacian(links))[1]
+    y0 = M_P * np.array(P_SET)
+    V_0 = 0.5 * np.sum((y0 - y0.mean()) ** 2)
+    limit = 4.0 * V_0 ** ((1.0 - gamma) / 2.0) / (c * (1.0 - gamma) * (4.0 * eigenvalue) ** ((1.0 + gamma) / 2.0))
+
+    y, _ = agreement(lambda: FiniteTime(gamma=gamma, c_P=c), P_SET, links, T, int(limit / T) + 1)
+    linear, _ = agreement(lambda: Consensus(k_p=M_P / c), P_SET, links, T, int(limit / T) + 1)
+    spread = np.ptp(y, axis=1)
+    agreed = T * int(np.argmax(spread < 1e-7))
+
+    assert 0.05 * limit < agreed < limit
+    assert spread[-1] < 1e-7
+    assert np.ptp(linear[-1]) > 100.0 * spread[-1]
+    assert y[-1].mean() == pytest.approx(y0.mean(), rel=1e-9)  # a symmetric law keeps the mean
+
+
+@pytest.mark.parametrize("c_0", [1e-5, 1e-4])
+def test_event_based_broadcasting_agrees_within_its_radius_with_few_messages(c_0: float) -> None:
+    """The radius is norm(L) sqrt(N) c_0 / lambda_2; c_0 = c_1 = 0 tells every step, and more tolerance tells less."""
+    links, T, steps = ring(6), 0.002, 4000
+    eigenvalues = np.linalg.eigvalsh(laplacian(links))
+    radius = eigenvalues[-1] * np.sqrt(6.0) * c_0 / eigenvalues[1]
+
+    y, told = agreement(lambda: EventTriggered(c_0=c_0, c_1=0.0), P_SET, links, T, steps)
+    last = y[-1] - y[-1].mean()
+
+    assert 0.0 < np.linalg.norm(last) <= radius
+    assert 6 <= told < 0.1 * 6 * steps
+    assert told < agreement(lambda: EventTriggered(c_0=0.1 * c_0, c_1=0.0), P_SET, links, T, steps)[1]
+
+
+def test_without_tolerance_every_change_is_told() -> None:
+    """Then event-based broadcasting is the periodic law."""
+    links, T = ring(6), 0.002
+    y, told = agreement(lambda: EventTriggered(c_0=0.0, c_1=0.0), P_SET, links, T, 200)
+
+    assert told == 6 * 200
+    assert np.allclose(y, agreement(Consensus, P_SET, links, T, 200)[0], rtol=0.0, atol=1e-6)

@@ -1,0 +1,115 @@
+"""One law, four carriers, two drivers: the same history to the byte."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gridpeers as gp
+from tests.conformance.laws.consensus_fmi3 import NAME, build, described
+from tests.conformance.laws.law_runs import SHORT, Driver, islanding, written
+
+HERE = Path(__file__).parent
+PATIENT = {"time_limit_s": 30.0}
+"""A busy machine is no reason to fail."""
+PROGRAM = {"command": [sys.executable, str(HERE / "consensus_program.py")]}
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The paper's law, exported as an FMU."""
+    folder = tmp_path_factory.mktemp("fmu")
+    source = str(HERE / "consensus_fmu.py")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", str(folder)], check=True)
+    return {"fmu": "ConsensusFmu.fmu", "folder": str(folder)}
+
+
+@pytest.fixture(scope="module")
+def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The paper's law in C, as an FMU of FMI 3."""
+    cc = shutil.which("cc")
+    if cc is None:
+        pytest.skip("no C compiler is here")
+    folder = tmp_path_factory.mktemp("fmi3")
+    return {"fmu": build(cc, folder), "folder": str(folder)}
+
+
+@pytest.mark.parametrize(
+    ("carrier", "driver"),
+    [("class", "inprocess"), ("program", "inprocess"), ("fmu", "inprocess"), ("fmu", "processes")],
+)
+def test_every_carrier_of_a_law_gives_the_same_history(carrier: str, driver: Driver, fmu: dict[str, str]) -> None:
+    """The paper's law built in, as anybody's class, as a program and as an FMU: one hash, in one process and in ten.
+
+    Processes run a class in tests/unit/gridpeers/test_own_law.py, and a program in test_law_programs.py.
+    """
+    laws: dict[str, Any] = {
+        "class": "agents.laws.consensus:Consensus",
+        "program": PROGRAM | PATIENT,
+        "fmu": fmu | PATIENT,
+    }
+    result = written(laws[carrier], driver=driver)
+
+    assert not list(result.events[result.events["kind"] == "law"]["text"])
+    assert result.sha256 == islanding(short=True).sha256
+
+
+def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp_path: Path) -> None:
+    """It cannot be loaded here: one line says for which it is, before anything starts."""
+    with zipfile.ZipFile(Path(fmu["folder"]) / fmu["fmu"]) as whole, zipfile.ZipFile(tmp_path / "x.fmu", "w") as other:
+        for name in whole.namelist():
+            if not name.startswith("binaries/") or "win64" in name:
+                other.writestr(name, whole.read(name))
+        if not any("win64" in name for name in whole.namelist()):
+            other.writestr("binaries/win64/ConsensusFmu.dll", b"MZ")
+
+    with pytest.raises(gp.ScenarioError, match=r"case.IV.law.fmu: x.fmu is for .*win64.*, and this is "):
+        written({"fmu": "x.fmu", "folder": str(tmp_path)})
+
+
+def test_an_fmu_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None:
+    """A scenario gives them as those of any law; an unknown one is told with what there is."""
+    slower = written({**fmu, "k_p": 0.0014})
+
+    assert slower.sha256 == gp.load("islanding").replace({"gains.k_p": 0.0014, **SHORT}).run("IV").sha256
+    with pytest.raises(gp.ScenarioError, match=re.escape('case.IV.law.k_pp: unknown parameter; did you mean "k_p"?')):
+        written({**fmu, "k_pp": 1.0})
+
+
+def test_an_fmu_of_fmi_3_gives_the_history_of_the_class(fmi3: dict[str, str]) -> None:
+    """With a parameter too, and after the reset that a second time on the grid brings."""
+    k_p = {"gains.k_p": 0.0014}
+    twice = [("event1", 1.0, "open"), ("back", 1.2, "close"), ("event2", 1.4, "open")]
+    events = [{"label": label, "t_s": t, action: ["13-152"]} for label, t, action in twice]
+    scenario = gp.load("islanding").replace({**SHORT, "time.end_s": 1.8, "event": events})
+
+    carried = scenario.replace({"case.IV.law": {**fmi3, **PATIENT, "k_p": 0.0014}}).run("IV")
+    assert carried.sha256 == scenario.replace(k_p).run("IV").sha256
+
+
+@pytest.mark.parametrize(
+    ("kind", "library", "said"),
+    [
+        ("Boolean", b"", f"{NAME}.fmu has own_leader as Boolean; declare it as a scalar Float64"),
+        ("Float64", b"no library", f"law {NAME}.fmu cannot be instantiated: "),
+    ],
+)
+def test_an_fmu_that_cannot_be_a_law_is_told_before_the_run(
+    kind: str, library: bytes, said: str, tmp_path: Path
+) -> None:
+    """A variable of another type, and a library that cannot be loaded: one line at its key, and no traceback."""
+    fmpy, here = pytest.importorskip("fmpy"), Path.cwd()
+    with zipfile.ZipFile(tmp_path / f"{NAME}.fmu", "w") as packed:
+        packed.writestr("modelDescription.xml", described(kind))
+        packed.writestr(f"binaries/{fmpy.platform_tuple}/{NAME}{fmpy.sharedLibraryExtension}", library)
+
+    with pytest.raises(gp.ScenarioError, match=re.escape(f"case.IV.law.fmu: {said}")):
+        written({"fmu": f"{NAME}.fmu", "folder": str(tmp_path)})
+    assert Path.cwd() == here

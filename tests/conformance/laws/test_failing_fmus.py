@@ -1,0 +1,104 @@
+"""An FMU that fails is told in one line, harms no other process, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from agents.agent_config import LawChoice
+from agents.carriers.fmu import FmuLaw, load_problem
+from agents.carriers.fmu_interface import fmu_problems
+from agents.laws.call import LawError, begun, decided
+from tests.conformance.laws.test_programs_end import OWN
+
+NAME = "FailingFmu.fmu"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the FMU is that fails on demand."""
+    place = tmp_path_factory.mktemp("fmu")
+    source = str(Path(__file__).parent / "failing_fmu.py")
+    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", str(place)], check=True)
+    return place
+
+
+@pytest.fixture
+def unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where FMUs are unpacked; it must be empty at the end."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    yield tmp_path
+    assert not list(tmp_path.iterdir())
+
+
+def steps(path: Path, how: float, time_limit: float = 1.0) -> float:
+    """P_set (pu) after two steps of an FMU."""
+    law = FmuLaw(LawChoice(fmu=path.name, folder=str(path.parent), parameters={"how": how}, time_limit=time_limit))
+    try:
+        begun(law, OWN)
+        decided(law, OWN, (), 0.02)
+        return decided(law, OWN, (), 0.02).P_set
+    finally:
+        law.close()
+
+
+@pytest.mark.parametrize(("how", "said"), [
+    (1, r"FailingFmu.fmu did not answer the step at t = 0 s within 0.3 s"),
+    (2, r"step at t = 0 s returned P_set = nan; it must be a finite number \(pu\)"),
+    (3, r"step at t = 0 s raised FMICallException: fmi2DoStep failed with status \d"),
+    (4, r"FailingFmu.fmu ended at the step at t = 0 s with signal 6"),
+])  # fmt: skip
+def test_an_fmu_that_fails_in_a_step_is_told(how: float, said: str, folder: Path, unpacked: Path) -> None:
+    """It hangs, gives nan, fails, or takes its process with it."""
+    with pytest.raises(LawError, match=said):
+        steps(folder / NAME, how, time_limit=0.3)
+
+
+AGENT = """
+import os, signal
+from agents.carriers.fmu import FmuLaw
+from agents.agent_config import LawChoice
+from agents.laws.law import Own
+law = FmuLaw(LawChoice(fmu={name!r}, folder={folder!r}, parameters={{"how": 1}}))
+law.start(Own(*{own!r}))
+os.write(law._group.program.stdin.fileno(), {step!r})
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+STEP = {"type": "step", "own": OWN._asdict(), "neighbours": [], "T": 0.02}
+
+
+def test_an_fmu_that_hangs_does_not_outlive_an_agent_that_is_killed(folder: Path, unpacked: Path) -> None:
+    """Its process holds the pipe until it ends, and what was unpacked is removed before."""
+    script = AGENT.format(name=NAME, folder=str(folder), own=tuple(OWN), step=msgspec.json.encode(STEP) + b"\n")
+    subprocess.run([sys.executable, "-c", script], stderr=subprocess.PIPE, timeout=30.0)
+
+
+def test_what_an_fmu_prints_is_no_answer(folder: Path, unpacked: Path) -> None:
+    """It goes to standard error, and the decision is what it is."""
+    assert steps(folder / NAME, 5) == 0.5
+
+
+def test_an_fmu_that_cannot_be_loaded_is_told(
+    folder: Path, unpacked: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Its library is spoilt, or its file is cut short since the scenario was checked."""
+    place = tmp_path_factory.mktemp("spoilt")
+    with zipfile.ZipFile(folder / NAME) as whole, zipfile.ZipFile(place / NAME, "w") as other:
+        for name in whole.namelist():
+            other.writestr(name, whole.read(name)[:1000] if name.startswith("binaries/") else whole.read(name))
+    with pytest.raises(LawError, match=r"ended at the start at t = 0 s with signal|OSError: "):
+        steps(place / NAME, 0)
+    assert load_problem(place / NAME).startswith(f"law {NAME} cannot be instantiated: ")
+    (place / NAME).write_bytes((folder / NAME).read_bytes()[:-1000])
+    with pytest.raises(LawError, match="BadZipFile"):
+        steps(place / NAME, 0)
+
+    assert re.match(f"{NAME} is no FMU: BadZipFile", fmu_problems(place / NAME, {})[0][1])

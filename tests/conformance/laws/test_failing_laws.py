@@ -1,0 +1,203 @@
+"""A law that fails is named, its agent stands still, and the run goes on; one that cannot work is refused before."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gridpeers as gp
+from tests.conformance.laws.law_runs import SHORT, islanding, written
+from tests.conformance.laws.test_carriers import PROGRAM
+
+BAD = "tests.conformance.laws.bad_laws"
+
+
+@pytest.mark.parametrize(("how", "said"), [
+    ("raises", r"step at t = 1.2 s raised ZeroDivisionError: division by zero"),
+    ("nan", r"step at t = 1.2 s returned P_set = nan; it must be a finite number \(pu\)"),
+    ("nothing", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
+    ("text", r"step at t = 1.2 s returned P_set = '0.5'; it must be a number"),
+    ("a list", r"step at t = 1.2 s returned V_set = \[1.0\]; it must be a number"),
+    ("too great a number", r"step at t = 1.2 s returned P_set = 10{96}...; it must be a number"),
+    ("leaves", r"step at t = 1.2 s raised SystemExit: 3"),
+    ("raises what cannot be told", r"step at t = 1.2 s raised UntoldError: its text cannot be had"),
+    ("returns what cannot be shown", r"step at t = 1.2 s returned a Unshown that cannot be shown; return SetPoints.*"),
+    ("is a generator", r"step at t = 1.2 s returned <generator object Failing.*>>; return .*"),
+    ("sends an array", r"step at t = 1.2 s returned SetPoints.*, which raised ValueError: The truth value of an.*"),
+    ("shares nothing", r"step at t = 1.2 s shares None; share at most 16 numbers by name"),
+    ("shares an array", r"step at t = 1.2 s shares array\(\[1., 2.\]\); share at most 16 numbers by name"),
+    ("hangs in spite of all", r"step at t = 1.2 s took longer than time_limit_s = 0.05 s"),
+    ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.05 s"),
+    ("shares too much", r"step at t = 1.2 s shares .*; share at most 16 numbers by name"),
+    ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
+])  # fmt: skip
+def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
+    """Whatever a step does: one line of every agent in events.csv, primary droop from then on, a history to the end."""
+    result = written({"use": f"{BAD}:Failing", "how": how, "time_limit_s": 0.05})
+    told = result.events[result.events["kind"] == "law"]
+
+    assert list(told["subject"]) == [f"inv{i}" for i in range(1, 10)]
+    assert all(re.search(f"law {BAD}:Failing: {said}; its agent stands still", text) for text in told["text"]), told
+    assert result.history.index[-1] == 1.5
+    assert 59.0 < result.history["inv1"]["f"].iloc[-1] < 60.0
+
+
+@pytest.mark.parametrize(("failure", "said"), [
+    ("rubbish", r"answered the step at t = [\d.]+ s with 'hello', which is none; e.g. \{\"P_set\": 0.5"),
+    ("partial", r"answered a step at t = [\d.]+ s without V_set"),
+    ("nan", r"answered the step at t = [\d.]+ s with '\{\"P_set\": NaN"),
+    ("error", r"says: no idea \(step at t = [\d.]+ s\)"),
+    ("twice", r"printed '\{\"P_set\": 0.6.*' before the step at t = [\d.]+ s; print one line for each that comes"),
+    ("babbles", r"printed '.*' before the step at t = [\d.]+ s; print one line for each that comes"),
+    ("dies", r"ended at the step at t = [\d.]+ s with exit code 7"),
+    ("hangs", r"did not answer the step at t = [\d.]+ s within 0.5 s"),
+])  # fmt: skip
+def test_a_program_that_fails_is_named_and_leaves_no_process(failure: str, said: str) -> None:
+    """Rubbish, a wrong answer, an error of its own, death or silence."""
+    law = {"command": [*PROGRAM["command"], failure], "time_limit_s": 0.5}
+    result = written(law)
+    told = list(result.events[result.events["kind"] == "law"]["text"])
+
+    assert len(told) == 9
+    assert all(re.search(said, text) for text in told), told
+    assert result.history.index[-1] == 1.5
+    assert not [
+        path for path in Path("/proc").glob("[0-9]*/cmdline") if f"consensus_program.py\0{failure}" in _text(path)
+    ]
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(errors="replace")
+    except OSError:  # it has just ended
+        return ""
+
+
+@pytest.mark.parametrize(("law", "said"), [
+    ("dapy", r'case.IV.law: there is no law "dapy"; did you mean "dapi"\? The laws are consensus, dapi, .*module:Name'),
+    ("mine:Mine", r'case.IV.law.*: there is no module "mine" in .* on the Python path'),
+    (f"{BAD}:Fail", rf'case.IV.law.*: {BAD}:Fail: module {BAD} has no "Fail"; did you mean "Failing"\?'),
+    (f"{BAD}:no_class", r"no_class is no law: derive a class from gridpeers.Law"),
+    (f"{BAD}:NoStep", r"NoStep is no law: it has no method step\(self, own, neighbours, T\)"),
+    (f"{BAD}:WrongStep", r"WrongStep is no law: write its method step\(self, own, neighbours, T\): too many"),
+    (f"{BAD}:Unmakeable", r"Unmakeable cannot be made: RuntimeError: no licence"),
+    ({"use": f"{BAD}:NeverMade", "time_limit_s": 0.01}, r"cannot be made: its __init__ took longer than 0.1 s, ten t"),
+    ({"use": f"{BAD}:NeverClosed", "time_limit_s": 0.01}, r"the close of .*:NeverClosed failed: it took longer than t"),
+    (f"{BAD}:NamedAsAKey", r"is no law: its parameter folder cannot be given, as a scenario has the key folder for s"),
+    (f"{BAD}:NamedAsAMethod", r"is no law: its start is no method; give the parameter another name"),
+    ({"use": "dapi", "k": 10**30}, r"case.IV.law.k: a whole number has at most 64 bits; got 1000"),
+    ({"command": ["ls"], "k": float("nan")}, r"case.IV.law.k: must be a finite number, got nan"),
+    ({"use": f"{BAD}:Failing", "gain": 500}, r"case.IV.law.gain: must be from 0 to 100 1/s, got 500"),
+    ({"use": f"{BAD}:Failing", "gian": 5}, r'case.IV.law.gian: unknown parameter; did you mean "gain"\?'),
+    ({"use": "dapi", "k": "fast"}, r'case.IV.law.k: must be a number, got "fast"'),
+    ({"use": "dapi", "time_limit_s": 0}, r"case.IV.law.time_limit_s: must be from 0.001 to 60 s, got 0"),
+    ({"use": "consensus", "k_p": 1.0}, r"case.IV.law.k_p: the parameters of .consensus. are those of \[gains\]"),
+    ({}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
+    ({"gain": 1.0}, r'case.IV.law: needs one of use, command, fmu; got none; e.g. law = "mine:Mine"'),
+    ({"use": "dapi", "fmu": "x.fmu"}, r"case.IV.law: needs one of use, command, fmu; got use and fmu"),
+    ({"command": ["./nothing"]}, r"case.IV.law.command: there is no program ./nothing, neither beside"),
+    ({"command": ["ls", "a\0"]}, r"case.IV.law.command: has the character 0 in it"),
+    ({"command": ["ls"], "folder": "/nowhere"}, r"case.IV.law.folder: there is no folder /nowhere"),
+    ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: P_set_min = 1 pu is above P_set_max = 0.5"),
+    ({"command": ["ls"], "P_set_max": "much"}, r'case.IV.law.P_set_max: must be a number, got "much"'),
+    ({"command": "./nothing"}, r"case.IV.law.command: must be a list of texts, the program first"),
+    ({"fmu": "x.fmu"}, r"case.IV.law.fmu: there is no file x.fmu; write its path, seen from the scenario"),
+    ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
+    (3, r"case.IV.law: must be a text in quotes or a table, got 3"),
+])  # fmt: skip
+def test_a_law_that_cannot_work_is_refused_before_anything_starts(law: Any, said: str) -> None:
+    """Each problem with its key, and what would be right."""
+    with pytest.raises(gp.ScenarioError) as refused:
+        gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
+
+    assert len(refused.value.problems) == 1
+    assert re.search(said, refused.value.problems[0]), refused.value.problems
+
+
+def test_a_program_may_have_any_parameter() -> None:
+    """Also one that is called as something else of the class Law."""
+    gp.load("islanding").replace({"case.IV.law": {"command": ["ls"], "source": 1, "step": 2, "k": 3}, **SHORT})
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("print(1)\n", r"\./law has no first line such as #!/usr/bin/env python3, and is no compiled program; write one"),
+    ("#!/nowhere/python\n", r"\./law asks in its first line for /nowhere/python, and there is no such program"),
+    ("#!/usr/bin/env pithon3\n", r"\./law asks in its first line for pithon3, which is not on the PATH"),
+    ("#!/bin/sh\r\n", r"\./law has lines that end as those of Windows"),
+])  # fmt: skip
+def test_a_program_that_the_system_cannot_run_is_refused(text: str, said: str, tmp_path: Path) -> None:
+    """Its first line says it, before anything starts."""
+    file = tmp_path / "law"
+    file.write_bytes(text.encode())
+    file.chmod(0o755)
+
+    with pytest.raises(gp.ScenarioError, match=said):
+        gp.load("islanding").replace({"case.IV.law": {"command": ["./law"], "folder": str(tmp_path)}})
+
+
+def test_all_problems_of_a_law_come_at_once() -> None:
+    """A key of the table itself hides none of the law's parameters."""
+    law = {"use": "dapi", "time_limit_s": 0, "kk": 1, "k": -1.0}
+    with pytest.raises(gp.ScenarioError) as refused:
+        gp.load("islanding").replace({"case.IV.law": law, **SHORT}).check()
+
+    assert [line.split(": ")[-2].split()[-1] for line in refused.value.problems] == [
+        f"case.IV.law.{key}" for key in ("time_limit_s", "kk", "k")
+    ]
+
+
+def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
+    """They would do nothing, and nobody would know."""
+    with pytest.raises(gp.ScenarioError, match=r'\[gains\] are those of the law "consensus", and this case has dapi'):
+        gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
+    weights = {"weights": "degree-normalised"}
+    with pytest.raises(gp.ScenarioError, match=r'case.IV.handling.weights: weights other than "paper" are the law'):
+        gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.handling": weights}).check()
+
+
+def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:
+    """`mine:Mine` is the class Mine of mine.py in the folder of the scenario file, wherever the run is started."""
+    (tmp_path / "my_law.py").write_text(
+        "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n"
+        "        return gp.SetPoints(own.P_set, own.V_set)\n"
+    )
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        gp.load("islanding").replace({**SHORT}).to_toml().replace('law = "consensus"', 'law = "my_law:Hold"')
+    )
+
+    assert gp.load(file).run("IV").sha256 != islanding(short=True).sha256
+
+
+def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Path) -> None:
+    """A script without the guard of its main part; it stands outside of the tests, which pytest imports."""
+    (tmp_path / "leaving_law.py").write_text("import sys\nsys.exit(3)\n")
+
+    with pytest.raises(gp.ScenarioError, match="importing leaving_law failed: SystemExit: 3"):
+        written({"use": "leaving_law:Mine", "folder": str(tmp_path)})
+
+
+def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
+    """Who changes a law between two runs of a notebook sees the new one, in process as with processes."""
+    text = "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n        return "
+    module = tmp_path / "edited_law.py"
+    law = {"use": "edited_law:Hold", "folder": str(tmp_path)}
+    module.write_text(text + "gp.SetPoints(own.P_set, own.V_set)\n")
+    first = written(law)
+    module.write_text(text + "gp.SetPoints(0.9 * own.P_set, own.V_set)\n")
+    os.utime(module, ns=(0, 10**18))
+
+    assert written(law).sha256 != first.sha256
+
+
+def test_a_module_of_another_scenario_is_not_taken_for_ones_own(tmp_path: Path) -> None:
+    """Two projects may each have a module of the same name; none finds the other's by chance."""
+    (tmp_path / "theirs.py").write_text("from tests.conformance.laws.bad_laws import Failing\n")
+    written({"use": "theirs:Failing", "folder": str(tmp_path), "how": "raises"})
+
+    with pytest.raises(gp.ScenarioError, match=r'there is no module "theirs" in .* on the Python path'):
+        written({"use": "theirs:Failing", "folder": str(tmp_path.parent), "how": "raises"})

@@ -1,0 +1,97 @@
+"""The complete programs of docs/law-programs.md: the paper's law in C and in Python, without anything of ours."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from agents.laws.consensus import Consensus
+from agents.laws.law import Neighbour, Own
+from tests.conformance.laws.law_runs import Driver, islanding, written
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "examples" / "law-program"
+PAGE = (ROOT / "docs" / "law-programs.md").read_text()
+PYTHON = (sys.executable, str(EXAMPLES / "law.py"))
+
+
+@pytest.fixture(scope="module")
+def in_c(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """The program in C, built as the page says, with all warnings as errors."""
+    cc = shutil.which("cc")
+    if cc is None:
+        pytest.skip("no C compiler is here")
+    program = tmp_path_factory.mktemp("law") / "law"
+    options = re.search(r"^cc (.*) law\.c -o law -lm$", PAGE, re.MULTILINE)
+    assert options is not None
+    source = str(EXAMPLES / "law.c")
+    subprocess.run(
+        [cc, *options[1].split(), "-Wall", "-Wextra", "-Werror", source, "-o", str(program), "-lm"], check=True
+    )
+    return (str(program),)
+
+
+@pytest.fixture(params=["C", "Python"])
+def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
+    """Each of the two programs."""
+    return PYTHON if request.param == "Python" else request.getfixturevalue("in_c")
+
+
+def answers(command: tuple[str, ...], *lines: str) -> list[dict[str, object]]:
+    """What a program answers to some lines."""
+    done = subprocess.run(command, input="".join(f"{line}\n" for line in lines), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_the_program_in_python_gives_the_history_of_the_class() -> None:
+    """To the byte."""
+    assert written({"command": list(PYTHON), "k_p": 0.0007}).sha256 == islanding(short=True).sha256
+
+
+@pytest.mark.parametrize("driver", ["inprocess", "processes"])
+def test_the_program_in_c_gives_the_history_of_the_class(in_c: tuple[str, ...], driver: Driver) -> None:
+    """To the byte, in one process and in ten."""
+    assert written({"command": list(in_c), "k_p": 0.0007}, driver=driver).sha256 == islanding(short=True).sha256
+
+
+def test_the_lines_on_the_page_are_what_is_said(command: tuple[str, ...]) -> None:
+    """Both programs answer the page's lines as the page does, and the lines have every field."""
+    start, ready, step, decision = re.findall(r"```json\n(.*)\n```", PAGE)
+
+    asked = json.loads(step)
+    law = Consensus(**json.loads(start)["parameters"])
+    decided = law.step(Own(**asked["own"]), [Neighbour(**other) for other in asked["neighbours"]], asked["T"])
+
+    assert answers(command, start, step) == [json.loads(ready), json.loads(decision)]
+    assert {"P_set": decided.P_set, "V_set": decided.V_set} == json.loads(decision)
+    assert tuple(json.loads(start)["own"]) == tuple(json.loads(step)["own"]) == Own._fields
+    assert tuple(json.loads(step)["neighbours"][0]) == Neighbour._fields
+
+
+def test_a_program_begins_anew_with_other_parameters(command: tuple[str, ...]) -> None:
+    """A second start takes back the parameters of the first; kappa_c and limits count."""
+    start, _, step, decision = re.findall(r"```json\n(.*)\n```", PAGE)
+    asked = json.loads(start)
+    other = json.dumps(asked | {"parameters": {"P_set_max": 0.65, "kappa_c": 12.0, "V_full": 0.02}})
+    _, limited, _, again = answers(command, other, step, start, step)
+
+    assert limited["P_set"] == 0.65
+    assert limited["V_set"] != json.loads(decision)["V_set"]
+    assert again == json.loads(decision)
+
+
+def test_a_line_without_numbers_is_an_error(in_c: tuple[str, ...]) -> None:
+    """The program in C, whose reader of JSON is its own, answers nonsense with an error and goes on."""
+    start, _, step, decision = re.findall(r"```json\n(.*)\n```", PAGE)
+    odd = ['{"type":"step"}', '{"type":"step","own":{"P_set":"x"},"neighbours":[{}]}', "[", '{"a', "{}", ""]
+    got = answers(in_c, start, *odd, step)
+
+    assert [sorted(answer) for answer in got[1:-1]] == [["error"]] * len(odd)
+    assert got[-1] == json.loads(decision)

@@ -1,0 +1,235 @@
+"""Real processes that are killed, frozen, doubled and orphaned. The plant is a toy; all else is the real thing."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic
+
+import msgspec
+import pytest
+
+from scenarios.drivers.process_driver import run_processes
+from scenarios.drivers.rendezvous import rendezvous
+from tests.toy import toy_plant
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_runs import FleetRun
+from wire.driver.session import SessionError
+
+LONG = 2000.0
+"""An end (s) that no test waits for."""
+
+
+def last_P_set(row: tuple[float, ...], inverter: int) -> float:
+    """P_set (W) of an inverter in a row."""
+    return row[5 + 6 * (inverter - 1)]
+
+
+def killed_after(name: str, text: str) -> float:
+    """The time (s) that a message about somebody who was killed names."""
+    match = re.match(rf"{name} was killed by SIGKILL after t = ([0-9.]+) s", text)
+    assert match is not None, text
+    return float(match[1])
+
+
+def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Path) -> None:
+    """Kill -9: the run reaches its end, says who died and when, and is not reproducible; the rest restore 60 Hz."""
+    run = FleetRun(*toy_configs(4, end=6.0), tmp_path)
+    run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
+    outcome = run()
+    deaths = [event for event in outcome.events if event.kind == "roster"]
+
+    assert outcome.broke == ""
+    assert not outcome.reproducible
+    assert [event.subject for event in deaths] == ["inv3"]
+    assert "its inverter stays on primary droop at its last set-points" in deaths[0].text
+    assert run.rows[-1][0] == 6.0
+    assert run.rows[-1][1] == pytest.approx(60.0, abs=0.01)
+    assert last_P_set(run.rows[-1], 3) == last_P_set(run.rows[round(deaths[0].t / 0.02) + 2], 3)
+    assert len(outcome.notes) == 1
+    assert 0.4 <= killed_after("inv3", outcome.notes[0]) <= deaths[0].t + 0.2
+    assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
+
+
+def test_a_plant_killed_in_mid_run_ends_it(tmp_path: Path) -> None:
+    """Kill -9: the run ends by itself within seconds, and says who died, when, and where its log lies."""
+    run, killed = FleetRun(*toy_configs(4, end=LONG), tmp_path), []
+
+    def kill() -> None:
+        run.child("plant").signal(signal.SIGKILL)
+        killed.append(monotonic())
+
+    run.at(0.4, kill)
+    outcome = run()
+
+    assert monotonic() - killed[0] < 5.0
+    assert 0.4 <= killed_after("plant", outcome.broke) < LONG
+    assert outcome.broke.endswith(f"Whole log: {tmp_path / 'plant.log'}")
+    assert not outcome.reproducible
+
+
+def test_a_frozen_agent_is_named_by_the_deadline(tmp_path: Path) -> None:
+    """SIGSTOP: who neither answers nor dies is named, with its last tick and its last sign of life."""
+    run = FleetRun(*toy_configs(3, end=LONG, deadline=1.0), tmp_path)
+    run.at(0.4, lambda: run.child("inv2").signal(signal.SIGSTOP))
+    outcome = run()
+
+    assert outcome.broke.startswith("plant: no State(")
+    assert ") from inv2 within 1 s; last heard of inv2: tick " in outcome.broke
+    if "inv1" in outcome.broke:  # frozen between two sends, inv2 keeps the others waiting, who are missed as well
+        assert ") from inv3 within 1 s" in outcome.broke
+
+
+def test_a_frozen_plant_is_noticed(tmp_path: Path) -> None:
+    """SIGSTOP: a plant that is silent for longer than its own deadline is ended."""
+    run = FleetRun(*toy_configs(2, end=LONG, deadline=0.5), tmp_path)
+    run.at(0.4, lambda: run.child("plant").signal(signal.SIGSTOP))
+    outcome = run()
+
+    assert outcome.broke.startswith("nothing was heard of the plant for 1.75 s, so the run was ended: plant still runs")
+
+
+def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
+    """An agent that dies before t = 0 is reported with its exit status, its last lines and its log."""
+    plant, agents = toy_configs(3)
+    bad = msgspec.structs.replace(agents[1], listen=("tcp/256.0.0.1:0",))
+    outcome = FleetRun(plant, (agents[0], bad, agents[2]), tmp_path)()
+
+    assert outcome.broke.startswith("inv2 exited with status 2 before t = 0. Its last lines:")
+    assert "cannot open a Zenoh session (listening on tcp/256.0.0.1:0)" in outcome.broke
+
+
+def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
+    """What is wrong with the plant's configuration is in its last lines."""
+    plant, agents = toy_configs(2)
+    outcome = FleetRun(msgspec.structs.replace(plant, end=0.41), agents, tmp_path)()
+
+    assert outcome.broke.startswith("plant exited with status 2 before t = 0. Its last lines:")
+    assert "end: must be a positive multiple of the control period 0.02 s, got 0.41 s" in outcome.broke
+
+
+def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
+    """A namesake started in mid-run leaves with status 3 and a word why; the run does not notice."""
+    endpoint = rendezvous()
+    plant, agents = toy_configs(3, end=LONG)
+    run, refused = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
+
+    def start_namesake() -> None:
+        config = msgspec.structs.replace(agent_config("inv2"), connect=(endpoint,))
+        namesake = [sys.executable, "-P", "-m", "agents"]
+        refused.append(subprocess.run(namesake, input=msgspec.json.encode(config), capture_output=True, timeout=20))
+
+    run.at(0.2, start_namesake)
+    run.at(0.2, lambda: run.child("plant").signal(signal.SIGTERM))
+    outcome = run()
+
+    assert refused[0].returncode == 3
+    assert b"inv2: another agent of this name takes part in the run already" in refused[0].stderr
+    assert [event for event in outcome.events if event.kind == "roster"] == []
+    assert outcome.broke == "the plant was asked to leave: SIGTERM"
+
+
+def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
+    """The error names the endpoint and what to do; no process, no log."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
+        plant, agents = toy_configs(2)
+        run = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
+
+        with pytest.raises(SessionError, match=r"listen: cannot use tcp/127.* in use; choose another port, or 0"):
+            run()
+    assert run.children is None
+    assert not (tmp_path / "log").exists()
+
+
+PARENT = """
+import json, sys
+from pathlib import Path
+from scenarios.drivers.process_driver import run_processes
+from tests.toy.toy_configs import toy_configs
+plant, agents = toy_configs(3, end=2000.0)
+def told(children):
+    pids = [child.pid for child in children]
+    def take(telemetry):
+        print(json.dumps(pids), flush=True)
+    return take
+takes = []
+run_processes(plant, agents, Path(sys.argv[1]), lambda telemetry: takes[0](telemetry),
+              on_start=lambda children: takes.append(told(children)), plant_command=(sys.argv[2],))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="watches processes that are not its children by pidfd")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_the_end_of_the_parent_is_the_end_of_all(number: signal.Signals, tmp_path: Path) -> None:
+    """Ctrl-C, a polite or a rude end of the parent leave no process."""
+    command = [sys.executable, "-c", PARENT, str(tmp_path), toy_plant.__file__]
+    root = Path(toy_plant.__file__).parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=root) as parent:
+        assert parent.stdout is not None
+        pids = json.loads(parent.stdout.readline())
+        watched = {os.pidfd_open(pid): pid for pid in pids}
+        parent.send_signal(number)
+        parent.stdout.close()
+        until = monotonic() + 10.0
+        left = dict(watched)
+        while left and monotonic() < until:
+            ended, _, _ = select.select(list(left), [], [], until - monotonic())
+            left = {fd: pid for fd, pid in left.items() if fd not in ended}
+        for fd in watched:
+            os.close(fd)
+        parent.wait(timeout=10.0)
+
+    assert len(pids) == 4
+    assert left == {}
+
+
+@pytest.mark.parametrize("module", ["agents", "plant"])
+def test_a_bad_configuration_is_refused(module: str) -> None:
+    """Status 2 and what is wrong where, as msgspec says it."""
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", module], input=b'{"run": 1}', capture_output=True, timeout=30, check=False
+    )
+
+    assert done.returncode == 2
+    assert b"Expected `str`, got `int` - at `$.run`" in done.stderr
+
+
+def test_an_agent_alone_gives_up() -> None:
+    """Without a rendezvous it says after its deadline what it waited for and where."""
+    config = msgspec.structs.replace(agent_config("inv1", deadline=0.2), connect=("tcp/127.0.0.1:9",))
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "agents"],
+        input=msgspec.json.encode(config),
+        capture_output=True,
+        timeout=30,
+        check=False,
+    )
+
+    assert done.returncode == 3
+    assert b"inv1: no sign of life from plant within 0.4 s" in done.stderr
+    assert b"is the plant of run toy running at tcp/127.0.0.1:9?" in done.stderr
+
+
+def test_an_agent_imports_nothing_heavy() -> None:
+    """Nine agents start in the time of one: neither numpy nor numba are in them."""
+    heavy = ("numpy", "scipy", "numba", "matplotlib", "asyncio")
+    code = f"import sys, agents.agent_process, wire.driver.process; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+
+    assert done.stdout == "[]\n"
+
+
+def test_start_order_must_name_everybody(tmp_path: Path) -> None:
+    """A start order that forgets somebody is an error of the caller."""
+    plant, agents = toy_configs(2)
+
+    with pytest.raises(ValueError, match="start_order: must name plant and every agent once, got plant, inv1"):
+        run_processes(plant, agents, tmp_path, lambda telemetry: None, start_order=["plant", "inv1"])

@@ -1,0 +1,219 @@
+"""Runs by hand with the real commands, one terminal each, in the order of people."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import invoke
+from tests.processes.commands.test_run_command import command
+from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of
+
+EVENTS = """
+[time]
+end_s = 3600.0
+[[event]]
+label = "early"
+t_s = 0.2
+open = ["13-152"]
+[[event]]
+label = "late"
+t_s = 0.6
+open = ["60-160"]
+[case.IV]
+secondary = "all"
+graph = "full"
+"""
+"""Two events: the window of the first is over when the second happens, that of the second never is."""
+
+
+def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:
+    """Start the plant; it has begun when this returns, unless it waits for agents."""
+    endpoint = desk.options[-1]
+    plant = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", endpoint, "--wait", f"{wait:g}", *words)
+    plant.expect("t = 0; speed" if wait == 0.0 else "waits up to")
+    return plant
+
+
+def test_terminals_in_the_order_of_people(desk: Desk) -> None:
+    """An agent before the plant, one after, one that is stopped and comes back, a switch, a look, and the end.
+
+    The plant says for whom it waits and how long, and starts without those who have not come.
+    """
+    early = desk.open("agent", "inv2")
+    early.expect("inv2: seeks the plant of run lab at tcp/127.0.0.1:")
+    early.expect("inv2: no plant yet of run lab at .*; 2 of 60 s waited")
+    plant = plant_of(desk, "--out", "here", wait=3.0)
+    plant.expect("inv2 joined")
+    plant.expect("started without the agents of inv1, inv3, inv4, ")
+    early.expect("inv2: joins at t = ")
+    late = desk.open("agent", "inv1")
+    late.expect("inv1: joins at t = ")
+    watch = desk.open("watch")
+    watch.expect(r"inv1 .* inv2 ")
+
+    code, text = desk.type("stop", "inv2")
+    assert (code, early.end()) == (0, 0)
+    assert text.startswith("inv2 was asked to leave at t = ")
+    plant.expect("inv2 left; its inverter is off the network")
+    watch.expect(r"inv2 +- .* no agent")
+
+    again = desk.open("agent", "inv2")
+    again.expect("inv2: joins at t = ")
+    watch.expect(r"inv1 .* inv2 ")
+    code, text = desk.type("event", "open", "13-152")
+    assert code == 0
+    plant.expect(r"\d s  switch 13-152 opened")
+    watch.expect(r"inv1 +inv1 ")
+    code, text = desk.type("status")
+    assert code == 0
+    assert re.match(r"run lab   t = \d+\.\d\d s   speed 1   pace: .* of steps in time .*   islands: inv1\n", text)
+    assert re.search(r"\n +\d+\.\d\d s  switch 13-152 opened\n", text)
+    assert re.search(r"\ninv9 +- .* no agent\n", text)
+
+    code, text = desk.type("down")
+    assert code == 0
+    assert text.startswith("run lab ends at t = ")
+    assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
+    plant.expect("NOTE  case IV: events that the scenario does not have: by hand at .* s: switch 13-152 opened")
+    metrics = json.loads((desk.folder / "here" / "metrics.json").read_text())
+    by_hand = metrics["by_hand"]
+    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in by_hand["departures"][-4:]] == [
+        *("inv1 joined", "inv2 left", "inv2 joined", "switch 13-152 opened")
+    ]
+    ((label, window),) = by_hand["windows"].items()
+    assert window == {"t_s": window["t_s"], "end_s": by_hand["ended_s"], "what": "switch 13-152 opened"}
+    measured = metrics["cases"]["IV"][label]
+    assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
+
+
+def test_what_befalls_an_agent_or_the_plant_is_told_in_the_terminals(desk: Desk) -> None:
+    """SIGSTOP, kill -9 and Ctrl-C of an agent, a spare one that comes, kill -9 and Ctrl-C of the plant.
+
+    Who is frozen is left out and welcome again; who was killed can be started again at once; who is asked to leave
+    takes its inverter off the network; agents stay when their plant goes, and join its next life.
+    """
+    plant = plant_of(desk)
+    first, second = desk.open("agent", "inv1"), desk.open("agent", "inv2")
+    for agent in (first, second):
+        agent.expect("joins at t = ")
+    watch = desk.open("watch")
+    watch.expect(r"inv1 .* inv2 ")
+    second.signal(signal.SIGSTOP)
+    watch.expect(r"inv1 .*without inv2|inv2 .*(silent for|no agent)")
+    second.signal(signal.SIGCONT)
+    watch.expect(r"inv1 .* inv2 ")
+
+    second.signal(signal.SIGKILL)
+    plant.expect("inv2 died; its inverter stays on primary droop at its last set-points")
+    again = desk.open("agent", "inv2")
+    again.expect("inv2: joins at t = ")
+    plant.expect("inv2 joined")
+    desk.open("agent", "inv10").expect("inv10: joins at t = ")
+    plant.expect("inv10 connected")
+    watch.expect(r"inv1 .* inv2,10 ")
+    again.signal(signal.SIGINT)
+    assert again.end() == 130
+    plant.expect("inv2 left; its inverter is off the network")
+
+    plant.signal(signal.SIGKILL)
+    first.expect("inv1: the plant is gone; holds, and seeks it again")
+    plant = plant_of(desk)
+    first.expect("inv1: joins at t = ")
+    plant.signal(signal.SIGINT)
+    assert plant.end() == 130
+    first.expect("inv1: the plant is gone; holds, and seeks it again")
+
+
+def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
+    """An agent without inverter, a second one of a name, no such switch, no such run, one that is there: exit 2."""
+    plant_of(desk)
+    desk.open("agent", "inv2").expect("inv2: joins at t = ")
+    endpoint = desk.options[-1]
+    agents = [desk.open("agent", name) for name in ("inv77", "inv2")]
+    second = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", endpoint)
+    said = {
+        'no inverter "inv77" in run lab at .*; inverters are inv1, .*, inv9, inv10': (agents[0].end(), agents[0].text),
+        "inv2: another agent of this name takes part in run lab already": (agents[1].end(), agents[1].text),
+        'no agent "inv9" is running; running are: inv2': desk.type("stop", "inv9"),
+        'switch "13-15": no such switch': desk.type("event", "open", "13-15"),
+        rf"no plant of run other at {endpoint} within 1 s \(runs there: lab\)": invoke(
+            "status", "--run", "other", "--connect", endpoint, "--wait", "1"
+        ),
+    }
+    for what, (code, text) in said.items():
+        errors = [line for line in text.splitlines() if line.startswith("gridpeers: ")]
+
+        assert code == 2, text
+        assert len(errors) == 1, text
+        assert re.search(what, errors[0])
+        assert "Traceback" not in text
+    assert second.end() == 2
+    assert f"--listen: run lab is there already, at {endpoint}; gridpeers status --run lab " in second.text
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
+@pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGTERM", 143)])
+def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, status: int) -> None:
+    """The plant and nine agents at once; `down` or SIGTERM ends them all, with numbers beside the history."""
+    (desk.folder / "events.toml").write_text(EVENTS)
+    up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
+    for _ in range(9):
+        up.expect("inv[1-9] joined")
+    children = children_of(up.pid)
+    assert len(children) == 10
+    desk.open("watch").expect(r"inv1 .* inv2-9 ")
+    up.expect("0.60 s  switch 60-160 opened")
+
+    if by == "down":
+        assert desk.type("down")[0] == 0
+    else:
+        up.signal(signal.Signals[by])
+
+    assert up.end() == status
+    up.expect(r"ended at t = .* steps")
+    for child in children:
+        with pytest.raises(ProcessLookupError):
+            os.kill(child, 0)
+    up.expect(r"NOTE  case IV: ended at .* s, before the end of late \(0.6 to 3600 s\): they have no numbers")
+    here = desk.folder / "here"
+    assert (here / "status.txt").read_text() == "complete\n"
+    assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv"]
+    metrics = json.loads((here / "metrics.json").read_text())
+    assert metrics["by_hand"] | {"ended_s": 0.0} == {
+        **{"ended_s": 0.0, "windows": {}, "too_short": []},
+        **{"not_reached": ["late"], "disturbed": [], "departures": []},
+    }
+    early = metrics["cases"]["IV"]["early"]
+    assert early["f_error_Hz"] is None  # 0.4 s after the event nothing is steady yet
+    assert "last mean" in early["reasons"]["f_error_Hz"]
+
+
+def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> None:
+    """They serve until the run is ended, as if somebody read, and complain nowhere."""
+    endpoint = desk.options[-1]
+    reading, closed_pipe = os.pipe()
+    os.close(reading)
+    plant = ["plant", "calm.toml", "--run", "lab", "--listen", endpoint, "--wait", "0"]
+    agent = ["agent", "inv1", "--run", "lab", "--connect", endpoint]
+    started = [
+        subprocess.Popen(command(*words), cwd=desk.folder, stdout=closed_pipe, stderr=subprocess.PIPE, text=True)
+        for words in (plant, agent)
+    ]
+    os.close(closed_pipe)
+    try:
+        desk.open("watch", "--wait", f"{DEADLINE:g}").expect(r"inv1 +grid +\d")
+        code, text = desk.type("down")
+
+        assert code == 0, text
+        assert [(process.communicate(timeout=DEADLINE)[1], process.returncode) for process in started] == [("", 0)] * 2
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()

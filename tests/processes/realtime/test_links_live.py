@@ -1,0 +1,254 @@
+"""Emulated links in wall-clock time, with real processes: commanded while the run goes on, and as a scenario says."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+import signal
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from netem.ledger import LinkTrace, Outcome
+from netem.models.delay import Normal
+from netem.schema.change import Heal, replayed
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.emulation.link_command import LinkCommand
+from scenarios.results.link_records import LinkRecord
+from scenarios.schema import load_scenario
+from tests.processes.terminals import Desk
+from tests.toy.town import Town
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_runs import FleetRun
+
+FOUR = ("inv1", "inv2", "inv3", "inv4")
+MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1", "inv4": "mg2"}
+T_C = 0.02
+
+
+def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition, ...]) -> EmulationConfig:
+    """What processes of the toy run are told."""
+    return EmulationConfig(netem=Netem(seed=5, nodes=nodes, **netem), microgrids=MICROGRIDS, real_nodes=True)  # type: ignore[arg-type]
+
+
+def verdicts(trace: LinkTrace) -> list[tuple[float, Outcome]]:
+    """Of each message of a link when it was sent (s) and what became of it; each was judged once."""
+    assert len({*zip(trace.seq, trace.t, strict=True)}) == len(trace.seq)
+    return list(zip(trace.t, trace.outcome, strict=True))
+
+
+def fates(trace: LinkTrace) -> dict[int, tuple[float, Outcome]]:
+    """The same by the number of the message; its sender has one life."""
+    assert len({*trace.seq}) == len(trace.seq)
+    return dict(zip(trace.seq, verdicts(trace), strict=True))
+
+
+def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTrace]:
+    """Verdicts of the toy run in simulated time."""
+    links = LinkRecord()
+    plant, agents = toy_configs(4, end=end)
+    plant = replace(plant, links=told.to_tree())
+    agents = tuple(replace(agent, links=told.to_tree()) for agent in agents)
+    outcome = run_inprocess(plant, agents, lambda telemetry: None, on_links=links, plant=ToyPlant(plant))
+    assert outcome.broke == ""
+    return links.by_link()
+
+
+def give(town: Town, order: LinkCommand, *receivers: str) -> float:
+    """Give a link command and wait until the receivers have taken it; from when on (s) it holds."""
+    before = len(town.acknowledgements)
+    answer = town.command("link", order.to_text())
+    assert answer.ok, answer.text
+    taken = json.loads(answer.text)
+    town.until(
+        lambda: (
+            {other.sender for other in town.acknowledgements[before:] if other.seq == taken["number"]} >= {*receivers}
+        ),
+        f"order {taken['number']} is taken by {', '.join(receivers)}",
+    )
+    assert all(other.ok for other in town.acknowledgements[before:])
+    return float(taken["t"])
+
+
+def wait(town: Town, seconds: float) -> None:
+    """Let the run go on (s of run time)."""
+    until = town.t + seconds
+    town.until(lambda: town.t >= until, f"t = {until:g} s")
+
+
+def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_path: Path) -> None:
+    """Set, cut and heal hold for all messages of the tick after the plant heard of them, for a restarted agent too.
+
+    And the schedule that replays them gives every message of the same number the same fate in simulated time.
+    """
+    told = setup()
+    with Town(4, tmp_path, links=told.to_tree()).all() as town:
+        orders = [
+            LinkCommand(fault=Fault(on="inv1 -> inv2", loss=0.3, delay=Normal(mean_s=0.03, std_s=0.01))),
+            LinkCommand(fault=Fault(on="inv3 <-> inv4", cut=True)),
+            LinkCommand(fault=Fault(on="inv2 -> inv4", delay=0.05)),
+        ]
+        set_at = give(town, orders[0], "inv2")
+        cut_at = give(town, orders[1], "inv3", "inv4")
+        delayed_at = give(town, orders[2], "inv4")
+        town.until(lambda: town.status["inv4"].impaired == ("inv2", "inv3"), "inv4 tells what is impaired")
+        town.signal("inv4", signal.SIGKILL)
+        town.until_event("inv4", "inv4 died")
+        count = len(town.events)
+        town.start("inv4").until_event("inv4", "inv4 joined", after=count)
+        town.until(lambda: town.status["inv4"].impaired == ("inv2", "inv3"), "the new inv4 is behind the same links")
+        wait(town, 0.6)
+        joined_at = next(event.t for event in town.events[count:] if "inv4 joined" in event.text)
+        healed_at = give(town, LinkCommand(heal=Heal(on="inv3 <-> inv4", from_s=0.0)), "inv3", "inv4")
+        town.until(lambda: town.status["inv4"].impaired == ("inv2",), "inv4 tells that it is healed")
+        wait(town, 2.5)  # a report comes every 2 s
+        assert town.command("down").ok
+        assert [town.until_ended(name) for name in (*FOUR, "plant")] == [0] * 5
+        traces = town.link_record.by_link()
+        changes = [LinkCommand.of_text(order.text).at(order.t) for order in town.orders]
+
+    heard_at = [event.t for event in town.events if event.kind == "link"]
+    cut = [*verdicts(traces["inv3", "inv4"]), *verdicts(traces["inv4", "inv3"])]
+    assert town.telemetry is not None
+    assert town.telemetry.pacing is not None
+    late = math.ceil(town.telemetry.pacing.worst / T_C) * T_C  # a plant behind its time acts a period after now
+    ahead = [round(order.t - t, 9) for order, t in zip(town.orders, heard_at, strict=True)]
+    assert all(T_C <= time <= T_C + late for time in ahead)
+    assert {cut_at <= t < healed_at for t, fate in cut if fate == "cut"} == {True}
+    assert {fate for t, fate in cut if cut_at <= t < healed_at} == {"cut"}
+    assert {fate for t, fate in cut if t >= healed_at} == {0.0}
+    assert {fate for t, fate in verdicts(traces["inv2", "inv4"]) if t >= delayed_at} == {0.05}
+    assert any(joined_at <= t < healed_at for t, _ in verdicts(traces["inv3", "inv4"]))
+
+    again = setup(links=replayed(told.netem, changes, MICROGRIDS).links)
+    lost = {n: fate for n, (t, fate) in fates(traces["inv1", "inv2"]).items() if t >= set_at}
+    by_schedule = {n: fate for n, (t, fate) in fates(simulated(again, 6.0)["inv1", "inv2"]).items() if t >= set_at}
+    common = sorted(lost.keys() & by_schedule.keys())
+    assert len(common) > 100
+    assert [lost[n] for n in common] == [by_schedule[n] for n in common]
+    assert {"loss"} < {fate if isinstance(fate, str) else "passed" for fate in lost.values()}
+
+
+def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
+    """Each message has the fate that its number has in simulated time; partitions by time; who is killed really is."""
+    faults = (
+        Fault(on="inv1 -> *", loss=0.2, delay=Normal(mean_s=0.05, std_s=0.02), duplicate=0.1),
+        Fault(on="plant -> inv2", loss=0.1),
+        Fault(on="inv2 -> plant", delay=0.03),
+    )
+    nodes = (
+        NodeFault(name="inv3", pause=True, from_s=1.0, to_s=1.8),
+        NodeFault(name="inv4", kill=True, from_s=2.4),
+    )
+    parted = Partition(groups=(("inv2",), ("inv3", "inv4")), from_s=0.5, to_s=0.9)
+    told = setup(links=faults, partitions=(parted,), nodes=nodes)
+    plant, agents = toy_configs(4, end=3.0)
+    wall = {"clock": "wall", "links": told.to_tree()}
+    run, links = FleetRun(replace(plant, **wall), [replace(agent, **wall) for agent in agents], tmp_path), LinkRecord()
+    outcome = run(on_links=links)
+    calm = simulated(setup(links=faults), 3.0)
+
+    assert (outcome.broke, outcome.notes) == ("", ())
+    assert [event.subject for event in outcome.events if "died" in event.text] == ["inv4"]
+    assert all(book.closes for book in links.counts.values())
+    found = {link: fates(trace) for link, trace in links.by_link().items()}
+    for link in (("inv1", "inv2"), ("inv1", "inv3"), ("plant", "inv2"), ("inv2", "plant")):
+        expected = fates(calm[link])
+        common = [n for n in sorted(found[link]) if n in expected and found[link][n][1] != "partition"]
+        assert len(common) > 50
+        assert [found[link][n][1] for n in common] == [expected[n][1] for n in common], link
+    for link in (("inv2", "inv3"), ("inv3", "inv2")):
+        assert {fate == "partition" for t, fate in found[link].values() if 0.5 <= t < 0.9} == {True}
+        assert {fate == "partition" for t, fate in found[link].values() if not 0.5 <= t < 0.9} == {False}
+    asleep = [t for t, _ in found["inv3", "inv2"].values() if 1.2 <= t < 1.7]
+    assert asleep == []
+    assert max(t for t, _ in found["inv3", "inv2"].values()) > 1.8
+
+
+LINK = ("inv1", "inv4")
+"""That is set by hand."""
+
+
+def set_fates(path: Path, since: float, until: float) -> dict[int, tuple[str, str]]:
+    """Delay and fate of the messages of inv1 -> inv4 by number, of those sent from one time to another (s)."""
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    return {
+        int(n): (delay, fate)
+        for src, dst, n, t, delay, fate in rows[1:]
+        if (src, dst) == LINK and since <= float(t) < until
+    }
+
+
+def now(desk: Desk) -> float:
+    """Run time (s), as `status` tells it."""
+    told = re.search(r" t = ([\d.]+) s ", desk.type("status")[1])
+    assert told is not None
+    return float(told[1])
+
+
+def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
+    """What people type and read: set, cut, show, status, heal, problems; the record, and a scenario that can be run."""
+    listen = desk.options[-1]
+    kept = ("--out", "here", "--record", "again.toml")
+    agents = [desk.open("agent", name) for name in ("inv1", "inv4")]
+    for agent in agents:
+        agent.expect("seeks the plant of run lab")
+    plant = desk.open_bare("plant", "calm.toml", "--run", "lab", "--listen", listen, "--wait", "0", *kept)
+    plant.expect("t = 0; speed")
+    joined = max(float(agent.expect(r"joins at t = ([\d.]+)")[1]) for agent in agents)
+
+    code, text = desk.type("link", "set", "inv1 -> inv4", "--delay", "0.1", "--jitter", "0.02", "--loss", "0.2")
+    said = re.fullmatch(
+        r"inv1 -> inv4: loss 0.2, delay 0.08 to 0.12 s; from t = ([\d.]+) s on\nacknowledged: inv4\n", text
+    )
+    assert code == 0, text
+    assert said is not None, text
+    plant.expect(r"link command 1: inv1 -> inv4: loss 0.2, delay 0.08 to 0.12 s, from t = [\d.]+ s on")
+    code, text = desk.type("link", "cut", "inv4", "inv7", "--for", "60")
+    assert (code, text.splitlines()[1:]) == (0, ["acknowledged: inv4", "no agent yet, told when it comes: inv7"]), text
+    code, text = desk.type("link", "show")
+    assert code == 0
+    assert re.search(r"^inv1 -> inv4 +\d+ +\d+ +\d+ .*loss 0.2, delay 0.08 to 0.12 s$", text, re.MULTILINE), text
+    assert re.search(r"^inv7 -> inv4 .* cut$", text, re.MULTILINE), text
+    code, text = desk.type("status")
+    assert re.search(r"lost +impaired\n", text), text
+    assert re.search(r"\ninv4 .* inv1,7( |\n)", text), text
+    code, text = desk.type("link", "set", "inv1", "inv44", "--loss", "0.1")
+    assert (code, 'LINKS: "inv1 -> inv44" matches nothing: nobody is called "inv44"' in text) == (2, True), text
+    # in the replay inv1 is there from the start: only after this time the same numbers are behind the fault in both
+    while now(desk) < float(said[1]) + joined + 1.0:
+        pass
+    code, text = desk.type("link", "heal")
+    healed, *told = text.splitlines()
+    assert (code, told) == (0, ["acknowledged: inv4", "no agent yet, told when it comes: inv7"]), text
+    assert re.fullmatch(r"inv1 -> inv4, inv4 <-> inv7: healed; from t = [\d.]+ s on", healed), text
+    assert "impaired" not in desk.type("status")[1]
+    assert desk.type("down")[0] == 0
+    assert plant.end() == 0
+    plant.expect(r"emulated links: \d+ messages over \d+ links, dropped: .* \(links.json, links.csv\)")
+
+    case = desk.folder / "here" / "IV"
+    assert sorted(path.name for path in case.iterdir()) == ["events.csv", "history.csv", "links.csv", "links.json"]
+    events = (case / "events.csv").read_text()
+    assert events.count(',link,links,"link command ') == 3
+    assert (desk.folder / "here" / "replay.toml").read_text() == (desk.folder / "again.toml").read_text()
+    entries = load_scenario(desk.folder / "again.toml")[0].netem.links
+    assert {(entry.on, entry.from_s) for entry in entries if "inv1" in entry.on} == {("inv1 -> inv4", float(said[1]))}
+    (healed,) = {entry.to_s for entry in entries if entry.on == "inv1 -> inv4"} - {None}
+    again = desk.open_bare("run", "again.toml", "--driver", "inprocess", "--out", "again")
+    assert again.end() == 0, again.text
+    live, replay = (
+        set_fates(desk.folder / run / "IV" / "links.csv", float(said[1]), healed) for run in ("here", "again")
+    )
+    common = sorted(live.keys() & replay.keys())
+    assert len(common) > 30
+    assert [live[n] for n in common] == [replay[n] for n in common]

@@ -1,0 +1,272 @@
+"""Wall-clock time with real processes: people start, stop, kill and freeze agents and the plant. The plant is a toy.
+
+Every wait is for a message, with a deadline.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+from itertools import pairwise
+from pathlib import Path
+from time import monotonic
+
+import pytest
+from msgspec.structs import replace
+
+from tests.toy.town import Town
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import FleetRun
+
+FOUR = ("inv1", "inv2", "inv3", "inv4")
+OTHERS = ("inv1", "inv3", "inv4")
+
+
+def P_sets(row: tuple[float, ...]) -> list[float]:
+    """P_set (W) of all inverters in a row."""
+    return list(row[5::6])
+
+
+def P_outs(row: tuple[float, ...]) -> list[float]:
+    """P (W) of all inverters in a row."""
+    return list(row[2::6])
+
+
+def largest_step(rows: list[tuple[float, ...]], inverters: tuple[int, ...]) -> float:
+    """Largest change of P_set (W) of some inverters from one row to the next."""
+    return max(abs(P_sets(b)[i - 1] - P_sets(a)[i - 1]) for a, b in pairwise(rows) for i in inverters)
+
+
+def settled(town: Town, of: tuple[int, ...] = (1, 2, 3)) -> Town:
+    """Wait for telemetry, from now on, of an island at 60 Hz in which these inverters share equally."""
+    since = len(town.rows)
+
+    def at_rest() -> bool:
+        if len(town.rows) == since or town.rows[-1][0] < 0.5:
+            return False
+        row = town.rows[-1]
+        shares = [P_sets(row)[i - 1] for i in of]
+        return abs(row[1] - 60.0) < 0.0003 and max(shares) - min(shares) < 50.0
+
+    return town.until(at_rest, "60 Hz and equal set-points")
+
+
+def test_a_frozen_agent_and_a_killed_one_are_out_and_in_again(tmp_path: Path) -> None:
+    """SIGSTOP: neighbours drop it by age, long before its token is gone; SIGCONT: all use each other again.
+
+    Kill -9: reported, out of all sums, its inverter held; a new process of the name is a new life, and welcome.
+    """
+    with Town(4, tmp_path).all() as town:
+        settled(town)
+        frozen = monotonic()
+        town.signal("inv2", signal.SIGSTOP)
+        town.together(OTHERS)
+        noticed = monotonic() - frozen
+        still = [key for key in town.tokens if "/inv2/" in key]
+        before = len(town.rows)
+        town.until(lambda: not any("/inv2/" in key for key in town.tokens), "its token is gone")
+        town.signal("inv2", signal.SIGCONT)
+        town.together(FOUR)
+        settled(town)
+
+        assert noticed < 0.5
+        assert len(still) == 1
+        assert largest_step(town.rows[before:], (1, 2, 3, 4)) < 100.0
+        assert town.status["inv2"].phase == "running"
+
+        count = len(town.events)
+        town.signal("inv2", signal.SIGKILL)
+        town.until_event("inv2", "inv2 died; its inverter stays on primary droop", after=count).together(OTHERS)
+        first = town.status["inv2"].epoch
+        before = len(town.rows)
+        town.start("inv2").together(FOUR)
+        settled(town)
+
+        assert town.status["inv2"].epoch > first
+        assert largest_step(town.rows[before:], (1, 3, 4)) < 100.0
+
+
+def test_who_is_asked_to_leave_leaves_properly(tmp_path: Path) -> None:
+    """SIGTERM and Ctrl-C: its inverter is off the network, the others take over, and its exit status is 0."""
+    others = ("inv1", "inv3", "inv4", "inv5", "inv6")
+    with Town(6, tmp_path).all() as town:
+        settled(town, of=(1, 2, 3, 4, 5, 6))
+        town.signal("inv2", signal.SIGTERM)
+        assert town.until_ended("inv2") == 0
+        town.until_event("inv2", "inv2 disconnected").together(others)
+        taken_over = settled(town, of=(1, 3, 4, 5, 6)).rows[-1]
+        town.start("inv2").until_event("inv2", "inv2 connected").together((*others, "inv2"))
+        settled(town, of=(1, 2, 3, 4, 5, 6))
+        count = len(town.events)
+        town.signal("inv2", signal.SIGINT)
+        assert town.until_ended("inv2") == 0
+        town.until_event("inv2", "inv2 disconnected", after=count).together(others)
+
+        assert P_outs(taken_over)[1] == 0.0
+        assert P_outs(taken_over)[0] == pytest.approx(0.96 * 100e3, abs=300.0)
+        assert [event.subject for event in town.events if "left" in event.text] == ["inv2", "inv2"]
+        assert not any("died" in event.text for event in town.events)
+
+
+def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(tmp_path: Path) -> None:
+    """SIGSTOP: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was.
+
+    Kill -9 of the plant, which is the rendezvous too: agents hold and seek; a new plant has them all again.
+    """
+    with Town(4, tmp_path).all() as town:
+        settled(town)
+        town.signal("plant", signal.SIGSTOP)
+        town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")
+        town.signal("plant", signal.SIGCONT)
+        # not the event: with the link silent for longer than the lease, its one message may be lost on the way here
+        town.until(town.was_put_off, "the plant says by how much")
+        town.together(FOUR)
+        settled(town)
+
+        assert town.telemetry is not None
+        assert town.telemetry.pacing is not None
+        assert town.telemetry.pacing.slipped > 1.0
+        assert "s of wall time behind; all later steps are put off" in town.children["plant"].log.read_text()
+
+        town.signal("plant", signal.SIGKILL)
+        town.until(lambda: all(town.status[name].phase == "seeking" for name in FOUR), "all seek")
+        held = {name: town.status[name].sent for name in FOUR}
+        town.until(lambda: all(town.status[name].received > 0 for name in FOUR), "news")
+        assert all(town.children[name].status is None for name in FOUR)
+        assert {name: town.status[name].sent for name in FOUR} == held
+        town.events.clear()
+        town.rows.clear()
+        town.start("plant").together(FOUR)
+        town.until_event("inv4", "inv4 joined")
+
+        settled(town)
+
+
+def test_a_start_order_works_in_which_the_plant_is_neither_first_nor_last(tmp_path: Path) -> None:
+    """Agents wait for a plant; the plant waits for agents as long as told."""
+    with Town(4, tmp_path) as town:
+        town.start("inv3", "inv1", "plant", "inv4", "inv2")
+        town.together(FOUR)
+        settled(town)
+
+        assert [event.subject for event in town.events if "joined" in event.text and event.t > 0.0] == []
+
+
+def test_a_plant_that_waits_for_nobody_has_its_agents_and_a_spare_one_as_they_come(tmp_path: Path) -> None:
+    """It starts alone; an agent nobody has heard of brings its inverter on line, and all share with it."""
+    with Town(4, tmp_path, spares=("inv4",), wait_for_agents=0.0) as town:
+        town.start("plant").until(lambda: town.t > 0.3, "the plant runs")
+        assert "started without the agents of inv1, inv2, inv3" in town.children["plant"].log.read_text()
+        town.start("inv1", "inv2", "inv3").together(("inv1", "inv2", "inv3"))
+        settled_without = [event for event in town.events if event.subject == "inv4"]
+        town.start("inv4").until_event("inv4", "inv4 connected").together(FOUR)
+        settled(town)
+
+        assert settled_without == []
+        assert all(town.children[name].status is None for name in FOUR)
+
+
+def test_a_second_agent_of_one_name_is_refused(tmp_path: Path) -> None:
+    """By name, in one line, with exit status 2; the first goes on, and its inverter stays on."""
+    with Town(3, tmp_path).all() as town:
+        first = town.children["inv2"]
+        life = town.status["inv2"].epoch
+        second = town.add("second", ["-m", "agents"], town.agent_configs["inv2"])
+        status = town.until_ended("second")
+        since = town.t
+        town.until(lambda: town.t > since + 0.6, "the run goes on")
+
+        assert status == 2
+        assert "inv2: another agent of this name takes part in run toy already" in second.log.read_text()
+        assert first.status is None
+        assert town.status["inv2"].epoch == life
+        assert not any("disconnected" in event.text for event in town.events)
+        town.together(("inv1", "inv2", "inv3"))
+
+
+def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
+    """Even where agents of one run are connected to the other's plant: names keep them apart."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    with Town(3, tmp_path / "a", run="run-a") as a, Town(3, tmp_path / "b", run="run-b", also=(a.endpoint,)) as b:
+        a.all()
+        b.all()
+        a.signal("inv2", signal.SIGTERM)
+        a.until_event("inv2", "inv2 left").together(("inv1", "inv3"))
+        since = b.t
+        b.until(lambda: b.t > since + 0.6, "the other run goes on")
+
+        b.together(("inv1", "inv2", "inv3"))
+        assert [event for event in b.events if "left" in event.text or "died" in event.text] == []
+
+
+def test_commands_reach_a_running_plant(tmp_path: Path) -> None:
+    """Status, stop, open, what there is not, and down, which ends everybody with exit status 0."""
+    with Town(3, tmp_path).all() as town:
+        status = json.loads(town.command("status").text)
+        wrong = town.command("open", "sw7")
+        opened = town.command("open", "sw1")
+        stopped = town.command("stop", "inv2")
+        ended = town.until_ended("inv2")
+        town.until_event("inv2", "inv2 left")
+        again = town.command("stop", "inv2")
+        down = town.command("down")
+
+        assert status["agents"] == ["inv1", "inv2", "inv3"]
+        assert (wrong.ok, wrong.text) == (False, 'no switch "sw7"; switches are sw1')
+        assert (opened.ok, stopped.ok, ended, down.ok) == (True, True, 0, True)
+        assert (again.ok, again.text) == (False, 'no agent "inv2" is running; running are: inv1, inv3')
+        assert [town.until_ended(name) for name in ("inv1", "inv3", "plant")] == [0, 0, 0]
+
+
+def test_an_agent_without_a_plant_ends_after_its_deadline(tmp_path: Path) -> None:
+    """One line with the run, the time and the endpoint; exit status 2."""
+    with Town(3, tmp_path) as town:
+        config = replace(town.agent_configs["inv1"], deadline=0.5)
+        lonely = town.add("inv1", ["-m", "agents"], config)
+
+        assert town.until_ended("inv1") == 2
+        text = lonely.log.read_text()
+        assert "inv1: no plant of run toy within 0.5 s; is the plant of run toy running at tcp/127.0.0.1:" in text
+
+
+def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: Path) -> None:
+    """All rows come, after end / speed, with the percentiles of the pace; who died is in the notes."""
+    plant, agents = toy_configs(4, end=3.0)
+    run = FleetRun(
+        replace(plant, clock="wall", speed=2.0), [replace(a, clock="wall", speed=2.0) for a in agents], tmp_path
+    )
+    run.at(1.0, lambda: run.child("inv3").signal(signal.SIGKILL))
+    outcome = run()
+
+    assert outcome.broke == ""
+    assert not outcome.reproducible
+    assert [row[0] for row in run.rows] == pytest.approx([0.02 * k for k in range(151)])
+    assert outcome.run_s == pytest.approx(1.5, abs=0.4)
+    assert outcome.pacing is not None
+    assert outcome.pacing.steps == 150
+    assert [event.subject for event in outcome.events if "died" in event.text] == ["inv3"]
+    assert [note.split(" after")[0] for note in outcome.notes] == ["inv3 was killed by SIGKILL"]
+
+
+def test_an_inverter_without_agent_stays_on_droop_while_the_others_share(tmp_path: Path) -> None:
+    """Nobody waits for its agent or misses it; its set-point never moves, and the frequency comes back without it."""
+    plant, agents = toy_configs(4, end=3.0)
+    present = [replace(agent, clock="wall", speed=4.0) for agent in agents if agent.name != "inv2"]
+    run = FleetRun(replace(plant, clock="wall", speed=4.0, agents=OTHERS), present, tmp_path)
+    outcome = run()
+
+    assert outcome.broke == ""
+    assert {event.subject for event in outcome.events if event.kind == "roster"} == set(OTHERS)
+    assert {P_sets(row)[1] for row in run.rows} == {P_sets(run.rows[0])[1]}
+    assert P_sets(run.rows[-1])[0] > P_sets(run.rows[0])[0]
+
+
+def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
+    """At a speed that nothing can keep the plant ends with status 3, says how late it was and what to do."""
+    plant, agents = toy_configs(2, end=400.0)
+    plant = replace(plant, clock="wall", speed=1e6, strict=True)
+    outcome = FleetRun(plant, [replace(agent, clock="wall") for agent in agents], tmp_path)()
+
+    assert outcome.broke.startswith("plant: cannot keep pace at speed 1e+06: ")
+    assert outcome.broke.endswith("give it a lower speed or more cores")

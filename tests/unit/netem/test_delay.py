@@ -1,0 +1,113 @@
+"""Delays: the realised law against the configured one."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from statistics import NormalDist
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
+from tests.unit.netem.link_messages import T_C, channel, delays, fates, steady
+
+N = 4000
+
+LAWS = {
+    "uniform": (Uniform(low_s=0.01, high_s=0.05), stats.uniform(0.01, 0.04)),
+    "normal": (Normal(mean_s=0.1, std_s=0.02), stats.truncnorm(-5.0, math.inf, 0.1, 0.02)),
+    "normal, truncated": (Normal(mean_s=0.01, std_s=0.02), stats.truncnorm(-0.5, math.inf, 0.01, 0.02)),
+    "lognormal": (Lognormal(median_s=0.02, sigma=0.6, offset_s=0.01), stats.lognorm(0.6, 0.01, 0.02)),
+    "pareto": (Pareto(minimum_s=0.02, shape=3.0), stats.pareto(3.0, 0.0, 0.02)),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_delays_follow_their_law(name: str) -> None:
+    """A Kolmogorov-Smirnov test against scipy's own form of the law does not tell the drawn delays from it."""
+    model, law = LAWS[name]
+
+    assert stats.kstest(delays(channel(delay=model), N), law.cdf).pvalue > 0.01
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_quantile_and_distribution_function_are_those_of_the_law(name: str) -> None:
+    """Both agree with scipy's, from the first thousandth of a millionth to the last."""
+    model, law = LAWS[name]
+
+    for u in (1e-9, 0.001, 0.3, 0.5, 0.9, 1 - 1e-9):
+        assert model.quantile(u) == pytest.approx(law.ppf(u), rel=1e-6)
+        assert model.cdf(law.ppf(u)) == pytest.approx(u, abs=1e-9)
+
+
+@steady
+@given(st.sampled_from(list(LAWS)), st.floats(2.0**-53, 1.0 - 2.0**-53))
+def test_no_delay_is_negative_or_endless(name: str, u: float) -> None:
+    """Whatever number is drawn, the delay is finite and not below zero."""
+    assert 0.0 <= LAWS[name][0].quantile(u) < math.inf
+
+
+def test_a_constant_delay_is_exact() -> None:
+    """Nothing is added to a constant delay, not even a last digit."""
+    assert set(delays(channel(delay=0.1), 1000)) == {0.1}
+    assert channel(delay=Constant(delay_s=0.3)).judge(17, 17 * T_C, 5).deliveries == ((0.3, None),)
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.95])
+@pytest.mark.parametrize("model", [Normal(mean_s=0.02, std_s=0.02), Pareto(minimum_s=0.02, shape=3.0)])
+def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(model: RandomDelay, phi: float) -> None:
+    """The normal scores of correlated delays are an AR(1) process, of standard normal, independent innovations."""
+    drawn = delays(channel(delay=msgspec.structs.replace(model, correlation=phi)), N)
+    scores = [NormalDist().inv_cdf(model.cdf(delay)) for delay in drawn]
+    innovations = [(new - phi * old) / math.sqrt(1 - phi**2) for old, new in pairwise(scores)]
+
+    assert stats.pearsonr(scores[1:], scores[:-1]).statistic == pytest.approx(phi, abs=4 * math.sqrt((1 - phi**2) / N))
+    assert stats.kstest(innovations, "norm").pvalue > 0.01
+    assert abs(stats.pearsonr(innovations[1:], innovations[:-1]).statistic) < 3 / math.sqrt(N)
+
+
+@steady
+@given(st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20), st.booleans())
+def test_a_trace_is_played_in_order_and_again(recorded: list[float], spread: bool) -> None:
+    """Message n has the delay n places after the link's start, which without spread is the first of the trace."""
+    drawn = delays(channel(delay=Trace(delays_s=tuple(recorded), spread=spread)), 2 * len(recorded))
+
+    starts = range(len(recorded)) if spread else (0,)
+    turned = [recorded[start:] + recorded[:start] for start in starts]
+    assert drawn[: len(recorded)] in turned
+    assert drawn[: len(recorded)] == drawn[len(recorded) :]
+
+
+@steady
+@given(st.integers(0, 50), st.floats(0.05, 0.5))
+def test_fifo_delays_never_let_a_message_overtake(seed: int, sigma: float) -> None:
+    """With fifo arrivals are in the order of sending, and no delay is shortened; without it, some are not."""
+    model = Lognormal(median_s=0.1, sigma=2 * sigma)
+    free = delays(channel(seed, delay=model), 200)
+    kept = delays(channel(seed, delay=Lognormal(median_s=0.1, sigma=2 * sigma, fifo=True)), 200)
+    arrivals = [seq * T_C + delay for seq, delay in enumerate(kept)]
+
+    assert all(one <= other + 1e-12 for one, other in pairwise(arrivals))
+    assert all(short <= long + 1e-12 for short, long in zip(free, kept, strict=True))
+
+
+def test_without_fifo_messages_do_overtake() -> None:
+    """Independent delays longer than the distance of the messages reorder them."""
+    arrivals = [
+        seq * T_C + delay for seq, delay in enumerate(delays(channel(delay=Uniform(low_s=0.0, high_s=0.2)), 200))
+    ]
+
+    assert arrivals != sorted(arrivals)
+
+
+def test_a_delay_that_changes_in_time_keeps_the_draws_of_each_message() -> None:
+    """Which entry holds is a matter of time, which number is drawn one of the message: the two do not mix."""
+    whole = fates(channel(delay=Uniform(low_s=0.0, high_s=1.0)), range(100))
+    late = fates(channel(delay=Uniform(low_s=0.0, high_s=1.0), from_s=1.0), range(100))
+
+    assert late[:50] == [type(fate)(((0.0, None),)) for fate in late[:50]]
+    assert late[50:] == whole[50:]

@@ -1,0 +1,156 @@
+"""What depends on time: cuts, flaps, slots, the queue of a slow line, and the order of it all."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from netem.channel import Channel
+from netem.fault_schedule import FaultSchedule
+from netem.models.cut import Cut
+from netem.models.delay import Constant
+from netem.models.duplicate import Duplicate
+from netem.models.flap import Flap
+from netem.models.rate import Rate
+from netem.models.slots import Slots
+from netem.schema.fault import Span
+from netem.schema.pattern import Link
+from tests.unit.netem.link_messages import T_C, channel, fates, steady
+
+time = st.integers(0, 200).map(lambda k: k / 10)
+
+
+def spans(*entries: tuple[str, float, float, object]) -> Channel:
+    """A link with faults of the kinds and times given."""
+    return Channel(Link("inv1", "inv2"), [Span(*entry) for entry in entries], seed=1)
+
+
+@steady
+@given(st.integers(0, 500), st.integers(0, 500))
+def test_a_cut_drops_what_is_sent_from_its_beginning_up_to_its_end(start: int, end: int) -> None:
+    """Of messages at ticks k T_c, those of start <= k < end are dropped, whatever binary makes of k T_c."""
+    assume(start < end)
+    judge = channel(cut=True, from_s=round(start * 0.02, 9), to_s=round(end * 0.02, 9))
+
+    dropped = [seq for seq, fate in enumerate(fates(judge, range(501))) if fate.reason == "cut"]
+
+    assert dropped == list(range(start, min(end, 501)))
+
+
+def test_a_holding_cut_lets_everything_go_at_its_end() -> None:
+    """With hold, messages of the cut arrive together when it ends; none is lost."""
+    kept = fates(spans(("cut", 0.1, 0.5, Cut(hold=True)), ("delay", 0.0, 9.0, Constant(delay_s=0.01))), range(40))
+
+    assert [seq * T_C + fate.deliveries[0][0] for seq, fate in enumerate(kept)] == pytest.approx(
+        [(0.5 if 5 <= seq < 25 else seq * T_C) + 0.01 for seq in range(40)]
+    )
+    assert {fate.held_until for fate in kept[5:25]} == {0.5}
+
+
+def test_a_holding_cut_without_an_end_never_lets_go() -> None:
+    """What such a cut keeps is neither delivered nor dropped."""
+    fate = channel(cut=Cut(hold=True), loss=1.0).judge(0, 1.0, 10)
+
+    assert fate.deliveries == ((math.inf, None),)
+    assert not fate.reason
+
+
+def test_what_a_cut_lets_go_into_another_cut_meets_that_one() -> None:
+    """A kept message is lost if the link is down where it would go on, and kept on where it is kept again."""
+    lost = spans(("cut", 0.0, 1.0, Cut(hold=True)), ("partition", 1.0, 2.0, Cut()))
+    kept = spans(("cut", 0.0, 1.0, Cut(hold=True)), ("flap", 0.0, 9.0, Flap(up_s=0.5, down_s=1.0, hold=True)))
+
+    assert lost.judge(0, 0.5, 10).reason == "partition"
+    assert kept.judge(0, 0.2, 10).deliveries == ((pytest.approx(1.3), None),)
+
+
+@steady
+@given(st.integers(1, 20), st.integers(1, 20), st.integers(0, 300))
+def test_a_flap_is_up_and_down_in_turn(up: int, down: int, start: int) -> None:
+    """From its beginning on, a flapping link is up for up_s and down for down_s, tick by tick."""
+    flap = Flap(up_s=round(up * T_C, 9), down_s=round(down * T_C, 9))
+    judged = fates(channel(flap=flap, from_s=round(start * T_C, 9)), range(400))
+
+    for seq, fate in enumerate(judged):
+        assert (fate.reason == "flap") == (seq >= start and (seq - start) % (up + down) >= up)
+
+
+@steady
+@given(st.integers(1, 40), st.integers(0, 40), st.integers(1, 40), st.integers(0, 2000))
+def test_a_message_goes_in_the_first_slot_that_is_open(period: int, offset: int, length: int, tick: int) -> None:
+    """It goes at once if a slot is open, else at the beginning of the next, as counted in whole milliseconds."""
+    assume(offset < period and length <= period)
+    slots = Slots(period_s=period / 1000, offset_s=offset / 1000, length_s=length / 1000)
+
+    goes = next(ms for ms in range(tick, tick + 2 * period) if (ms - offset) % period < length)
+
+    assert slots.opens(tick / 1000) == pytest.approx(goes / 1000, abs=1e-9)
+
+
+@steady
+@given(
+    st.lists(st.tuples(st.integers(0, 300), st.integers(1, 400)), max_size=40), st.integers(1, 20), st.integers(1, 900)
+)
+def test_a_slow_line_sends_one_byte_after_the_other(gaps: list[tuple[int, int]], rate: int, queue: int) -> None:
+    """Messages fare as on a line that is counted byte by byte: in order, with waiting, and with a full queue."""
+    judge = channel(rate=Rate(bytes_per_s=1000.0 * rate, queue_bytes=queue))
+    now, free = 0, 0.0  # ms; bytes per ms is the rate
+    for seq, (gap, size) in enumerate(gaps):
+        now += gap
+        waiting = max(free - now, 0.0) * rate
+        fate = judge.judge(seq, now / 1000, size)
+        assume(abs(waiting + size - queue) > 1e-3)
+        if waiting > 1e-9 and waiting + size > queue:
+            assert fate.reason == "queue"
+        else:
+            free = max(now, free) + size / rate
+            assert fate.deliveries[0][0] == pytest.approx((free - now) / 1000, abs=1e-9)
+
+
+def test_a_line_with_too_much_to_send_carries_its_rate_and_no_more() -> None:
+    """Offered twice its rate, a line delivers half, each message as late as the full queue makes it."""
+    judged = fates(channel(rate=Rate(bytes_per_s=3000.0, queue_bytes=1200)), range(4000), size=120)
+    through = [fate.deliveries[0][0] for fate in judged if fate.deliveries]
+
+    assert len(through) == pytest.approx(2000, abs=10)
+    assert max(through) == pytest.approx(1200 / 3000, abs=1e-6)
+
+
+def test_a_lost_message_takes_no_room_in_the_queue() -> None:
+    """Loss comes before the line: with all lost nobody meets a full queue, with half lost half of the load is there."""
+    free = fates(channel(rate=Rate(bytes_per_s=3600.0, queue_bytes=1200), loss=0.5), range(2000), size=120)
+
+    assert {fate.reason for fate in free} == {"", "loss"}
+
+
+def test_everything_at_once_adds_up_in_the_order_told() -> None:
+    """Kept by a cut to 1.0 s, 0.1 s on the line, on to the slot at 1.25 s, 0.5 s of delay, and a copy 0.125 s later."""
+    judge = spans(
+        ("cut", 0.0, 1.0, Cut(hold=True)),
+        ("rate", 0.0, 9.0, Rate(bytes_per_s=1000.0)),
+        ("slots", 0.0, 9.0, Slots(period_s=0.25, length_s=0.0625)),
+        ("delay", 0.0, 9.0, Constant(delay_s=0.5)),
+        ("duplicate", 0.0, 9.0, Duplicate(p=1.0, extra_delay_s=0.125)),
+    )
+
+    assert judge.judge(0, 0.5, 100).deliveries == ((1.25, None), (1.375, None))
+
+
+@steady
+@given(st.lists(st.tuples(st.sampled_from(["cut", "loss", "delay"]), time, time, st.integers(0, 3)), max_size=6), time)
+def test_a_flat_schedule_says_at_every_time_what_the_layered_one_says(
+    layers: list[tuple[str, float, float, int]], t: float
+) -> None:
+    """Taking precedence away changes nothing that holds, and leaves no two entries of a kind that overlap."""
+    schedule = FaultSchedule(Span(kind, start, end, model) for kind, start, end, model in layers)
+    flat = schedule.flat()
+
+    def holding(spans: FaultSchedule) -> dict[str, object]:
+        return {kind: span.model for kind, span in spans.at(t).active.items()}
+
+    assert holding(FaultSchedule(flat)) == holding(schedule)
+    assert all(one.kind != other.kind or one.to_s <= other.from_s for one, other in pairwise(flat))

@@ -1,0 +1,140 @@
+"""Losses, duplicates and flipped bits: realised against configured."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import groupby, pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from netem.models.corrupt import Corrupt, flip
+from netem.models.duplicate import Duplicate
+from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
+from tests.unit.netem.link_messages import channel, fates, steady
+
+N = 20_000
+
+CHAINS = {
+    "gilbert": GilbertElliott(p=0.05, r=0.25),
+    "gilbert-elliott": GilbertElliott(p=0.02, r=0.2, loss_good=0.01, loss_bad=0.6),
+    "markov": Markov(p13=0.03, p31=0.2, p32=0.3, p23=0.4, p14=0.02),
+}
+
+probability = st.floats(0.0, 1.0)
+
+
+def lost(model: LossModel, n: int = N) -> list[bool]:
+    """Which of n messages are lost."""
+    return [fate.reason == "loss" for fate in fates(channel(loss=model), range(n))]
+
+
+@pytest.mark.parametrize("p", [0.001, 0.02, 0.5, 0.9])
+def test_independent_losses_are_as_frequent_as_configured(p: float) -> None:
+    """A binomial test does not tell the losses from those of probability p, nor a run test from independent ones."""
+    drawn = lost(Bernoulli(p=p))
+    pairs = Counter(pairwise(drawn))
+
+    assert stats.binomtest(sum(drawn), N, p).pvalue > 0.01
+    assert stats.binomtest(pairs[True, True], sum(drawn[:-1]), p).pvalue > 0.01
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_states_follow_each_other_as_the_transition_matrix_says(name: str) -> None:
+    """What follows a received and a lost message is as frequent as two steps of the chain make it."""
+    model = CHAINS[name]
+    drawn = lost(model)
+    # joint probability of (n lost or not, n + 1 lost), from the model's own matrix, summed by hand
+    states = range(len(model.stationary))
+    for first in (False, True):
+        here = [model.loss_in_state[s] if first else 1 - model.loss_in_state[s] for s in states]
+        weight = sum(model.stationary[s] * here[s] for s in states)
+        both = sum(
+            model.stationary[s] * here[s] * model.transitions[s][z] * model.loss_in_state[z]
+            for s in states
+            for z in states
+        )
+        follows = Counter(after for before, after in pairwise(drawn) if before == first)
+        assert stats.binomtest(follows[True], follows.total(), both / weight).pvalue > 0.01
+
+
+def test_gilberts_bursts_are_geometric() -> None:
+    """With loss in the bad state only, a burst of l messages has probability r (1 - r)^(l - 1)."""
+    model = CHAINS["gilbert"]
+    bursts = Counter(sum(1 for _ in run) for is_lost, run in groupby(lost(model)) if is_lost)
+    total = bursts.total()
+    observed = [bursts[length] for length in range(1, 10)] + [sum(n for length, n in bursts.items() if length >= 10)]
+    expected = [total * 0.25 * 0.75 ** (length - 1) for length in range(1, 10)] + [total * 0.75**9]
+
+    assert stats.chisquare(observed, expected).pvalue > 0.01
+
+
+@steady
+@given(probability, st.floats(0.01, 1.0), probability, probability)
+def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
+    p: float, r: float, good: float, bad: float
+) -> None:
+    """The law from which chains start is that of the chain, so no message is special."""
+    _assert_stationary(GilbertElliott(p=p, r=r, loss_good=good, loss_bad=bad))
+
+
+@steady
+@given(st.floats(0.0, 0.5), st.floats(0.01, 0.5), st.floats(0.0, 0.5), st.floats(0.01, 1.0), st.floats(0.0, 0.5))
+def test_the_four_states_stationary_law_is_left_by_one_step_as_it_was(
+    p13: float, p31: float, p32: float, p23: float, p14: float
+) -> None:
+    """The closed form of the four states' law solves the chain's balance."""
+    _assert_stationary(Markov(p13=p13, p31=p31, p32=p32, p23=p23, p14=p14))
+
+
+def _assert_stationary(model: LossModel) -> None:
+    n = len(model.stationary)
+    assert [sum(row) for row in model.transitions] == pytest.approx([1.0] * n)
+    after = [sum(model.stationary[i] * model.transitions[i][j] for i in range(n)) for j in range(n)]
+    assert after == pytest.approx(list(model.stationary), abs=1e-12)
+    assert sum(model.stationary) == pytest.approx(1.0)
+
+
+def test_markov_with_a_single_way_is_gilberts_model() -> None:
+    """Without states 2 and 4 the four states are Gilbert's two, message by message."""
+    assert lost(Markov(p13=0.05, p31=0.25), 4000) == lost(GilbertElliott(p=0.05, r=0.25), 4000)
+
+
+@steady
+@given(st.integers(0, 20), st.floats(0.0, 0.9), st.floats(0.0, 0.1))
+def test_a_higher_loss_loses_what_a_lower_one_loses_and_more(seed: int, p: float, more: float) -> None:
+    """A message's number is the same whatever the probability: sweeps over loss compare like with like."""
+    low = fates(channel(seed, loss=p), range(200))
+    high = fates(channel(seed, loss=p + more), range(200))
+
+    assert {i for i, fate in enumerate(low) if fate.reason} <= {i for i, fate in enumerate(high) if fate.reason}
+
+
+def test_duplicates_are_as_frequent_and_as_late_as_configured() -> None:
+    """Copies come with probability p, a fixed time behind the first."""
+    drawn = fates(channel(duplicate=Duplicate(p=0.1, extra_delay_s=0.5), delay=0.25), range(N))
+
+    assert stats.binomtest(sum(len(fate.deliveries) == 2 for fate in drawn), N, 0.1).pvalue > 0.01
+    assert {tuple(delay for delay, _ in fate.deliveries) for fate in drawn} == {(0.25,), (0.25, 0.75)}
+
+
+def test_corrupted_messages_have_any_bit_flipped_alike() -> None:
+    """Corruption comes with probability p, and each bit of a message is as likely as any other."""
+    bits = [fate.deliveries[0][1] for fate in fates(channel(corrupt=Corrupt(p=0.2)), range(N), size=4)]
+    flipped = Counter(bit for bit in bits if bit is not None)
+
+    assert stats.binomtest(flipped.total(), N, 0.2).pvalue > 0.01
+    assert stats.chisquare([flipped[bit] for bit in range(32)]).pvalue > 0.01
+
+
+@steady
+@given(st.binary(min_size=1, max_size=40), st.data())
+def test_a_flip_changes_one_bit_and_undoes_itself(payload: bytes, data: st.DataObject) -> None:
+    """A flipped payload differs in exactly one bit."""
+    bit = data.draw(st.integers(0, 8 * len(payload) - 1))
+    flipped = flip(payload, bit)
+
+    assert sum((one ^ other).bit_count() for one, other in zip(payload, flipped, strict=True)) == 1
+    assert flip(flipped, bit) == payload

@@ -1,0 +1,274 @@
+"""Entries of a scenario: read, checked with all problems at once, and replayed."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netem.models.cut import Cut
+from netem.models.delay import Constant, Lognormal, Normal
+from netem.models.loss import Bernoulli, GilbertElliott
+from netem.schema.change import Change, Heal, replayed, schedule_of
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.partition import Partition
+from netem.schema.pattern import Link, links_among
+from netem.schema.profiles import PROFILES
+from tests.unit.netem.link_messages import MICROGRIDS, steady
+from wire.table_reading import read_table
+
+NAMES = list(MICROGRIDS)
+
+
+def problems_of(text: str, end_s: float = 10.0) -> list[str]:
+    """All problems of a TOML text, as "path: text"."""
+    netem, form = read_table(Netem, tomllib.loads(text))
+    noted = {problem.path for problem in form}
+    return [": ".join(problem) for problem in form + netem.problems(NAMES, MICROGRIDS, end_s, noted)]
+
+
+def test_a_scenarios_entries_are_read_as_written() -> None:
+    """Shorthands, models, profiles with a key of their own, partitions and nodes come out as structs."""
+    text = """
+    [[link]]
+    on = "MG1 <-> MG2"
+    profile = "lte"
+    loss = 0.02
+    from_s = 1
+    [[link]]
+    on = "plant -> inv2"
+    delay = {model = "normal", mean_s = 0.1, std_s = 0.02, correlation = 0.5, fifo = true}
+    cut = {hold = true}
+    [[partition]]
+    groups = [["inv1"], ["MG2", "inv9"]]
+    [[node]]
+    name = "inv3"
+    skew = {factor = 1.0001}
+    """
+    netem, form = read_table(Netem, tomllib.loads(text))
+
+    assert not form
+    assert not netem.problems(NAMES, MICROGRIDS, 10.0)
+    assert netem.links[0].models() == {"loss": Bernoulli(p=0.02), "delay": PROFILES["lte"].delay}
+    assert netem.links[1].models() == {
+        "cut": Cut(hold=True),
+        "delay": Normal(mean_s=0.1, std_s=0.02, correlation=0.5, fifo=True),
+    }
+    assert msgspec.json.decode(msgspec.json.encode(netem), type=Netem) == netem
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "words"),
+    [
+        ('[[link]]\non = "* -> *"\ndelay = -0.1', "link[0].delay", ["must not be negative, got -0.1 s"]),
+        ('[[link]]\non = "* -> *"\ndelay = 250', "link[0].delay", ["250 s", "0.25 (250 ms)"]),
+        ('[[link]]\non = "* -> *"\ndelay = "20 ms"', "link[0].delay", ["must be a number", "write 0.02"]),
+        ('[[link]]\non = "* -> *"\ndelay = "1.2.3 ms"', "link[0].delay", ["must be a number", 'got "1.2.3 ms"']),
+        ('[[link]]\non = "* -> *"\ndelay_ms = 20', "link[0].delay_ms", ["unknown key", "write delay"]),
+        ('[[link]]\non = "* -> *"\nloss = 30', "link[0].loss", ["0 to 1, got 30", "0.3 (30 %)"]),
+        ('[[link]]\non = "* -> *"\nloss = nan', "link[0].loss", ["got nan"]),
+        ('[[link]]\non = "* -> *"\nduplicate = {p = -1}', "link[0].duplicate.p", ["got -1"]),
+        ('[[link]]\non = "* -> *"\ncorrupt = 2', "link[0].corrupt", ["0.02 (2 %)"]),
+        ('[[link]]\non = "* -> *"\nrate = 0', "link[0].rate", ["bytes/s", "not bits"]),
+        ('[[link]]\non = "* -> *"\nflap = {up_s = 0, down_s = 1}', "link[0].flap.up_s", ["above 0"]),
+        ('[[link]]\non = "* -> *"\nslots = {period_s = 1, length_s = 2}', "link[0].slots.length_s", ["period_s = 1 s"]),
+        ('[[link]]\non = "* -> *"\nloss = {model = "gilbert-elliott", p = 0.1, r = 0}', "link[0].loss.r", ["above 0"]),
+        (
+            '[[link]]\non = "* -> *"\nloss = {model = "markov", p13 = 0.7, p31 = 1, p14 = 0.7}',
+            "link[0].loss.p13",
+            ["1.4"],
+        ),
+        ('[[link]]\non = "* -> *"\nloss = {model = "gilbert"}', "link[0].loss.model", ['"gilbert-elliott"?']),
+        (
+            '[[link]]\non = "* -> *"\ndelay = {model = "uniform", low_s = 2, high_s = 1}',
+            "link[0].delay.low_s",
+            ["swap"],
+        ),
+        (
+            '[[link]]\non = "* -> *"\ndelay = {model = "pareto", minimum_s = 1, shape = 1}',
+            "link[0].delay.shape",
+            ["mean"],
+        ),
+        (
+            '[[link]]\non = "* -> *"\ndelay = {model = "normal", mean_s = 1, std_s = 1, correlation = 90}',
+            "link[0].delay.correlation",
+            ["0.9 (90 %)"],
+        ),
+        ('[[link]]\non = "inv1 -> inv77"\ncut = true', "link[0].on", ['did you mean "inv7"?']),
+        ('[[link]]\non = "* -> *"\nprofile = "wifi"', "link[0].profile", ['did you mean "wifi-mesh"?']),
+        ('[[link]]\non = "* -> *"', "link[0]", ["does nothing"]),
+        ('[[link]]\non = "* -> *"\ncut = true\nfrom_s = 3\nto_s = 3', "link[0].to_s", ["not after from_s"]),
+        ('[[link]]\non = "* -> *"\ncut = true\nfrom_s = 30', "link[0].from_s", ["before the end of the run at 10 s"]),
+        ("[[link]]\ncut = true", "link[0].on", ["is missing"]),
+        ('[[partition]]\nalone = "inv0"', "partition[0].alone", ['no agent "inv0"', 'did you mean "inv']),
+        ('[[partition]]\nby = "half"', "partition[0].by", ['"halves"']),
+        ("[[partition]]\nhold = true", "partition[0]", ["needs one of"]),
+        ('[[partition]]\ngroups = [["inv1"], ["inv1"]]', "partition[0].groups[1]", ["both sides"]),
+        ('[[partition]]\ngroups = [["MG1", "MG2", "MG3"]]', "partition[0]", ["parts nobody"]),
+        ('[[node]]\nname = "inv3"\npause = true', "node[0].pause", ["give to_s"]),
+        ('[[node]]\nname = "inv3"\nkill = true\nto_s = 3', "node[0].kill", ["stays so"]),
+        ('[[node]]\nname = "inv3"\nskew = {factor = 50}', "node[0].skew.factor", ["1.00005 (50 ppm)"]),
+        ('[[node]]\nname = "inv3"\nslow_s = 20', "node[0].slow_s", ["0.02 (20 ms)"]),
+        ('[[node]]\nname = "inv3"', "node[0]", ["does nothing"]),
+        ("link = 3", "link", ["[[link]]"]),
+    ],
+)
+def test_a_problem_says_where_what_and_what_would_be_right(text: str, path: str, words: list[str]) -> None:
+    """Each problem is the only one found, at its key, with the value and what was probably meant."""
+    (found,) = problems_of(text)
+
+    assert found.startswith(f"{path}: "), found
+    assert all(word in found for word in words), found
+
+
+def test_all_problems_come_at_once() -> None:
+    """Problems of several entries, and several of one, are told together."""
+    text = (
+        '[[link]]\non = "a -> b"\nloss = 3\ndelay = -1\n[[partition]]\nalone = "x"\n[[node]]\nname = "y"\nkill = true'
+    )
+
+    assert sorted(found.partition(":")[0] for found in problems_of(text)) == [
+        "link[0].delay",
+        "link[0].loss",
+        "link[0].on",
+        "link[0].on",
+        "node[0].name",
+        "partition[0].alone",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "clash"),
+    [
+        ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "loss": 0.2}, True),
+        ({"on": "* -> inv2", "loss": 0.1}, {"on": "inv1 <-> *", "delay": 0.2}, False),
+        ({"on": "* -> inv2", "loss": 0.1}, {"on": "* -> inv3", "loss": 0.2}, False),
+        ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.0}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, False),
+        ({"on": "* -> inv2", "loss": 0.1, "to_s": 2.1}, {"on": "* -> *", "loss": 0.2, "from_s": 2.0}, True),
+        ({"on": "MG1 -> MG2", "profile": "lte"}, {"on": "inv1 -> inv4", "delay": 0.1}, True),
+        ({"on": "MG1 -> MG2", "cut": True}, {"on": "inv1 -> inv4", "cut": Cut(hold=True), "from_s": 5.0}, True),
+    ],
+)
+def test_two_entries_of_one_kind_link_and_time_contradict_each_other(
+    first: dict[str, Any], second: dict[str, Any], clash: bool
+) -> None:
+    """Only entries that meet on a link, in time and in kind are a problem, which names the link and the other entry."""
+    found = Netem(links=(Fault(**first), Fault(**second))).problems(NAMES, MICROGRIDS, 10.0)
+
+    assert [problem.path.partition(".")[0] for problem in found] == ["link[1]"] * clash
+    assert all("link[0] gives inv1 -> inv" in problem.text for problem in found)
+
+
+def test_partitions_may_overlap_unless_one_keeps_what_the_other_loses() -> None:
+    """Two partitions, or one and a cut, add up; with hold in one of them it is unclear what becomes of a message."""
+    apart, half = Partition(by="microgrid"), Partition(by="halves")
+    held = msgspec.structs.replace(half, hold=True)
+
+    assert not Netem(partitions=(apart, half), links=(Fault(on="* -> inv2", cut=True),)).problems(
+        NAMES, MICROGRIDS, 9.0
+    )
+    (found,) = Netem(partitions=(apart, held)).problems(NAMES, MICROGRIDS, 9.0)
+    assert "only one of them has hold" in found.text
+
+
+@pytest.mark.parametrize(
+    ("partition", "groups"),
+    [
+        (Partition(by="microgrid"), [NAMES[:3], NAMES[3:6], NAMES[6:]]),
+        (Partition(by="halves"), [NAMES[:5], NAMES[5:]]),
+        (Partition(alone="inv4"), [["inv4"], [name for name in NAMES if name != "inv4"]]),
+        (Partition(groups=(("MG1",), ("inv4", "inv5"))), [NAMES[:3], NAMES[3:5], NAMES[5:]]),
+        (Partition(groups=(("MG1", "plant"),)), [[*NAMES[:3], "plant"], NAMES[3:]]),
+    ],
+)
+def test_a_partition_cuts_exactly_the_links_between_its_groups(partition: Partition, groups: list[list[str]]) -> None:
+    """Within a group all hear each other; of two groups nobody does; the plant hears all unless it is in a group."""
+    group = {name: i for i, names in enumerate(groups) for name in names}
+    for src, dst in links_among(NAMES):
+        apart = src in group and dst in group and group[src] != group[dst]
+        assert bool(partition.spans(src, dst, MICROGRIDS)) == apart
+
+
+def test_a_partition_by_island_follows_the_switches() -> None:
+    """While all are in one island nothing is cut; from the split on, links between islands are."""
+    timeline = [(0.0, dict.fromkeys(NAMES, "grid")), (2.0, MICROGRIDS), (4.0, dict.fromkeys(NAMES, "inv1"))]
+    netem = Netem(partitions=(Partition(by="island", from_s=1.0),)).over(timeline)
+
+    assert [(s.from_s, s.to_s) for s in netem.spans(Link("inv1", "inv4"), MICROGRIDS)] == [(2.0, 4.0)]
+    assert netem.spans(Link("inv1", "inv2"), MICROGRIDS) == ()
+
+
+changes = st.lists(
+    st.one_of(
+        st.builds(
+            lambda on, t, length, kind: Fault(on=on, from_s=t, to_s=t + length, **kind),
+            st.sampled_from(["inv1 -> inv2", "* <-> inv2", "MG1 <-> MG2", "plant -> *"]),
+            st.integers(0, 9).map(float),
+            st.integers(1, 5),
+            st.sampled_from([{"delay": 0.1}, {"delay": 0.2}, {"loss": 0.1}, {"cut": True}, {"cut": Cut(hold=True)}]),
+        ),
+        st.builds(Heal, on=st.sampled_from(["* -> inv2", "MG1 <-> MG2"]), from_s=st.integers(0, 9).map(float)),
+    ),
+    max_size=5,
+)
+
+
+@steady
+@given(changes, st.integers(0, 19))
+def test_a_run_with_live_changes_can_be_replayed_from_a_schedule(done: list[Change], tick: int) -> None:
+    """The schedule without changes has on every link, at every time, what the changed one had, and is consistent."""
+    netem = Netem(
+        links=(Fault(on="* -> inv2", delay=0.5, from_s=3.0),),
+        partitions=(Partition(by="halves", from_s=2.0, to_s=6.0),),
+    )
+    again = replayed(netem, done, MICROGRIDS)
+
+    assert not again.problems(NAMES, MICROGRIDS, 20.0)
+    assert not again.partitions
+    for link in links_among(["inv1", "inv2", "inv4", "inv9"]):
+        was, now = schedule_of(link, netem, done, MICROGRIDS), schedule_of(link, again, (), MICROGRIDS)
+        for schedule, other in ((was, now), (now, was)):
+            for kind, span in schedule.at(tick / 2).active.items():
+                assert kind not in ("delay", "loss") or span.model == other.at(tick / 2).active[kind].model
+        (ready, reason), (again_ready, again_reason) = was.passes(tick / 2), now.passes(tick / 2)
+        assert bool(reason) == bool(again_reason)
+        assert reason or ready == again_ready
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_is_plausible_and_tells_its_source(name: str) -> None:
+    """Every profile passes the checks that a user's numbers pass, and says what is assumed or where it is from."""
+    fault = Fault(on="* <-> *", profile=name)
+
+    assert not Netem(links=(fault,)).problems(NAMES, MICROGRIDS, 10.0)
+    assert "assumed" in PROFILES[name].source or "et al." in PROFILES[name].source
+
+
+def test_the_der_requirement_is_what_was_published() -> None:
+    """300 ms single trip and 1 % loss (Zhang et al., Energies 2018, abstract)."""
+    models = Fault(on="* <-> *", profile="der-requirement").models()
+
+    assert models == {"delay": Constant(delay_s=0.3), "loss": Bernoulli(p=0.01)}
+
+
+@steady
+@given(
+    st.builds(
+        Fault,
+        on=st.just("* -> *"),
+        delay=st.one_of(
+            st.none(), st.floats(0.0, 9.0), st.builds(Lognormal, median_s=st.floats(0.001, 1), sigma=st.floats(0.01, 2))
+        ),
+        loss=st.one_of(st.none(), st.floats(0, 1), st.builds(GilbertElliott, p=st.floats(0, 1), r=st.floats(0.001, 1))),
+        cut=st.sampled_from([None, True, Cut(hold=True)]),
+    )
+)
+def test_what_is_plausible_is_no_problem_and_survives_the_way_to_an_agent(fault: Fault) -> None:
+    """Numbers within their ranges pass, and an agent is told exactly what the file says."""
+    assert fault.problems() == [] or fault.models() == {}
+    assert msgspec.json.decode(msgspec.json.encode(fault), type=Fault) == fault

@@ -1,0 +1,231 @@
+"""A fault of somebody's own: where it stands among the others, its numbers, and what becomes of one that fails."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from netem.channel import Channel
+from netem.check.rows import LinkTest
+from netem.check.verify import verify
+from netem.ledger import LinkTrace
+from netem.models.own_fault import FAULTS, LinkFault
+from netem.receiver import Receiver
+from netem.schema.change import replayed
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.emulation.link_command import LinkCommand
+from wire.plugin import Plugin, plugin_problems
+from wire.registry import PluginError
+from wire.table_reading import read_table
+
+MODULE = '''
+from typing import Annotated
+from gridpeers import LinkFault, Range, Unit
+
+class Jam(LinkFault):
+    """Lose messages in the first part of every second, and delay the others."""
+    share: Annotated[float, Range(0, 1), "Part of a second."] = 0.2
+    delay: Annotated[float, Unit("s"), Range(0, 1), "Of the others."] = 0.01
+    def judge(self, message, draws):
+        if message.t % 1.0 < self.share and draws.uniform() < 0.5:
+            return None
+        return self.delay * draws.uniform(1)
+
+class Late(LinkFault):
+    def judge(self, message, draws):
+        if message.seq == 3:
+            raise RuntimeError("no idea")
+        return 0.1
+
+class Leaves(LinkFault):
+    def judge(self, message, draws):
+        raise SystemExit(3)
+
+class Early(LinkFault):
+    def judge(self, message, draws):
+        return -0.1
+
+class Sized(LinkFault):
+    def judge(self, message, draws):
+        return 0.1 if message.size > 50 else 0.0
+
+class Counts(LinkFault):
+    seen = 0
+    def judge(self, message, draws):
+        Counts.seen += 1
+        return 0.0 if Counts.seen < 250 else 0.1
+
+class Deaf(LinkFault):
+    def judge(self, message):
+        return 0.0
+'''
+LINK = Link("inv1", "inv2")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A folder with somebody's module `my_faults`."""
+    (tmp_path / "my_faults.py").write_text(MODULE, encoding="utf-8")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield str(tmp_path)
+    sys.modules.pop("my_faults", None)
+
+
+def fault(folder: str, name: str, **values: object) -> Fault:
+    """An entry with one fault of `my_faults`, and others."""
+    own = Plugin(use=f"my_faults:{name}", folder=folder, parameters=tuple(values.pop("parameters", ())))  # type: ignore[arg-type]
+    return Fault(on="inv1 -> inv2", own=(own,), **values)  # type: ignore[arg-type]
+
+
+def channel(entry: Fault, seed: int = 1) -> Channel:
+    """One link with one entry."""
+    return Channel(LINK, entry.spans(*LINK, {}), seed)
+
+
+def test_its_numbers_are_looked_up_so_that_every_driver_has_the_same(folder: str) -> None:
+    """A message's fate depends on seed, link and number alone, not on which messages were judged before it."""
+    entry = fault(folder, "Jam", parameters=(("share", 0.5),))
+    one, other = channel(entry), channel(msgspec.json.decode(msgspec.json.encode(entry), type=Fault))
+    fates = [one.judge(seq, 0.02 * seq, 100) for seq in range(200)]
+    again = {seq: other.judge(seq, 0.02 * seq, 100) for seq in range(0, 200, 3)}
+    lost = [fate.reason == "fault" for fate in fates]
+
+    assert [again[seq] for seq in again] == fates[::3]
+    assert 25 < sum(lost) < 75
+    assert not any(lost[26:50])
+    assert fates != [channel(entry, seed=2).judge(seq, 0.02 * seq, 100) for seq in range(200)]
+
+
+def test_it_adds_to_a_delay_and_leaves_other_faults_their_fates(folder: str) -> None:
+    """It acts after loss: what is lost is lost with it or without."""
+    both = channel(fault(folder, "Jam", delay=0.2, loss=0.3))
+    plain = channel(Fault(on="inv1 -> inv2", delay=0.2, loss=0.3))
+    pairs = [(both.judge(seq, 0.02 * seq, 100), plain.judge(seq, 0.02 * seq, 100)) for seq in range(100)]
+
+    assert all((ours.reason == "loss") == (theirs.reason == "loss") for ours, theirs in pairs)
+    assert all(0.2 < ours.deliveries[0][0] < 0.21 for ours, _ in pairs if ours.deliveries)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Late", "link fault my_faults:Late on inv1 -> inv2 raised RuntimeError: no idea at t = 0.06 s, message 3; it"),
+        (
+            "Leaves",
+            "my_faults:Leaves on inv1 -> inv2 raised SystemExit: 3 at t = 0 s, message 0; it does nothing since",
+        ),
+        ("Early", "my_faults:Early on inv1 -> inv2 returned -0.1; return a delay from 0 to 3600 s, or None to drop at"),
+    ],
+)
+def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, name: str, said: str) -> None:
+    """The messages go on as if it were not there; the report of the link has the sentence."""
+    receiver = Receiver("inv2", Netem(links=(fault(folder, name),)), {"inv1": "MG1", "inv2": "MG1"})
+    for seq in range(6):
+        receiver.offer("inv1", seq, 0.02 * seq, 0.02 * seq, b"state")
+    arrived = [round(arrival.delay, 9) for arrival in receiver.due(1.0)]
+    (told,) = receiver.take_failures()
+
+    assert sorted(arrived) == ([0.0, 0.0, 0.0, 0.1, 0.1, 0.1] if name == "Late" else [0.0] * 6)
+    assert said in told
+    assert receiver.take_failures() == ()
+
+
+def rows(entry: Fault, **changed: float) -> tuple[dict[str, LinkTest], tuple[str, ...]]:
+    """What the self-check makes of 200 messages, of which some had another delay (s) than the link gave them."""
+    link = channel(entry)
+    fates = [link.judge(seq, 0.02 * seq, 100) for seq in range(200)]
+    outcomes = [fate.reason or fate.deliveries[0][0] for fate in fates]
+    for seq, delay in changed.items():
+        outcomes[int(seq.removeprefix("m"))] = delay
+    trace = LinkTrace(*LINK, tuple(range(200)), tuple(0.02 * seq for seq in range(200)), tuple(outcomes))
+    found = verify([trace], {LINK: entry.spans(*LINK, {})}, seed=1)
+    return {row.what: row for row in found.rows}, found.warnings
+
+
+def test_the_self_check_asks_it_again_and_sees_the_delay_behind_it(folder: str) -> None:
+    """It must say what it said in the run; what it added is taken away before the delay is tested."""
+    found, warnings = rows(fault(folder, "Jam", delay=0.2, loss=0.3))
+
+    own = found["my_faults:Jam"]
+    assert (own.realised, own.ok) == (f"the same, {own.n} times", True)
+    assert found["delay"].n < own.n < 200, "those that it drops have no delay, those that loss drops do not meet it"
+    assert found["delay"].realised == f"exactly, {found['delay'].n} times"
+    assert found["delay"].ok is found["loss"].ok is True
+    assert warnings == ()
+
+
+def test_the_self_check_finds_a_fault_that_cannot_be_repeated(folder: str) -> None:
+    """One message that came later than judge says, and a fault that counts what it has seen in other runs."""
+    tampered, (warning,) = rows(fault(folder, "Jam"), m199=3.0)
+    row = tampered["my_faults:Jam"]
+    counting, told = rows(fault(folder, "Counts"))
+
+    assert (row.realised, row.ok) == ("otherwise for 1 of 200", False)
+    assert "judge may depend on the message and the draws alone" in warning
+    assert counting["my_faults:Counts"].ok is False
+    assert len(told) == 1
+
+
+def test_the_self_check_says_what_it_cannot_ask(folder: str) -> None:
+    """Sizes of messages are not recorded, and of two such faults it cannot tell which did what."""
+    sized, _ = rows(fault(folder, "Sized", delay=0.2))
+    both = Fault(on="inv1 -> inv2", own=(*fault(folder, "Jam").own, *fault(folder, "Sized").own))
+
+    assert sized["my_faults:Sized"].realised.startswith("not tested: it fails, or looks at the size of a message")
+    assert sized["delay"].realised == "not tested: my_faults:Sized on it"
+    assert rows(both)[0]["my_faults:Jam"].realised == "not tested: my_faults:Sized on it"
+
+
+def test_every_problem_of_an_entry_is_told_at_its_key(folder: str) -> None:
+    """Parameters with their range, and names that there are not."""
+    tables = {
+        "link": [{"on": "* <-> *", "my_faults:Jam": {"share": 3, "folder": folder}, "my_faults:Jem": True, "jam": 1}]
+    }
+    netem, wrong = read_table(Netem, tables)
+    (entry,) = netem.links
+    placed = msgspec.structs.replace(
+        entry, own=tuple(msgspec.structs.replace(it, folder=folder) for it in reversed(entry.own))
+    )
+    told = {problem.path: problem.text for problem in placed.problems()}
+
+    assert [problem.path for problem in wrong] == ["link[0].jam"]
+    assert told["my_faults:Jam.share"] == "must be from 0 to 1, got 3"
+    assert 'module my_faults has no "Jem"; did you mean "Jam"?' in told["my_faults:Jem"]
+    assert "judge(self, message, draws)" in plugin_problems(FAULTS, Plugin(use="my_faults:Deaf", folder=folder))[0][1]
+    assert read_table(Netem, {"link": [{"on": "* <-> *", "my_faults:Jam": 3}]})[1][0].text.startswith("must be true or")
+
+
+def test_a_run_with_one_can_be_replayed(folder: str) -> None:
+    """The file of a run by hand names it again, with its parameters and its folder."""
+    entry = fault(folder, "Jam", parameters=(("share", 0.5),), from_s=1.0)
+    (again,) = replayed(Netem(links=(entry,)), (), {"inv1": "MG1", "inv2": "MG1"}).links
+
+    assert (again.on, again.own, again.from_s) == (entry.on, entry.own, 1.0)
+
+
+def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
+    """A live order with a fault of somebody's own is no order; in the setup of a run it travels unharmed."""
+    entry = fault(folder, "Jam")
+    setup = EmulationConfig(netem=Netem(links=(entry,)), microgrids={"inv1": "MG1"})
+
+    assert EmulationConfig.of_tree(setup.to_tree()) == setup
+    with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
+        LinkCommand.of_text(LinkCommand(fault=entry).to_text())
+
+
+def test_a_decorator_adds_a_fault_and_takes_over_none_of_ours() -> None:
+    """`delay` stays what it is."""
+    with pytest.raises(PluginError, match='there is a link fault "delay" already'):
+
+        @FAULTS.register("delay")
+        class Mine(LinkFault):
+            def judge(self, message, draws):  # type: ignore[no-untyped-def]
+                """Nothing."""
+                return 0.0

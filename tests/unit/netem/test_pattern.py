@@ -1,0 +1,87 @@
+"""Patterns of links: what they mean and what is wrong with them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netem.schema.pattern import Link, links_among, objections, parse
+from tests.unit.netem.link_messages import MICROGRIDS, steady
+
+NAMES = list(MICROGRIDS)
+ENDS = [*NAMES, "plant"]
+
+
+def meant(pattern: str) -> set[Link]:
+    """Links that a pattern means."""
+    return {link for link in links_among(NAMES) if parse(pattern).matches(*link, MICROGRIDS)}
+
+
+def pairs(left: list[str], right: list[str]) -> set[Link]:
+    """Every directed link from one of the left to one of the right."""
+    return {Link(src, dst) for src in left for dst in right if src != dst}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "links"),
+    [
+        ("inv4 -> inv7", pairs(["inv4"], ["inv7"])),
+        ("inv4 <-> inv7", pairs(["inv4"], ["inv7"]) | pairs(["inv7"], ["inv4"])),
+        ("MG1 -> MG2", pairs(NAMES[:3], NAMES[3:6])),
+        ("mg1 <-> Mg1", pairs(NAMES[:3], NAMES[:3])),
+        ("* -> inv2", pairs(NAMES, ["inv2"])),
+        ("* <-> *", pairs(NAMES, NAMES)),
+        ("plant -> inv2", pairs(["plant"], ["inv2"])),
+        ("inv2 -> plant", pairs(["inv2"], ["plant"])),
+        ("plant <-> *", pairs(["plant"], NAMES) | pairs(NAMES, ["plant"])),
+        ("{inv1, MG2} <-> inv3", pairs(["inv1", *NAMES[3:6]], ["inv3"]) | pairs(["inv3"], ["inv1", *NAMES[3:6]])),
+        ("{*, plant} -> inv2", pairs(ENDS, ["inv2"])),
+        ("MG1->inv5", pairs(NAMES[:3], ["inv5"])),
+    ],
+)
+def test_a_pattern_means_these_links(pattern: str, links: set[Link]) -> None:
+    """Names, microgrids in any case, sets, all agents, and the plant where it is named."""
+    assert meant(pattern) == links
+    assert objections(pattern, NAMES, MICROGRIDS) == []
+
+
+side = st.one_of(
+    st.sampled_from([*ENDS, "MG1", "MG3", "*"]),
+    st.lists(st.sampled_from(NAMES), min_size=1).map(lambda n: f"{{{', '.join(n)}}}"),
+)
+
+
+@steady
+@given(side, side)
+def test_both_ways_is_one_way_and_the_other(left: str, right: str) -> None:
+    """`<->` means what the two arrows mean together."""
+    assert meant(f"{left} <-> {right}") == meant(f"{left} -> {right}") | meant(f"{right} -> {left}")
+
+
+def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
+    """A spare inverter matches by its microgrid and by `*` as soon as it is known."""
+    known = MICROGRIDS | {"inv10": "MG3"}
+
+    assert parse("MG3 -> inv1").matches("inv10", "inv1", known)
+    assert parse("* -> inv1").matches("inv10", "inv1", {})
+
+
+@pytest.mark.parametrize(
+    ("pattern", "words"),
+    [
+        ("inv4 - inv7", ['"inv4 - inv7" names no links', 'write "inv4 <-> inv7"']),
+        ("inv4 <- inv7", ["write the sender first"]),
+        ("", ["names no links"]),
+        ("inv1 ->", ["is no name"]),
+        ("inv1 -> inv22", ['nobody is called "inv22"', 'did you mean "inv2"?']),
+        ("MG7 -> inv1", ['nobody is called "MG7"', 'did you mean "MG']),
+        ("inv1 -> inv1", ["matches nothing", "two different ends"]),
+        ("plant -> plant", ["matches nothing"]),
+    ],
+)
+def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]) -> None:
+    """The problem quotes the pattern and says what would be right."""
+    (text,) = objections(pattern, NAMES, MICROGRIDS)
+
+    assert all(word in text for word in words), text

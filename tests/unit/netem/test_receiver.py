@@ -1,0 +1,280 @@
+"""The receiver: accounting, order, live changes, and fates that nothing elsewhere can change."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netem.ledger import LinkTrace
+from netem.models.corrupt import Corrupt
+from netem.models.cut import Cut
+from netem.models.delay import Lognormal, Uniform
+from netem.models.duplicate import Duplicate
+from netem.models.flap import Flap
+from netem.models.loss import GilbertElliott
+from netem.models.rate import Rate
+from netem.models.slots import Slots
+from netem.receiver import Receiver
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.partition import Partition
+from tests.unit.netem.link_messages import MICROGRIDS, T_C, receiver, steady
+from wire.links import Arrival
+
+PAYLOAD = bytes(range(120))
+
+KINDS: dict[str, Any] = {
+    "delay": Lognormal(median_s=0.03, sigma=1.0),
+    "loss": GilbertElliott(p=0.1, r=0.3),
+    "duplicate": Duplicate(p=0.3, extra_delay_s=0.05),
+    "corrupt": Corrupt(p=0.2, checksum=True),
+    "rate": Rate(bytes_per_s=7000.0, queue_bytes=500),
+    "slots": Slots(period_s=0.1, length_s=0.03),
+    "cut": Cut(hold=True),
+    "flap": Flap(up_s=0.2, down_s=0.1, hold=True),
+}
+
+
+def faults(on: str) -> st.SearchStrategy[Fault]:
+    """An entry of any kinds, for any time of the first seconds."""
+    chosen = st.sets(st.sampled_from(list(KINDS)), min_size=1).map(lambda kinds: {kind: KINDS[kind] for kind in kinds})
+    return st.builds(
+        lambda kinds, start, length: Fault(on=on, from_s=start / 10, to_s=(start + length) / 10, **kinds),
+        chosen,
+        st.integers(0, 20),
+        st.integers(1, 20),
+    )
+
+
+def send(to: Receiver, ticks: range, *sources: str) -> list[Arrival]:
+    """What arrives of a message a tick from each source, taken at every tick."""
+    arrived = []
+    for k in ticks:
+        for src in sources or ("inv1",):
+            to.offer(src, k, k * T_C, k * T_C, PAYLOAD)
+        arrived += to.due(k * T_C)
+    return arrived
+
+
+def outcomes(traces: tuple[LinkTrace, ...]) -> dict[str, Any]:
+    """Last verdict of each message, by sender."""
+    return {trace.src: dict(zip(trace.seq, trace.outcome, strict=True)) for trace in traces}
+
+
+@steady
+@given(
+    st.lists(faults("* -> inv2"), max_size=4), st.lists(st.tuples(st.integers(1, 99), faults("* -> inv2")), max_size=3)
+)
+def test_accounting_closes_whatever_happens(entries: list[Fault], live: list[tuple[int, Fault]]) -> None:
+    """At every tick sent + duplicated = delivered + dropped + in flight, and what is handed out counts as delivered."""
+    to = receiver(*entries)
+    handed = 0
+    for k in range(100):
+        for at, fault in live:
+            if at == k:
+                to.change(fault, k * T_C)
+            if at + 10 == k:
+                to.heal("* -> inv2", k * T_C)
+        handed += len(send(to, range(k, k + 1), "inv1", "inv3"))
+        assert all(count.closes for count in to.counts().values())
+        assert handed == sum(count.delivered for count in to.counts().values())
+        assert min(count.in_flight for count in to.counts().values()) >= 0
+    to.due(1e6)
+    assert all(count.closes and not count.in_flight for count in to.counts().values())
+
+
+@steady
+@given(faults("inv1 -> inv2"), faults("* -> inv3"), faults("inv4 -> inv2"), st.integers(1, 5))
+def test_nothing_elsewhere_changes_a_links_fates(own: Fault, other: Fault, third: Fault, extra: int) -> None:
+    """Faults and agents on other links leave every verdict of a link as it was."""
+    alone, among = receiver(own), receiver(third, other, own)
+    send(alone, range(100))
+    send(among, range(100), *[f"inv{i}" for i in range(4, 4 + extra)], "inv1")
+
+    assert alone.take_trace() == tuple(trace for trace in among.take_trace() if trace.src == "inv1")
+
+
+@steady
+@given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt", "slots"]), min_size=1), st.integers(0, 90))
+def test_a_cut_on_a_link_shifts_no_other_fate_on_it(kinds: set[str], start: int) -> None:
+    """Before and after a cut each message fares as if there had been none."""
+    own = {kind: KINDS[kind] for kind in kinds}
+    whole, cut = (
+        receiver(Fault(on="inv1 -> inv2", **own)),
+        receiver(
+            Fault(on="inv1 -> inv2", **own),
+            Fault(on="inv1 -> inv2", cut=True, from_s=start * T_C, to_s=(start + 10) * T_C),
+        ),
+    )
+    send(whole, range(100))
+    send(cut, range(100))
+    before, after = outcomes(whole.take_trace())["inv1"], outcomes(cut.take_trace())["inv1"]
+
+    assert {k: after[k] for k in range(start, min(start + 10, 100))} == dict.fromkeys(
+        range(start, min(start + 10, 100)), "cut"
+    )
+    assert {k: v for k, v in after.items() if v != "cut"} == {k: before[k] for k, v in after.items() if v != "cut"}
+
+
+@steady
+@given(st.sets(st.sampled_from(["delay", "loss", "duplicate", "corrupt"]), min_size=1), st.sets(st.integers(0, 99)))
+def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str], missed: set[int]) -> None:
+    """Times that wander, a way that takes time and messages never seen change no fate, nor does another process."""
+    fault = Fault(on="inv1 -> inv2", **{kind: KINDS[kind] for kind in kinds})
+    simulated, wall = receiver(fault), receiver(fault)
+    send(simulated, range(100))
+    for k in sorted(set(range(100)) - missed):
+        wall.offer("inv1", k, 0.7 + k * 0.0213, 0.703 + k * 0.0213, PAYLOAD)
+    fates, seen = outcomes(simulated.take_trace()), outcomes(wall.take_trace())
+
+    assert seen.get("inv1", {}) == {k: v for k, v in fates["inv1"].items() if k not in missed}
+
+
+@steady
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 8)), max_size=30))
+def test_messages_are_handed_out_in_the_order_of_arrival_number_and_sender(offers: list[tuple[int, int]]) -> None:
+    """What arrives at one time is sorted by number, then by sender, whoever was offered first."""
+    to = receiver(Fault(on="* -> inv2", delay=0.3))
+    for src, seq in dict.fromkeys(offers):
+        to.offer(f"inv{3 + src}", seq, seq * 0.1, seq * 0.1, bytes([seq, src]))
+
+    arrived = [tuple(arrival.payload) for arrival in to.due(10.0)]
+
+    assert arrived == sorted({(seq, src) for src, seq in offers})
+
+
+def test_a_delay_of_whole_ticks_ends_at_that_tick() -> None:
+    """A message of tick k with a delay of 5 T_c is there at tick k + 5 and not before, at every one of 10 000 ticks."""
+    to = receiver(Fault(on="* -> inv2", delay=0.1))
+    for k in range(10_000):
+        to.offer("inv1", k, k * T_C, k * T_C, PAYLOAD)
+        assert len(to.due(k * T_C)) == (k >= 5)
+
+
+@steady
+@given(st.lists(st.floats(0.0, 0.015), min_size=20, max_size=20))
+def test_the_way_to_the_receiver_reorders_nothing_that_netem_leaves_in_order(jitter: list[float]) -> None:
+    """In wall-clock time the real way's jitter adds to netem's delays, and no message overtakes another by it."""
+    to = receiver(Fault(on="inv1 -> inv2", delay=Uniform(low_s=0.01, high_s=0.2, fifo=True)))
+    at = 0.0
+    for k in range(20):
+        at = max(at, k * T_C + jitter[k])
+        to.offer("inv1", k, k * T_C, at, bytes([k]))
+
+    arrived = [arrival.payload[0] for step in range(200) for arrival in to.due(step * 0.002)] + [
+        arrival.payload[0] for arrival in to.due(9.0)
+    ]
+    assert arrived == list(range(20))
+
+
+def test_a_corrupted_message_has_one_flipped_bit_or_is_dropped_by_the_checksum() -> None:
+    """Without a checksum the flipped message is handed on; with it the same messages are dropped and counted."""
+    plain, checked = (receiver(Fault(on="* -> inv2", corrupt=Corrupt(p=0.3, checksum=c))) for c in (False, True))
+    handed, sound = send(plain, range(200)), send(checked, range(200))
+    changed = [
+        sum((one ^ other).bit_count() for one, other in zip(arrival.payload, PAYLOAD, strict=True))
+        for arrival in handed
+    ]
+
+    assert set(changed) == {0, 1}
+    assert sum(changed) == plain.counts()["inv1"].corrupted == checked.counts()["inv1"].dropped["checksum"]
+    assert [arrival.payload for arrival in sound] == [PAYLOAD] * changed.count(0)
+
+
+def test_a_link_without_a_fault_is_known_as_such_and_leaves_no_trace() -> None:
+    """Whether a fault may ever act is known before any message; what passes untouched is counted and not recorded."""
+    to = receiver(Fault(on="inv1 -> inv2", delay=0.1, from_s=50.0), Fault(on="plant -> inv3", loss=0.1))
+
+    assert [to.touched(src) for src in ("inv1", "inv3", "plant")] == [True, False, False]
+    assert len(send(to, range(10), "inv3")) == 10
+    assert to.take_trace() == ()
+    assert to.counts()["inv3"].delivered == 10
+
+
+def test_the_hash_of_the_trace_does_not_depend_on_when_it_is_looked_at() -> None:
+    """Two processes that take their traces at other times, or never, come to one hash; another seed to another."""
+    entries = (Fault(on="* -> inv2", **{kind: KINDS[kind] for kind in ("delay", "loss", "duplicate", "corrupt")}),)
+    often, never, other = receiver(*entries), receiver(*entries), receiver(*entries, seed=2)
+    for k in range(2000):
+        send(often, range(k, k + 1), "inv1", "inv3")
+        if k % 7 == 0:
+            often.take_trace()
+    send(never, range(2000), "inv3", "inv1")
+    send(other, range(2000), "inv1", "inv3")
+
+    assert often.trace_sha256 == never.trace_sha256 != other.trace_sha256
+
+
+def test_a_live_fault_acts_from_its_time_on_and_heals() -> None:
+    """Messages sent before the change or after the healing fare as the scenario has it, those between as was said."""
+    to = receiver(Fault(on="* -> inv2", delay=0.1))
+    send(to, range(50))
+    assert to.change(Fault(on="inv1 <-> inv2", delay=0.5, loss=0.0), 1.0) == ("inv1",)
+    send(to, range(50, 100))
+    to.heal("inv1 <-> inv2", 2.0, kinds=("loss",))
+    send(to, range(100, 150))
+    to.heal("* -> inv2", 3.0)
+    send(to, range(150, 200))
+    seen = outcomes(to.take_trace())["inv1"]
+
+    assert [seen[k] for k in range(200)] == [0.1] * 50 + [0.5] * 100 + [0.0] * 50
+
+
+def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> None:
+    """A live cut without an end, healed at 1 s, delivers the same messages, as late, as one planned to 1 s."""
+    rest = Fault(on="* -> inv2", delay=0.05, rate=Rate(bytes_per_s=20_000.0), loss=0.2, duplicate=0.2)
+    live, planned = receiver(rest), receiver(rest, Fault(on="inv1 -> inv2", cut=Cut(hold=True), from_s=0.5, to_s=1.0))
+    arrived = send(live, range(25))
+    live.change(Fault(on="inv1 -> inv2", cut=Cut(hold=True)), 0.5)
+    arrived += send(live, range(25, 50))
+    assert live.counts()["inv1"].in_flight >= 25
+    live.heal("inv1 -> inv2", 1.0, kinds=("cut",))
+    arrived += send(live, range(50, 100))
+
+    assert arrived == send(planned, range(100))
+    live.due(9.0)
+    planned.due(9.0)
+    assert live.counts() == planned.counts()
+    assert outcomes(live.take_trace()) == outcomes(planned.take_trace())
+
+
+def test_a_link_heard_first_after_a_change_is_changed_as_well() -> None:
+    """A newcomer's link has what was said of it before it came."""
+    to = receiver()
+    to.change(Fault(on="MG4 -> MG1", cut=True), 0.0)
+    to.meet("inv10", "MG4")
+    send(to, range(3), "inv10")
+
+    assert to.counts()["inv10"].dropped == {"cut": 3}
+
+
+def test_a_partition_is_felt_by_links_between_groups_and_by_the_plants_only_if_named() -> None:
+    """Microgrids apart hear nobody else; the plant's links stay."""
+    to = Receiver("inv2", Netem(partitions=(Partition(by="microgrid", from_s=0.0, to_s=1.0),)), MICROGRIDS)
+    send(to, range(100), "inv1", "inv4", "plant")
+
+    assert {src: count.dropped for src, count in to.counts().items()} == {
+        "inv1": {},
+        "inv4": {"partition": 50},
+        "plant": {},
+    }
+
+
+def test_until_is_when_the_next_message_is_due() -> None:
+    """A wall-clock driver that wakes at `until` gets the next message, and nothing a nanosecond earlier."""
+    to = receiver(Fault(on="* -> inv2", delay=KINDS["delay"]))
+    for k in range(50):
+        to.offer("inv1", k, k * T_C, k * T_C, PAYLOAD)
+    times = []
+    while (until := to.until) is not None:
+        assert to.due(until - 1e-9) == []
+        assert to.due(until)
+        times.append(until)
+
+    assert all(one <= other for one, other in pairwise(times))
+    assert to.counts()["inv1"].delivered == 50
+    assert times[0] == pytest.approx(min(times))

@@ -1,0 +1,201 @@
+"""Sweep files: what they come to, and that every problem in them is told at once, before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.schema import ScenarioError
+from scenarios.sweep.file import read_sweep, sweeps
+from scenarios.sweep.file.paths import PathError, put
+from tests.unit.scenarios.sweep.conftest import Write
+
+
+def problems_of(path: Path) -> list[str]:
+    """All problems of a sweep file."""
+    with pytest.raises(ScenarioError) as caught:
+        read_sweep(path)
+    return list(caught.value.problems)
+
+
+@pytest.mark.parametrize("name", sweeps())
+def test_every_sweep_of_the_catalogue_can_be_run(name: str) -> None:
+    """What comes with gridpeers has no problem and a title."""
+    plan = read_sweep(name)
+
+    assert plan.title
+    assert plan.name == name
+
+
+def test_the_example_of_the_manual_is_a_sweep(sweep_file: Write) -> None:
+    """docs/sweeps.md shows every table in one file: 2 x 2 x 2 x 4 samples on 3 graphs with 2 seeds."""
+    manual = (Path(__file__).parents[4] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+
+    plan = read_sweep(sweep_file(manual.partition("## The file\n```\n")[2].partition("```")[0]))
+
+    assert len(plan.runs) == 2 * 2 * 2 * 4 * 3 * 2
+
+
+def test_the_topology_sweep_has_ten_graphs_for_each_number_of_links() -> None:
+    """The paper's figure, from 8 links to 36; with 36 there is but one graph."""
+    plan = read_sweep("topology")
+    counts: dict[int, set[str]] = {}
+    for run in plan.runs:
+        counts.setdefault(run.shown["graph.links"], set()).add(run.shown["graph.edges"])
+        assert run.scenario.cases["IV"].graph == "links"
+        assert len(run.scenario.cases["IV"].links) == run.shown["graph.links"]
+
+    assert {links: len(graphs) for links, graphs in counts.items() if links < 36} == dict.fromkeys(
+        (8, 9, 10, 12, 16, 20, 24, 28, 32), 10
+    )
+    assert len(counts[36]) == 1
+
+
+def test_every_combination_comes_once_and_in_order(sweep_file: Write) -> None:
+    """Grid, zip and seeds are crossed, the last fastest; zipped keys go together; both ways to write a path hold."""
+    plan = read_sweep(
+        sweep_file(
+            """
+[grid]
+gains.k_p = [0.0005, 0.0007]
+"event[0].t_s" = [0.1, 0.12]
+[zip]
+"case.IV.graph" = ["full", "ring"]
+"case.IV.title" = ["all", "round"]
+"""
+        )
+    )
+    got = [
+        (
+            run.scenario.cases["IV"].gains.k_p,
+            run.scenario.events[0].t_s,
+            run.scenario.cases["IV"].graph,
+            run.scenario.cases["IV"].title,
+        )
+        for run in plan.runs
+    ]
+
+    assert got == [
+        (k_p, t, graph, title)
+        for k_p in (0.0005, 0.0007)
+        for t in (0.1, 0.12)
+        for graph, title in (("full", "all"), ("ring", "round"))
+    ]
+    assert [run.sample for run in plan.runs] == list(range(8))
+
+
+def test_seeds_follow_that_of_the_scenario(sweep_file: Write) -> None:
+    """The key seeds runs every point with n seeds."""
+    path = sweep_file("")
+    path.write_text("seeds = 3\n" + path.read_text() + '\n"seed" = 7\n[grid]\n"gains.k_p" = [0.0005]\n')
+    mixed = problems_of(path)
+    path.write_text(path.read_text().replace('"seed" = 7\n', ""))
+
+    assert [run.scenario.seed for run in read_sweep(path).runs] == [1, 2, 3]
+    assert mixed == ["mine.toml:1: seeds: seed is set by set.seed already; leave one of them out"]
+
+
+def test_a_latin_hypercube_has_one_sample_in_every_slice(sweep_file: Write) -> None:
+    """Each key's 8 samples fall into the 8 slices of equal probability, by its law; the draws are the seed's."""
+    text = """
+[random]
+samples = 8
+seed = 5
+[random.keys]
+"gains.alpha" = { uniform = [1.0, 3.0] }
+"gains.k_p" = { loguniform = [1e-4, 1e-2] }
+"plant.load_set" = { choice = ["main", "event2"] }
+"""
+    plan, again = read_sweep(sweep_file(text)), read_sweep(sweep_file(text))
+    other = read_sweep(sweep_file(text.replace("seed = 5", "seed = 6")))
+    alpha = np.array([run.scenario.gains.alpha for run in plan.runs])
+    k_p = np.array([run.scenario.gains.k_p for run in plan.runs])
+
+    assert sorted(((alpha - 1.0) / 2.0 * 8).astype(int)) == list(range(8))
+    assert sorted((np.log10(k_p / 1e-4) / 2.0 * 8).astype(int)) == list(range(8))
+    assert sorted(run.scenario.plant.load_set for run in plan.runs) == ["event2"] * 4 + ["main"] * 4
+    assert plan.fingerprint == again.fingerprint != other.fingerprint
+
+
+def test_the_fingerprint_is_of_what_is_run_and_not_of_how_it_is_written(sweep_file: Write) -> None:
+    """A comment or a range instead of a list makes no other sweep; a changed value does."""
+    plain = read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0006, 0.0007]')).fingerprint
+    ranged = "# the same\n[grid]\ngains.k_p = { from = 0.0005, to = 0.0007, count = 3 }"
+
+    assert read_sweep(sweep_file(ranged)).fingerprint == plain
+    assert read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0006, 0.0008]')).fingerprint != plain
+
+
+def test_all_problems_of_samples_are_told_at_once_with_their_values(sweep_file: Write) -> None:
+    """An unknown key has a suggestion; a bad value, and one that is bad beside another, name key, line and sample."""
+    path = sweep_file('[grid]\n"gains.alpa" = [1.0]\n"time.T_c_s" = [0.02, 20]\n"time.record_s" = [0.01, 0.008]\n')
+    line = path.read_text().splitlines().index("[grid]") + 1
+
+    found = problems_of(path)
+
+    assert len(found) == 3
+    assert found[0].startswith(f'mine.toml:{line + 1}: grid.gains.alpa: unknown key; did you mean "alpha"?')
+    assert found[0].endswith("(in all 4 samples)")
+    assert found[1].startswith(
+        f"mine.toml:{line + 2}: grid.time.T_c_s: 20 s is not plausible for a control period (0.0005 to 2 s); did you "
+        "mean 0.02 (20 ms)? (sample 2: gains.alpa = 1.0, time.T_c_s = 20, time.record_s = 0.01; and in 1 more of 4)"
+    )
+    assert found[2].startswith(f"mine.toml:{line + 3}: grid.time.record_s: 0.008 s does not divide T_c_s = 0.02 s")
+
+
+BAD: list[tuple[str, str]] = [
+    ("seeds = 0\nscenario = 'islanding'", "seeds: must be from 1 to 10000, got 0"),
+    ("scenario = 'islandin'\nseeds = 2", 'no scenario "islandin"; did you mean "islanding"?'),
+    ("scenario = 'islanding'", "nothing is varied"),
+    ("scenario = 'islanding'\nsedes = 2\nseeds = 2", 'sedes: unknown key; did you mean "seeds"?'),
+    ("scenario = 'islanding'\ncases = ['V']\nseeds = 2", 'cases: no case "V"'),
+    ('[grid]\n"gains.k_p" = 0.0005', "grid.gains.k_p: must be a list of values"),
+    ('[grid]\n"gains.k_p" = []', "grid.gains.k_p: has no value"),
+    ('[grid]\n"gains.k_p" = [0.001, 0.001]', "lists 0.001 twice"),
+    ('[grid]\n"gains.k_p" = { from = 0, to = 1, count = 3, spacing = "log" }', "needs two numbers above 0"),
+    ('[grid]\n"gains.k_p" = { from = 0.1, to = 1, cuont = 3 }', 'cuont: unknown key; did you mean "count"?'),
+    ('[grid]\n"gains.k_p" = { from = 0.0001, to = 1, count = 50000 }', "50,000 runs, about 12 min on one core, and"),
+    ('[zip]\n"gains.k_p" = [0.001, 0.002]\n"gains.k_q" = [0.2]', "gains.k_p has 2, gains.k_q has 1"),
+    ('[grid]\n"gains.k_p" = [1]\n[zip]\n"gains.k_p" = [2]', "gains.k_p is set by grid.gains.k_p already"),
+    ('[grid]\n"link[0].delay" = [0.1]', "there is no link[0]; the scenario writes none: give link as a list first"),
+    ('[grid]\n"event[1].t_s" = [0.2]', "there is no event[1]; there is event[0] alone"),
+    ('[grid]\n"case.VI.graph" = ["ring"]', "there is no case.VI; did you mean"),
+    ('[grid]\n"gains..k_p" = [1]', "is no path of a key"),
+    ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { unifrom = [1, 2] }', 'did you mean "uniform"?'),
+    ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { uniform = [2, 1] }', "needs [low, high]"),
+    ('[random]\nsamples = 3\n[random.keys]\n"gains.k_p" = { loguniform = [0, 1] }', "needs bounds above 0"),
+    ('[random.keys]\n"gains.k_p" = { uniform = [1, 2] }', "random.samples: no sample is drawn; write how many"),
+    ("[random]\nsamples = 3", "samples are asked for, but no key is drawn"),
+    ("[graph]\nlinks = [7, 37]", "9 inverters have 8 to 36 links, got 7: fewer cannot join them"),
+    ('[graph]\nlinks = [9]\n[grid]\n"case.IV.graph" = ["ring"]', "case.IV.graph is set by grid.case.IV.graph already"),
+    ("[grid]\nevent = [[]]", "event"),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), BAD)
+def test_a_problem_is_told_by_its_key(sweep_file: Write, text: str, told: str) -> None:
+    """Each problem of a sweep file has its sentence."""
+    assert any(told in problem for problem in problems_of(sweep_file(text))), problems_of(sweep_file(text))
+
+
+def test_a_scenario_beside_the_sweep_is_found_and_its_problems_are_told(sweep_file: Write, tmp_path: Path) -> None:
+    """A relative path starts at the sweep file, and the problems of both files come together."""
+    (tmp_path / "base.toml").write_text("[time]\nend_s = 1.0\nT_c = 0.02\n")
+    found = problems_of(sweep_file('scenario = "base.toml"\nseeds = 0'))
+
+    assert any("base.toml:3: time.T_c: unknown key; write T_c_s" in problem for problem in found)
+    assert any("seeds: must be from 1" in problem for problem in found)
+
+
+def test_any_key_of_a_tree_can_be_set_that_a_later_version_may_know() -> None:
+    """Entries of lists and tables in tables: the tree decides what there is, not today's scenario."""
+    tree: dict[str, Any] = {"link": [{"delay": 0.0, "loss": {"p": 0.0}}]}
+    put(tree, "link[0].loss.p", 0.1)
+    put(tree, "netem.window_s", 2.0)
+
+    assert tree == {"link": [{"delay": 0.0, "loss": {"p": 0.1}}], "netem": {"window_s": 2.0}}
+    with pytest.raises(PathError, match=r"there is no link\[1\]; there is link\[0\] alone"):
+        put(tree, "link[1].delay", 0.1)

@@ -1,0 +1,260 @@
+"""Sweeps that run: killed and resumed, on a cluster, with runs that break; the table is the same every time."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.stats import binomtest
+
+from plant.build import build_plant
+from plant.dynamics import Circuit
+from plant.dynamics.live_network import LiveNetwork
+from plant.dynamics.reduction import Reduction
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.record import Recorder
+from scenarios.results.run_files import FolderError
+from scenarios.schema.configs import configs
+from scenarios.schema.loading import load_scenario
+from scenarios.sweep.file import read_sweep
+from scenarios.sweep.study import Summary, study
+from scenarios.sweep.sweep_case import plant_at_start
+from scenarios.sweep.sweep_folder import SweepFolder
+from tests.unit.scenarios.sweep.conftest import Write
+
+MANY = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'
+"""With 20 seeds 40 runs: enough that a tenth of them is not the end."""
+
+BREAKING = """
+[zip]
+"plant.gfm.k_iv" = [5.86, 1e5, 5.86]
+"plant.gfl.X_f_pu" = [0.15, 0.15, 0.001]
+"""
+"""The first is sound; then controllers are unstable and inverters trip; then the parameters contradict each other."""
+
+
+def done(path: Path, folder: Path, **how: object) -> Summary:
+    """Run a sweep in this process, unless asked otherwise."""
+    plan = read_sweep(path)
+    with SweepFolder(folder, plan) as opened:
+        return study(plan, opened, lambda _: None, **({"jobs": 1} | how))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def many(sweep_file: Write) -> Path:
+    """A sweep of 40 runs."""
+    path = sweep_file("")
+    path.write_text("seeds = 20\n" + path.read_text() + MANY)
+    return path
+
+
+@contextmanager
+def command(*words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
+    """The command in a session of its own, as in a terminal of its own; nothing of it outlives the test."""
+    line = [sys.executable, "-u", "-c", "from gridpeers.cli.app import main; main()", "sweep", *words]
+    with subprocess.Popen(
+        line, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as running:
+        try:
+            yield running
+        finally:
+            if running.poll() is None:
+                os.killpg(running.pid, signal.SIGKILL)
+
+
+def reached_a_tenth(running: subprocess.Popen[str]) -> bool:
+    """Read what the command tells until a tenth of its runs is done."""
+    assert running.stdout is not None
+    return any(line.endswith(" left\n") for line in running.stdout)
+
+
+def test_a_killed_sweep_goes_on_and_gives_the_table_of_an_undisturbed_one(many: Path, tmp_path: Path) -> None:
+    """Kill -9 of all its processes in the middle: what was done stays, nothing is done twice, the table is equal."""
+    journal = tmp_path / "killed" / "runs.jsonl"
+    with command("mine.toml", "--out", "killed", "--jobs", "2", cwd=tmp_path) as running:
+        assert reached_a_tenth(running)
+        os.killpg(running.pid, signal.SIGKILL)
+        running.communicate(timeout=60)  # ends when nobody holds the pipes any more
+    kept = journal.read_bytes()
+    count = kept.count(b"\n")
+    journal.write_bytes(kept + b'{"number":39,"status":"r')  # as if cut off in the middle of a line
+    resumed = done(many, tmp_path / "killed")
+    whole = done(many, tmp_path / "whole")
+    numbers = [json.loads(line)["number"] for line in journal.read_text().splitlines()]
+
+    assert 0 < count < 40
+    assert resumed.before == count
+    assert journal.read_bytes().startswith(kept)
+    assert sorted(numbers) == list(range(40))
+    assert pq.read_table(tmp_path / "killed" / "results.parquet").equals(pq.read_table(whole.table))
+    assert (tmp_path / "killed" / "status.txt").read_text() == "complete\n"
+
+
+def test_ctrl_c_keeps_what_is_done_says_how_to_go_on_and_leaves_no_worker(many: Path, tmp_path: Path) -> None:
+    """Exit code 130 and one line, whoever of the group got the signal."""
+    with command("mine.toml", "--out", "here", "--jobs", "2", cwd=tmp_path) as running:
+        assert reached_a_tenth(running)
+        os.killpg(running.pid, signal.SIGINT)
+        _, err = running.communicate(timeout=60)  # workers hold the pipe: it ends with the last of them
+        assert running.returncode == 130
+    kept = (tmp_path / "here" / "runs.jsonl").read_text().count("\n")
+
+    again = "gridpeers sweep mine.toml --out here"
+    assert err == f"gridpeers: interrupted; {kept} of 40 runs are kept in here/; go on with: {again}\n"
+    assert (tmp_path / "here" / "status.txt").read_text().startswith("broken: interrupted after")
+
+
+def test_dask_gives_the_table_of_this_machine(sweep_file: Write, tmp_path: Path) -> None:
+    """The same file on a cluster on the loopback, its workers threads side by side: an equal table."""
+    from distributed import LocalCluster
+
+    path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.001]\n')
+    with LocalCluster(  # type: ignore[no-untyped-call]
+        n_workers=1, threads_per_worker=2, processes=False, host="127.0.0.1", protocol="tcp", dashboard_address=":0"
+    ) as cluster:
+        there = done(path, tmp_path / "there", dask=cluster.scheduler_address)
+
+    assert pq.read_table(there.table).equals(pq.read_table(done(path, tmp_path / "here").table))
+
+
+def test_runs_that_break_are_rows_that_say_why(sweep_file: Write, tmp_path: Path) -> None:
+    """No solution and contradicting parameters end a run, not the sweep; their indexes are empty, not zero."""
+    summary = done(sweep_file(BREAKING), tmp_path / "here")
+    table: pa.Table = pq.read_table(summary.table)
+    column = table.to_pydict()
+
+    assert column["status"] == ["ran", "ran", "broke"]
+    assert column["why"][:2] == [None, None]
+    assert column["trips"][::2] == [None, None]
+    assert "tripped" in column["trips"][1]
+    assert "the current controller would diverge" in column["why"][2]
+    assert [value is None for value in column["event1.MPSI"]] == [False, True, True]
+    assert [value is None for value in column["history_sha256"]] == [False, False, True]
+    assert sum(summary.broke.values()) == 1
+
+
+def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_path: Path) -> None:
+    """An entry of `[[link]]` by its number: what is lost is the loss's share, another seed loses others, by name."""
+    path = sweep_file('"link" = [{ on = "* -> inv4", loss = 0.0 }]\n\n[grid]\n"link[0].loss" = [0.1, 0.3]\n')
+    path.write_text("seeds = 2\n" + path.read_text())
+    column = pq.read_table(done(path, tmp_path / "here").table).to_pydict()
+
+    assert column["link[0].loss"] == [0.1, 0.1, 0.3, 0.3]
+    assert column["link_warnings"] == [None] * 4
+    assert len(set(column["links_sha256"])) == 4
+    for loss, sent, dropped in zip(column["link[0].loss"], column["links_sent"], column["links_dropped"], strict=True):
+        assert sent > 100
+        assert binomtest(int(dropped), int(sent), loss).pvalue > 0.001
+
+
+def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_path: Path) -> None:
+    """A sweep's sample, written as a scenario, has the history and the indexes of its row, with unit and parameters."""
+    from scenarios.run import Request, run
+    from scenarios.schema.scenario_writing import to_toml
+
+    path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0011]\n')
+    summary = done(path, tmp_path / "sweep")
+    (tmp_path / "one.toml").write_text(to_toml(read_sweep(path).runs[1].scenario, {}))
+    scenario, feeder = load_scenario(tmp_path / "one.toml")
+    (tmp_path / "run").mkdir()
+    run(
+        Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path / "run"),
+        lambda case, t, end: None,
+    )
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())["cases"]["IV"]
+    table = pq.read_table(summary.table)
+    row = table.to_pylist()[1]
+
+    assert row["history_sha256"] == metrics["history_sha256"]
+    reasons = metrics["event1"].pop("reasons", {})
+    assert {name: row[f"event1.{name}"] for name in metrics["event1"] if name not in reasons} == {
+        name: value for name, value in metrics["event1"].items() if name not in reasons
+    }
+    assert row["event1.steady"] == float(not reasons)
+    assert (row["sample"], row["case"], row["seed"], row["gains.k_p"]) == (1, "IV", 1, 0.0011)
+    assert table.schema.field("event1.t_restore_s").metadata == {b"unit": b"s"}
+    assert b"gains.k_p" in table.schema.metadata[b"gridpeers.sweep"]
+
+
+def test_a_copied_plant_gives_the_bytes_of_a_new_one() -> None:
+    """What a worker keeps between runs changes no digit, and no run changes what is kept."""
+    scenario, feeder = load_scenario("islanding")
+    plant, agents = configs(scenario, feeder, "IV")
+    plant = msgspec.structs.replace(plant, end=1.5)
+    hashes = set()
+    for make in (build_plant, plant_at_start, plant_at_start):
+        recorder = Recorder()
+        run_inprocess(plant, agents, recorder, plant=make(plant))
+        hashes.add(recorder.finish(1.5, plant.record_step).sha256)
+
+    assert len(hashes) == 1
+
+
+def test_a_copied_plant_factors_no_network_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was factored ahead for the switchings of a kept plant serves its copies: a hit for each."""
+    config = configs(*load_scenario("islanding"), "IV")[0]
+    plant_at_start(config)
+    factored: list[Circuit] = []
+    asked: list[Circuit] = []
+
+    def count(made: list[Circuit], method: Callable[..., Any]) -> Callable[..., Any]:
+        def counting(self: Any, circuit: Circuit, *rest: Any) -> Any:
+            made.append(circuit)
+            return method(self, circuit, *rest)
+
+        return counting
+
+    monkeypatch.setattr(Reduction, "__init__", count(factored, Reduction.__init__))
+    monkeypatch.setattr(LiveNetwork, "reduced", count(asked, LiveNetwork.reduced))
+    switchings = len(config.settings.events)
+    for _ in range(2):
+        plant = plant_at_start(config)
+        for _ in range(round(7.0 / config.T_c)):
+            plant.advance()
+
+    assert switchings > 0
+    assert (len(factored), len(asked)) == (0, 2 * switchings)
+
+
+def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_path: Path) -> None:
+    """Another sweep, a changed one, other versions, strange files, and one in use: each is told, nothing is touched."""
+    path = sweep_file('[grid]\n"gains.k_p" = [0.0005]\n')
+    folder = tmp_path / "here"
+    plan = read_sweep(path)
+    with SweepFolder(folder, plan), pytest.raises(FolderError, match="another `gridpeers sweep` is at work in it"):
+        SweepFolder(folder, plan)
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+
+    with pytest.raises(FolderError, match='holds the sweep "mine" of 1 runs now, not "gains" of 49'):
+        SweepFolder(folder, read_sweep("gains"))
+    with pytest.raises(FolderError, match='holds the sweep "mine" of 1 runs as it was before its file'):
+        SweepFolder(folder, read_sweep(sweep_file('[grid]\n"gains.k_p" = [0.0006]\n')))
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    (folder / "sweep.json").write_text(before["sweep.json"].decode().replace('"numpy": "', '"numpy": "0.'))
+    with pytest.raises(FolderError, match=r"was begun with numpy 0\."):
+        SweepFolder(folder, plan)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.tex").write_text("")
+    with pytest.raises(FolderError, match=r"there are other things in it \(thesis.tex\)"):
+        SweepFolder(tmp_path / "other", plan)
+
+
+def test_a_damaged_line_of_the_journal_is_named(sweep_file: Write, tmp_path: Path) -> None:
+    """What was not written by us is not guessed at."""
+    path = sweep_file('[grid]\n"gains.k_p" = [0.0005]\n')
+    done(path, tmp_path / "here")
+    (tmp_path / "here" / "runs.jsonl").write_text("not a run\n")
+
+    with pytest.raises(FolderError, match=r"runs\.jsonl:1: this line is damaged"):
+        done(path, tmp_path / "here")
