@@ -28,8 +28,6 @@ from scenarios.results.claims import judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
 from scenarios.results.history import History, Nameplates
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
-from scenarios.results.link_accounts import LinkAccounts
-from scenarios.results.link_records import LinkRecord
 from scenarios.results.measured_run import measure_run
 from scenarios.results.metrics import windows
 from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
@@ -121,15 +119,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     scenario, folder, place = request.scenario, request.folder, shown(request.folder)
     write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
     recorded, notes = {}, []
-    links_sha256: dict[str, str] = {}
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
-        links = LinkRecord(folder / case)
-        plant, agents = _configs(request, case)
-        recorded[case], outcome = _run_case(request, case, plant, agents, progress, links)
-        accounts = _write_links(plant.links, links, folder / case, checked=request.self_check)
-        notes += [f"case {case}: {note}" for note in (*outcome.notes, *accounts)]
-        links_sha256 |= {case: links.sha256} if links.counts else {}
+        recorded[case], outcome = _run_case(request, case, progress)
+        notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
             pace = sentence(outcome.pacing, scenario.time.T_c_s / request.speed)
@@ -149,6 +142,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
     found, saved = measure_run(scenario, request.feeder, nameplates, histories, opened, recorded)
     sha256 = {case: record.sha256 for case, record in recorded.items()}
+    links_sha256 = {case: record.links.sha256 for case, record in recorded.items() if record.links.sha256}
     compared = _compared(request, recorded)
     unlike = {
         case: {"disturbed": one.disturbed, "departures": one.lines()}
@@ -207,28 +201,12 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, C
     }
 
 
-def _write_links(links: Mapping[str, Any], record: LinkRecord, folder: Path, *, checked: bool) -> list[str]:
-    """Write the accounts of emulated links, with the self-check if it is asked for; return lines for the report."""
-    if not record.counts:
-        return []
-    if not checked:
-        return LinkAccounts(record).write(folder)
-    from scenarios.results.link_self_check import self_check  # scipy.stats takes half a second to import
-
-    return LinkAccounts(record, self_check(record, EmulationConfig.of_tree(links))).write(folder)
-
-
-def _run_case(
-    request: Request,
-    case: str,
-    plant: PlantConfig,
-    agents: tuple[AgentConfig, ...],
-    progress: Progress,
-    links: LinkRecord,
-) -> tuple[Recorded, Outcome]:
+def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded, Outcome]:
     """Run one case by the driver asked for, and record it."""
     time = request.scenario.time
-    with Recorder(request.folder / case) as recorder:
+    plant, agents = _configs(request, case)
+    self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
+    with Recorder(request.folder / case, self_check=self_check) as recorder:
 
         def note(telemetry: Telemetry) -> None:
             recorder(telemetry)
@@ -239,11 +217,11 @@ def _run_case(
             if request.driver == "inprocess":
                 from scenarios.drivers.inprocess import run_inprocess
 
-                outcome = run_inprocess(plant, agents, note, on_links=links)
+                outcome = run_inprocess(plant, agents, note, on_links=recorder)
             else:
                 from scenarios.drivers.process_driver import run_processes
 
-                outcome = run_processes(plant, agents, request.folder / "log" / case, note, on_links=links)
+                outcome = run_processes(plant, agents, request.folder / "log" / case, note, on_links=recorder)
             if outcome.broke:
                 raise BrokenRunError(f"case {case}: {outcome.broke}")
             return recorder.finish(time.end_s, time.record_s), outcome

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from scenarios.results.link_records import COLUMNS
+from scenarios.results.link_record import COLUMNS
 from scenarios.sweep.column_labels import unit_of
 
 

@@ -52,7 +52,7 @@ class Closings:
             return ""
         return (
             f"switch {self._switches.shown(name)} not closed: its sides are {difference}; allowed are "
-            f"{difference.window}; {difference.way_out}, or close it without the check"
+            f"{difference.limits}; {difference.way_out}, or close it without the check"
         )
 
     def check_waiting(self, step: int) -> list[PlantEvent]:
@@ -66,7 +66,7 @@ class Closings:
             elif step >= waiting.last:
                 del self._waiting[name]
                 waited = (step - waiting.since) * self._h
-                text = f"not closed: not in step within {waited:g} s, now {difference}; allowed are {difference.window}"
+                text = f"not closed: not in step within {waited:g} s, now {difference}; allowed are {difference.limits}"
                 events.append(self._warning(step, name, text))
         return events
 
@@ -88,7 +88,7 @@ class Closings:
             if operation.synchronised and not difference.within:
                 self._switches.drop(step, operation)
                 self._waiting[name] = _Pending(step, step + self._timeout)
-                text = f"waits for synchronism: its sides are {difference}; allowed are {difference.window}"
+                text = f"waits for synchronism: its sides are {difference}; allowed are {difference.limits}"
                 events.append(self._warning(step, name, text))
             elif operation.synchronised:
                 notes[name] = f" in step: {difference}"
@@ -100,7 +100,7 @@ class Closings:
 
     def _note(self, step: int, difference: Difference) -> None:
         t = time_of(step, self._h)
-        self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.window.angle))
+        self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.limits.angle))
         del self.joined[:-20]
 
     def _warning(self, step: int, name: str, text: str) -> PlantEvent:

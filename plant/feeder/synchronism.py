@@ -1,7 +1,7 @@
 """How far two live islands are apart across an open switch, and how far they may be when it closes.
 
-The windows are those of IEEE Std 1547-2018, Table 5: limits of frequency, voltage and phase-angle difference for
-connecting an energized local system, by the aggregate rating of its units.
+The limits are the synchronization parameter limits of IEEE Std 1547-2018, Table 5: of frequency, voltage and
+phase-angle difference for connecting an energized local system, by the aggregate rating of its units.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ class Difference:
     """Difference of frequency (Hz)."""
     V: float
     """Largest difference of voltage of equal phases (pu of nominal)."""
-    window: Window
+    limits: SynchronizationLimits
     """Limits of these three."""
 
     @property
     def within(self) -> bool:
         """Whether the two sides may be joined."""
-        return self.angle <= self.window.angle and self.f <= self.window.f and self.V <= self.window.V
+        return self.angle <= self.limits.angle and self.f <= self.limits.f and self.V <= self.limits.V
 
     @property
     def way_out(self) -> str:
-        """What brings the two sides within the window, as the start of a sentence.
+        """What brings the two sides within the limits, as the start of a sentence.
 
         Examples
         --------
-        >>> apart = {"switch": "sw", "V": 0.0, "window": Window(angle=10.0, f=0.1, V=0.03)}
+        >>> apart = {"switch": "sw", "V": 0.0, "limits": SynchronizationLimits(angle=10.0, f=0.1, V=0.03)}
         >>> Difference(angle=90.0, f=0.05, **apart).way_out
         'try again: the angle passes through zero every 20 s'
         >>> Difference(angle=90.0, f=0.001, **apart).way_out
@@ -60,7 +60,7 @@ class Difference:
         >>> Difference(angle=3.0, f=0.5, **apart).way_out
         'try again when frequencies and voltages have come closer'
         """
-        if self.f > self.window.f or self.V > self.window.V:
+        if self.f > self.limits.f or self.V > self.limits.V:
             return "try again when frequencies and voltages have come closer"
         if self.f < LOCKED:
             return "at equal frequencies the angle stays: change the load or the set-points of one side"
@@ -71,7 +71,7 @@ class Difference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Window:
+class SynchronizationLimits:
     """Largest differences at which a switch may close."""
 
     angle: float
@@ -85,22 +85,22 @@ class Window:
         return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
 
 
-def window_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Window:
-    """Window of IEEE 1547-2018 Table 5 for an aggregate rating (VA); what `check` sets goes before.
+def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> SynchronizationLimits:
+    """Return the limits of IEEE 1547-2018, Table 5, for an aggregate rating (VA); those that `check` sets go before.
 
     The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
     Examples
     --------
-    >>> window_for(1.3e6, SyncCheck())
-    Window(angle=15.0, f=0.2, V=0.05)
-    >>> str(window_for(3.9e6, SyncCheck(angle=5.0)))
+    >>> limits_for(1.3e6, SyncCheck())
+    SynchronizationLimits(angle=15.0, f=0.2, V=0.05)
+    >>> str(limits_for(3.9e6, SyncCheck(angle=5.0)))
     'at most 5 deg, 0.1 Hz and 3 %'
-    >>> round(window_for(3.9e6, SyncCheck(), 50.0).f, 4), window_for(3.9e6, SyncCheck(f=0.2), 50.0).f
+    >>> round(limits_for(3.9e6, SyncCheck(), 50.0).f, 4), limits_for(3.9e6, SyncCheck(f=0.2), 50.0).f
     (0.0833, 0.2)
     """
     f, V, angle = next(row[1:] for row in _TABLE_5 if rating <= row[0])
-    return Window(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)
+    return SynchronizationLimits(angle=check.angle or angle, f=check.f or f * (f_nom / F_BASE), V=check.V or V)
 
 
 class Synchronism:
@@ -113,7 +113,7 @@ class Synchronism:
     dynamics
         Its inverters.
     check
-        What the windows are to be, where not as in the standard.
+        Limits that replace those of the standard.
     """
 
     def __init__(self, network: Network, dynamics: Dynamics, check: SyncCheck) -> None:
@@ -150,7 +150,7 @@ class Synchronism:
             angle=degrees(float(np.max(np.abs(np.angle(a * np.conj(b)))))),
             f=abs(f_1 - f_2),
             V=float(np.max(np.abs(np.abs(a) - np.abs(b)))),
-            window=window_for(min(rated), self._check, network.feeder.f_nom),
+            limits=limits_for(min(rated), self._check, network.feeder.f_nom),
         )
 
     def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:

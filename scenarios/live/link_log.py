@@ -1,4 +1,4 @@
-"""Record of the emulated links of a live run and of commands to them, and the scenario that replays it."""
+"""Commands to the emulated links of a live run, and the scenario that replays them."""
 
 from __future__ import annotations
 
@@ -15,18 +15,16 @@ from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.run_address import UsageError
-from scenarios.results.link_accounts import LinkAccounts
-from scenarios.results.link_records import LinkRecord
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import Scenario
 from scenarios.schema.agent_schedule import inverters_of
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.scenario_writing import to_toml
-from wire.messages import LinkReport, LinkRequest
+from wire.messages import LinkRequest
 
 
 class LinkLog:
-    """Record link reports and link commands of a run.
+    """Keep the link commands of a run, and write the scenario that replays them.
 
     Parameters
     ----------
@@ -34,25 +32,15 @@ class LinkLog:
         As run, with its one case.
     feeder : Feeder
         Its feeder.
-    folder : Path or None
-        Where links.csv and links.json go; None for nowhere.
     replay : Path or None
         File of the scenario that replays the run's links: written in any case, and anew with every link command.
     by_the_way : Path or None
         The same, but only written once there is a link command.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        feeder: Feeder,
-        folder: Path | None,
-        replay: Path | None,
-        by_the_way: Path | None,
-    ) -> None:
+    def __init__(self, scenario: Scenario, feeder: Feeder, replay: Path | None, by_the_way: Path | None) -> None:
         self._scenario, self._feeder = scenario, feeder
-        self._folder, self._replay, self._by_the_way = folder, replay, by_the_way
-        self._record = LinkRecord(folder)
+        self._replay, self._by_the_way = replay, by_the_way
         self._orders: dict[int, Change] = {}
 
     @property
@@ -60,30 +48,16 @@ class LinkLog:
         """Changes by commands, in their order."""
         return tuple(change for _, change in sorted(self._orders.items()))
 
-    @property
-    def links_sha256(self) -> str:
-        """Hash of the fates of all messages on emulated links; "" if none was sent."""
-        return self._record.sha256 if any(book.sent for book in self._record.counts.values()) else ""
-
-    def __call__(self, message: LinkReport | LinkRequest) -> None:
-        """Take a report of links, or a command to them."""
-        if isinstance(message, LinkReport):
-            if self._folder is not None:
-                self._record(message)
-            return
+    def __call__(self, message: LinkRequest) -> None:
+        """Take a command to links."""
         self._orders[message.seq] = LinkCommand.of_text(message.text).at(message.t)
         self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:
-        """Write all files at the end of a run that reached t (s); return lines for the terminal."""
+        """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
-        lines: list[str] = []
-        if self._folder is not None and self.links_sha256:
-            lines += LinkAccounts(self._record).write(self._folder)
         file = self._replay or (self._by_the_way if self._orders else None)
-        if file is not None:
-            lines.append(f"the links as they were: gridpeers run {shown(file)}")
-        return lines
+        return [] if file is None else [f"the links as they were: gridpeers run {shown(file)}"]
 
     def _write_replay(self, t: float) -> None:
         files = [self._replay, self._by_the_way if self._orders else None]

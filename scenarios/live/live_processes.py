@@ -87,7 +87,7 @@ def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog) -> P
     folder : Path or None
         Where to record the run.
     link_log : LinkLog
-        Takes the messages on emulated links.
+        Takes the commands to links.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -124,7 +124,7 @@ def all_here(
     folder : Path or None
         Where to record the run.
     link_log : LinkLog
-        Takes the messages on emulated links.
+        Takes the commands to links.
     """
     signal.signal(signal.SIGTERM, _stop)
     config = _recorded(config, folder)

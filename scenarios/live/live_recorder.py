@@ -34,11 +34,11 @@ class LiveRecorder:
     say : Callable[[str], None]
         Called with a line for every event.
     folder : Path or None
-        Folder for history.csv and events.csv; None records nothing.
+        Folder for the files of the record; None records nothing.
     silent : Collection[str], optional
         Kinds of events that it does not say.
     link_log : LinkLog, optional
-        Takes the plant's messages on emulated links.
+        Takes the plant's messages on commands to links.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class LiveRecorder:
             try:
                 self._say_all(*self._link_log.close(self.t))
             except OSError as error:
-                self._fail(f"the record of links cannot be written: {error.strerror}")
+                self._fail(f"the link commands cannot be written: {error.strerror}")
         if self._recorder is not None:
             self._finish(self._recorder)
 
@@ -107,6 +107,7 @@ class LiveRecorder:
                 self._fail(f"the record ends at {recorder.ended:.2f} s: then no word came of the plant")
             else:
                 self.recorded = recorder.finish(recorder.ended, recorder.record_step)
+                self._say_all(*self.recorded.link_lines)
             recorder.close()
         except RecordError as error:
             self._fail(str(error))
@@ -128,8 +129,10 @@ class LiveRecorder:
                 try:
                     if isinstance(item, Telemetry):
                         self._take(item)
+                    elif isinstance(item, LinkReport):
+                        self._record(item)
                     else:
-                        self._take_links(item)
+                        self._take_request(item)
                 except Exception as error:  # an error in one message must not end the recording of the others
                     self._client.rejects.failed("telemetry", error)
         self._client.close()  # with it goes the token: the plant knows that the last telemetry is here
@@ -145,12 +148,15 @@ class LiveRecorder:
                 self._say(line)
         if self.ended:  # before the terminal says that the run has ended
             self._say_all(*self._limit.left_out())
+        self._record(telemetry)
+
+    def _record(self, message: Telemetry | LinkReport) -> None:
         recorder = self._recorder
         if recorder is None:
             return
         known = len(recorder.missing)
         try:
-            recorder(telemetry)
+            recorder(message)
         except (RecordError, OSError) as error:
             why = getattr(error, "strerror", None) or error
             self._fail(f"the record ends at {recorder.ended:.2f} s: {why}", _ON)
@@ -158,11 +164,11 @@ class LiveRecorder:
         for before, after in recorder.missing[known:]:
             self._say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
 
-    def _take_links(self, message: LinkReport | LinkRequest) -> None:
+    def _take_request(self, request: LinkRequest) -> None:
         if self._link_log is None:
             return
         try:
-            self._link_log(message)
+            self._link_log(request)
         except OSError as error:
-            self._fail(f"the record of links ends at {self.t:.2f} s: {error.strerror}", _ON)
+            self._fail(f"the link commands end at {self.t:.2f} s: {error.strerror}", _ON)
             self._link_log = None

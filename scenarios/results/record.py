@@ -1,4 +1,4 @@
-"""Record one case of a run, by any driver: history.csv and events.csv, or rows in memory.
+"""Record one case of a run, by any driver: history.csv, events.csv and the files of its links, or all in memory.
 
 Nothing is ever half-written under its own name: rows go to `history.partial.csv` while the case runs, and the file
 gets its name when the last row is there. What a broken case leaves keeps the partial name. A recorder with a
@@ -13,11 +13,13 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Protocol
+from typing import BinaryIO, Protocol, cast
 
 import msgspec
 
-from wire.messages import PlantEvent, Telemetry
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.results.link_record import LinkRecord
+from wire.messages import LinkReport, PlantEvent, Telemetry
 
 QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
 """Columns of each inverter, in the order of `wire.messages.Telemetry.rows`, with their units."""
@@ -76,6 +78,10 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """What happened, in the order of time."""
     quiet: tuple[tuple[float, int], ...] = ()
     """Run time (s), and how many states of that tick the neighbours were not told of."""
+    links: LinkRecord = msgspec.field(default_factory=LinkRecord)
+    """Verdicts and counts of the emulated links."""
+    link_lines: tuple[str, ...] = ()
+    """Lines for the report on the emulated links; none without a folder."""
     sha256: str
     """Of the bytes of history.csv."""
     reproducible: bool
@@ -98,11 +104,12 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
 
 
 class Recorder:
-    """Record the telemetry of one case: call it with every `Telemetry`, then `finish()`.
+    """Record one case: call it with every `Telemetry` and `LinkReport`, then `finish()`.
 
-    With a folder it writes history.csv and events.csv and keeps no rows; without one it keeps the rows in memory and
-    writes nothing. The hash of the bytes of history.csv is the same either way. Floats are written as the shortest text
-    that reads back to the same number, and lines end in a line feed on every system, so equal runs give equal bytes.
+    With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows; without one it keeps
+    the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Floats are
+    written as the shortest text that reads back to the same number, and lines end in a line feed on every system, so
+    equal runs give equal bytes.
 
     Parameters
     ----------
@@ -110,10 +117,14 @@ class Recorder:
         Folder of the case; the recorder makes it.
     gaps : bool, optional
         Whether rows may be missing, as in a run whose recorder was out of reach for too long; else that is an error.
+    self_check : EmulationConfig, optional
+        The faults that the case configures, to test the emulated links against them at the end.
     """
 
-    def __init__(self, folder: Path | None = None, *, gaps: bool = False) -> None:
-        self._gaps, self._folder = gaps, folder
+    def __init__(
+        self, folder: Path | None = None, *, gaps: bool = False, self_check: EmulationConfig | None = None
+    ) -> None:
+        self._gaps, self._folder, self._self_check = gaps, folder, self_check
         self._hash = hashlib.sha256()
         self._file: BinaryIO | None = None
         if folder is not None:
@@ -136,6 +147,8 @@ class Recorder:
         """See `Recorded.quiet`."""
         self.reproducible = True
         """False once something unscripted, such as the death of an agent, has entered the run."""
+        self.links = LinkRecord(folder)
+        """Verdicts and counts of the emulated links so far."""
 
     def __enter__(self) -> Recorder:
         return self
@@ -145,8 +158,14 @@ class Recorder:
     ) -> None:
         self.close()
 
-    def __call__(self, telemetry: Telemetry) -> None:
-        """Take the rows of one telemetry message; with a folder they are in the file when this returns."""
+    def __call__(self, message: Telemetry | LinkReport) -> None:
+        """Take one message; with a folder its rows and verdicts are in a file when this returns."""
+        if isinstance(message, LinkReport):
+            self.links(message)
+        else:
+            self._take(message)
+
+    def _take(self, telemetry: Telemetry) -> None:
         if not self._inverters:
             self._inverters = telemetry.inverters
             self._write(",".join(header(telemetry.inverters)) + "\n")
@@ -189,9 +208,10 @@ class Recorder:
                 f"history has {self.count} rows, but {end:g} s in steps of {record_step:g} s are {expected}; "
                 f"{last}{holes}"
             )
-        rows: Rows = self.rows
+        rows, link_lines = cast(Rows, self.rows), []
         if self._folder is not None:
             self._write_events(self._folder)
+            link_lines = self.links.write(self._folder, self._self_check)
             (self._folder / PARTIAL).rename(self._folder / "history.csv")
             rows = RowFile(self._folder / "history.csv", self.count)
         self._finished = True
@@ -202,6 +222,8 @@ class Recorder:
             missing=tuple(self.missing),
             events=tuple(self.events),
             quiet=tuple(self.quiet),
+            links=self.links,
+            link_lines=tuple(link_lines),
             sha256=self._hash.hexdigest(),
             reproducible=self.reproducible,
         )
@@ -212,6 +234,7 @@ class Recorder:
             with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and the writer reported it
                 self._file.close()
             self._write_events(self._folder)
+            self.links.write(self._folder)
 
     @property
     def record_step(self) -> float:

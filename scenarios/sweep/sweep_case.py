@@ -26,8 +26,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
 from scenarios.results.history import History, Nameplates
 from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.results.link_accounts import LinkAccounts
-from scenarios.results.link_records import LinkRecord
+from scenarios.results.link_record import LinkRecord
 from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorder
@@ -91,11 +90,11 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History 
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     recorder = Recorder()
-    links = LinkRecord()
-    outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant), on_links=links)
+    outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant), on_links=recorder)
     if outcome.broke:
         return SweepRow(number=number, status="broke", why=outcome.broke), None
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
+    links = recorded.links
     history = History.of(recorded.inverters, recorded.rows)
     nameplates = Nameplates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}
@@ -116,9 +115,9 @@ def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History 
         status="ran",
         metric_warnings="; ".join(failed),
         sha256=recorded.sha256,
-        links_sha256=links.sha256 if links.counts else "",
+        links_sha256=links.sha256,
         trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
-        link_warnings=_warnings(links),
+        link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
         measures=measures | _accounts(links),
     )
     return done, history
@@ -130,16 +129,10 @@ def _accounts(links: LinkRecord) -> dict[str, float | None]:
     if not books:
         return {}
     return {
-        "links_sent": float(sum(book.sent for book in books)),
+        "links_sent": float(links.sent),
         "links_delivered": float(sum(book.delivered for book in books)),
         "links_dropped": float(sum(sum(book.dropped.values()) for book in books)),
     }
-
-
-def _warnings(record: LinkRecord) -> str:
-    """Return what is wrong with the accounts of emulated links, and which plugged-in faults failed."""
-    accounts = LinkAccounts(record)
-    return "; ".join((*accounts.warnings, *accounts.failures))
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:

@@ -11,7 +11,7 @@ from netem.ledger import LinkCounts
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.process_driver import run_processes
-from scenarios.results.link_records import LinkRecord
+from scenarios.results.link_record import LinkRecord
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 

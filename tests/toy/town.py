@@ -15,7 +15,7 @@ from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child
 from scenarios.drivers.rendezvous import rendezvous
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.results.link_records import LinkRecord
+from scenarios.results.link_record import LinkRecord
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import TOY, exists
 from wire.codec import RejectedError, decode, encode

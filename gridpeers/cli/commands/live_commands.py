@@ -91,7 +91,7 @@ def _start(
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             replay = None if out is None else out / "replay.toml"
-            link_log = LinkLog(spec, feeder, kept.record, record, replay)
+            link_log = LinkLog(spec, feeder, record, replay)
             if agents:
                 say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log)
@@ -103,7 +103,7 @@ def _start(
                 ran = RunMetrics(
                     scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed
                 )
-                outcome = conclude(outcome, ran, link_log, kept)
+                outcome = conclude(outcome, ran, kept)
         _finish(outcome)
 
 

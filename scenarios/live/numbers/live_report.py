@@ -8,7 +8,6 @@ from typing import Any
 
 from rich.console import Console
 
-from scenarios.live.link_log import LinkLog
 from scenarios.live.live_folders import Folders
 from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Compared, compare
@@ -37,16 +36,14 @@ class LiveReport:
     ----------
     ran : RunMetrics
         The run: its scenario has one case, and its folder exists.
-    links_sha256 : str
-        Hash of the fates of all messages on emulated links; "" if none was sent.
     recorded : Recorded
         The whole record.
     pacing : Pacing or None
         How the plant kept pace.
     """
 
-    def __init__(self, ran: RunMetrics, links_sha256: str, recorded: Recorded, pacing: Pacing | None) -> None:
-        self._ran, self._links_sha256, self._recorded, self._pacing = ran, links_sha256, recorded, pacing
+    def __init__(self, ran: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> None:
+        self._ran, self._recorded, self._pacing = ran, recorded, pacing
         (self._case,) = ran.scenario.cases
 
     def write(self) -> RunReport:
@@ -71,7 +68,7 @@ class LiveReport:
             folder=shown(ran.folder) + "/",
         )
         pacing = {} if self._pacing is None else {case: self._pacing}
-        links = {case: self._links_sha256} if self._links_sha256 else {}
+        links = {case: recorded.links.sha256} if recorded.links.sha256 else {}
         by_hand = {
             "ended_s": compared.ended,
             "windows": _windows(compared),
@@ -143,7 +140,7 @@ def _few(lines: Sequence[str]) -> str:
     return f"{'; '.join(lines[:_SHOWN])}{more}"
 
 
-def conclude(outcome: ProcessOutcome, ran: RunMetrics, link_log: LinkLog, folders: Folders) -> ProcessOutcome:
+def conclude(outcome: ProcessOutcome, ran: RunMetrics, folders: Folders) -> ProcessOutcome:
     """Write and show the report of a run that has ended, and note in its folder how it ended.
 
     Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers.
@@ -154,8 +151,6 @@ def conclude(outcome: ProcessOutcome, ran: RunMetrics, link_log: LinkLog, folder
         How the run ended, with its record.
     ran : RunMetrics
         The run.
-    link_log : LinkLog
-        With the hash of the emulated links.
     folders : Folders
         With the run folder.
     """
@@ -163,7 +158,7 @@ def conclude(outcome: ProcessOutcome, ran: RunMetrics, link_log: LinkLog, folder
         folders.broken(outcome.broke or "no whole record")
         return outcome
     try:
-        show(LiveReport(ran, link_log.links_sha256, outcome.recorded, outcome.pacing).write(), Console())
+        show(LiveReport(ran, outcome.recorded, outcome.pacing).write(), Console())
         folders.complete()
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")

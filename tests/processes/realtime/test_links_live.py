@@ -21,7 +21,7 @@ from netem.schema.partition import Partition
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
-from scenarios.results.link_records import LinkRecord
+from scenarios.results.link_record import LinkRecord
 from scenarios.schema import load_scenario
 from tests.processes.terminals import Desk
 from tests.toy.town import Town

@@ -18,7 +18,7 @@ from scenarios.live.run_requests import read_config
 from scenarios.live.show.render import plain
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.watching import RunSubscriber
-from scenarios.results.link_records import LinkRecord
+from scenarios.results.link_record import LinkRecord
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
 from wire.codec import RejectedError, decode, encode

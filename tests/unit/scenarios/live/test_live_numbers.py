@@ -230,7 +230,7 @@ def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, A
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
     whole = msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events)
-    report = LiveReport(ran, "", whole, None).write()
+    report = LiveReport(ran, whole, None).write()
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
 

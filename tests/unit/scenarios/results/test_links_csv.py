@@ -1,10 +1,12 @@
 """links.csv: one row for each copy of a message, which any reader of CSV takes apart as it was written."""
 
 import csv
+import json
 import tracemalloc
 from pathlib import Path
 
 import msgspec
+import pytest
 
 from netem.ledger import LinkCounts
 from netem.models.corrupt import Corrupt
@@ -13,9 +15,9 @@ from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from scenarios.emulation.link_reports import report_data
-from scenarios.results.link_accounts import LinkAccounts
-from scenarios.results.link_records import COLUMNS, LinkRecord
-from wire.messages import LinkReport
+from scenarios.results.link_record import COLUMNS, LinkRecord
+from scenarios.results.record import Recorder
+from wire.messages import LinkReport, Telemetry
 
 
 def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_message(tmp_path: Path) -> None:
@@ -27,7 +29,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     record = LinkRecord()
     for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
         record(LinkReport(sender="inv2", epoch=1, seq=0, t=1.2, data=data))
-    record.write(tmp_path / "links.csv")
+    record.write(tmp_path)
 
     with (tmp_path / "links.csv").open(newline="") as file:
         rows = list(csv.DictReader(file, strict=True))
@@ -35,7 +37,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
     assert {len(row) for row in rows} == {len(COLUMNS)}  # DictReader keeps what is too much under the key None
     found = {(int(row["seq"]), row["delay_s"], row["fate"]) for row in rows}
     expected = set()
-    for trace in record.traces:
+    for trace in record.traces():
         for seq, outcome in zip(trace.seq, trace.outcome, strict=True):
             if isinstance(outcome, str):
                 expected.add((seq, "", outcome))
@@ -55,10 +57,39 @@ def test_an_account_that_does_not_close_is_a_warning_of_every_run() -> None:
     count = LinkCounts(sent=3, duplicated=0, delivered=1, dropped={"loss": 1}, corrupted=0, in_flight=0)
     record.counts["inv1", "inv2"] = count
 
-    (warning,) = LinkAccounts(record).warnings
+    (warning,) = record.warnings
     assert warning.startswith("inv1 -> inv2: the account does not close")
     record.counts["inv1", "inv2"] = msgspec.structs.replace(count, in_flight=1)
-    assert not LinkAccounts(record).warnings
+    assert not record.warnings
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path, finished: bool) -> None:
+    """Telemetry and link reports go into one record; a case that broke keeps the fates of its messages too."""
+    receiver = Receiver("inv2", Netem(seed=3, links=(Fault(on="* -> inv2", loss=0.2),)), {"inv1": "MG1", "inv2": "MG1"})
+    receiver.offer("inv1", 0, 0.0, 0.0, b"state")
+    telemetry = Telemetry(
+        sender="plant",
+        epoch=1,
+        seq=0,
+        t=0.0,
+        inverters=("inv1",),
+        rows=((0.0,) * 7,),
+        events=(),
+        final=True,
+        outcome="",
+        reproducible=True,
+    )
+    with Recorder(tmp_path / "IV") as recorder:
+        recorder(telemetry)
+        for data in report_data(receiver.take_trace(), receiver.counts(), receiver.trace_sha256):
+            recorder(LinkReport(sender="inv2", epoch=1, seq=0, t=0.0, data=data))
+        recorded = recorder.finish(0.0, 0.02) if finished else None
+
+    files = {path.name for path in (tmp_path / "IV").iterdir()}
+    assert files == {"history.csv" if finished else "history.partial.csv", "events.csv", "links.csv", "links.json"}
+    assert json.loads((tmp_path / "IV" / "links.json").read_text())["accounts"][0]["sent"] == 1
+    assert recorded is None or recorded.link_lines[0].startswith("emulated links: 1 messages over 1 links")
 
 
 def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path) -> None:
@@ -79,9 +110,9 @@ def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     (mine,), (theirs,) = on_disk.by_link().values(), in_memory.by_link().values()
-    on_disk.write(tmp_path / "links.csv")
+    on_disk.write(tmp_path)
 
     assert grown < 100_000
     assert mine.outcome[:5_000] == theirs.outcome
     assert mine.seq == tuple(range(20_000))
-    assert [path.name for path in tmp_path.iterdir()] == ["links.csv"]
+    assert {path.name for path in tmp_path.iterdir()} == {"links.csv", "links.json"}

@@ -1,0 +1,199 @@
+"""Record of the emulated links of one case: every verdict in links.csv, counts and one hash of all in links.json."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from netem.ledger import LinkCounts, LinkTrace, Outcome, combined
+from netem.schema.pattern import Link
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.emulation.link_reports import data_of
+from scenarios.results.run_files import write_whole
+from wire.messages import PLANT, LinkReport
+
+if TYPE_CHECKING:
+    from netem.check.verify import Report
+
+COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
+"""Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
+
+PARTIAL = "links.partial"
+"""Name of the verdicts' file while the case runs; links.csv takes its place."""
+
+
+class LinkRecord:
+    """Record the link reports of one case; `scenarios.results.record.Recorder` has one, and writes its files.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        The case's folder, for verdicts until the case has ended: they are as many as messages. Without one they are
+        kept in memory.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._file = None if folder is None else folder / PARTIAL
+        self._traces: list[LinkTrace] = []
+        self.counts: dict[tuple[str, str], LinkCounts] = {}
+        """Counts of the messages of each link (src, dst)."""
+        self.garbled = 0
+        """Reports that could not be read."""
+        self.failures: list[str] = []
+        """Sentences on plugged-in faults that failed."""
+        self._sha256: dict[str, str] = {}
+
+    def __call__(self, report: LinkReport) -> None:
+        """Take one report of a receiver."""
+        try:
+            data = data_of(report)
+        except msgspec.DecodeError:
+            self.garbled += 1
+            return
+        self._keep(data.traces)
+        self.failures += data.failures
+        self.counts.update({(src, report.sender): counts for src, counts in data.counts.items()})
+        if data.sha256:
+            self._sha256[report.sender] = data.sha256
+
+    def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
+        if self._file is None:
+            self._traces += traces
+        elif traces:
+            with self._file.open("ab") as file:
+                for trace in traces:
+                    encoded = _encode(trace)
+                    file.write(len(encoded).to_bytes(4, "little") + encoded)
+
+    @property
+    def sent(self) -> int:
+        """Messages sent over all links."""
+        return sum(counts.sent for counts in self.counts.values())
+
+    @property
+    def sha256(self) -> str:
+        """Hash (hex) of all verdicts of all links, whatever the order of the reports; "" if no message was sent."""
+        return combined(self._sha256) if self.sent else ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Links whose messages are neither delivered, dropped nor in flight."""
+        return tuple(
+            f"{src} -> {dst}: the account does not close: {counts}"
+            for (src, dst), counts in self.counts.items()
+            if not counts.closes
+        )
+
+    def traces(self) -> Iterator[LinkTrace]:
+        """Yield the verdicts in parts, as they were reported."""
+        yield from self._traces
+        if self._file is not None and self._file.exists():
+            with self._file.open("rb") as file:
+                while size := file.read(4):
+                    yield _decode(file.read(int.from_bytes(size, "little")))
+
+    def by_link(self) -> dict[tuple[str, str], LinkTrace]:
+        """Return all verdicts of each link (src, dst) in one."""
+        parts: dict[tuple[str, str], list[LinkTrace]] = {}
+        for part in self.traces():
+            parts.setdefault((part.src, part.dst), []).append(part)
+        return {
+            link: LinkTrace(
+                *link,
+                tuple(seq for part in of for seq in part.seq),
+                tuple(t for part in of for t in part.t),
+                tuple(outcome for part in of for outcome in part.outcome),
+            )
+            for link, of in sorted(parts.items())
+        }
+
+    def write(self, folder: Path, setup: EmulationConfig | None = None) -> list[str]:
+        """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent.
+
+        Parameters
+        ----------
+        folder : Path
+            The case's folder.
+        setup : EmulationConfig, optional
+            The faults that the case configures, to test the links against them: slow, as it imports scipy.stats.
+        """
+        if not self.sent:
+            return []
+        check = None if setup is None else self._check(setup)
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for trace in self.by_link().values():
+            writer.writerows(_rows(trace))
+        write_whole(folder / "links.csv", text.getvalue())
+        write_whole(folder / "links.json", self._json(check))
+        if self._file is not None:
+            self._file.unlink(missing_ok=True)
+            self._file = None
+        return list(self._lines(check))
+
+    def _check(self, setup: EmulationConfig) -> Report:
+        """Test every link over which anything was sent; see `netem.check.verify`."""
+        from netem.check.verify import verify
+
+        names = (*setup.microgrids, PLANT)
+        links = [Link(src, dst) for src in names for dst in names if (src, dst) in self.counts]
+        spans = {link: spans for link in links if (spans := setup.netem.spans(link, setup.microgrids))}
+        return verify(list(self.traces()), spans, setup.netem.seed)
+
+    def _json(self, check: Report | None) -> str:
+        """Return the text of links.json: the hash of all verdicts, the counts of every link, the tests if any."""
+        counts = [
+            {"src": src, "dst": dst, **msgspec.structs.asdict(of)} for (src, dst), of in sorted(self.counts.items())
+        ]
+        whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
+        whole |= {"tests": [row._asdict() for row in check.rows]} if check else {}
+        whole |= {"failures": sorted(self.failures)} if self.failures else {}
+        return json.dumps(whole, indent=1, default=str) + "\n"
+
+    def _lines(self, check: Report | None) -> Iterator[str]:
+        """Yield the lines for the report."""
+        dropped: Counter[str] = Counter()
+        for counts in self.counts.values():
+            dropped.update(counts.dropped)
+        shares = (f"{reason} {100.0 * count / self.sent:.2f} %" for reason, count in dropped.most_common())
+        checked = ""
+        if check is not None:
+            tested, failed = (sum(row.ok is not None for row in check.rows), len(check.warnings))
+            checked = "; self-check: " + (f"{tested} tests, {failed or 'none'} failed" if tested else "nothing to test")
+        yield (
+            f"emulated links: {self.sent} messages over {sum(of.sent > 0 for of in self.counts.values())} links, "
+            f"dropped: {', '.join(shares) or 'none'}{checked} (links.json, links.csv)"
+        )
+        yield from (f"WARNING: {warning}" for warning in (*self.warnings, *(check.warnings if check else ())))
+        if self.failures:
+            first, *others = sorted(self.failures)
+            more = f" (and {len(others)} more of this kind, links.json)" if others else ""
+            yield f"WARNING: {first}{more}"
+
+
+_encode = msgspec.msgpack.Encoder().encode
+_decode = msgspec.msgpack.Decoder(LinkTrace).decode
+
+
+def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:
+    for seq, t, outcome in zip(trace.seq, trace.t, trace.outcome, strict=True):
+        for delay_s, fate in _fates(outcome):
+            yield trace.src, trace.dst, seq, t, delay_s, fate
+
+
+def _fates(outcome: Outcome) -> Iterator[tuple[object, str]]:
+    if isinstance(outcome, str):
+        yield "", outcome
+    elif isinstance(outcome, float | int):
+        yield float(outcome), "passed"
+    else:
+        for copy, (delay_s, bit) in enumerate(outcome):
+            yield delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")
