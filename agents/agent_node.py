@@ -54,8 +54,8 @@ class AgentNode(PlantFollower):
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
         """The last measurement and the last states that it heard."""
-        self._routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
-        self._routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
+        self.routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
+        self.routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -72,7 +72,7 @@ class AgentNode(PlantFollower):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return tuple(self._routes)
+        return tuple(self.routes)
 
     @property
     def finished(self) -> bool:
@@ -118,8 +118,8 @@ class AgentNode(PlantFollower):
     def _listen_to(self, name: str) -> None:
         """Subscribe to the states of an agent, unless that is done."""
         key = self.keys.state(name)
-        if key not in self._routes:
-            self._routes[key] = Route(name, (State,), self._on_state)
+        if key not in self.routes:
+            self.routes[key] = Route(name, (State,), self._on_state)
             self._actions.append(Listen(key))
 
     # ---------------------------------------------------------------- messages

@@ -60,7 +60,7 @@ class LockstepAgent(AgentNode):
         super().__init__(config, instance, links, law)
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
-        self._routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
+        self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None

@@ -57,7 +57,7 @@ def load(name_or_path: str | Path) -> Scenario:
     """
     path = find_scenario(str(name_or_path))
     text, tree = read_toml(path)
-    return Scenario._of(tree, path, text)
+    return Scenario._of(tree, path, text)  # noqa: SLF001  a constructor of this file
 
 
 class Scenario:
@@ -152,7 +152,7 @@ class Scenario:
             except (PathError, ValueError) as error:
                 problems.add(path, str(error))
         new = type(self).__new__(type(self))
-        new._set(tree, self._path, self._text, changed, problems)
+        new._set(tree, self._path, self._text, changed, problems)  # noqa: SLF001  a new one of the same class
         return new
 
     def check(self) -> tuple[str, ...]:

@@ -67,10 +67,10 @@ class LockstepPlant(PlantNode):
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._states: dict[str, State] = {}
         for name in self._everyone:
-            self._routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
-            self._routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
-            self._routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
-        self.subscriptions = tuple(self._routes)
+            self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
+            self.routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
+            self.routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+        self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
         self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
 

@@ -71,7 +71,7 @@ class Node:
         self.admission = Admission(rate)
         self.members = Membership(self.admission)
         self._name = name
-        self._routes: dict[str, Route] = {}
+        self.routes: dict[str, Route] = {}
         self._actions: list[Action | Log] = []
 
     @property
@@ -89,7 +89,7 @@ class Node:
         if self.finished:
             return
         try:
-            route = self._routes.get(key)
+            route = self.routes.get(key)
             if route is None:
                 raise RejectedError("foreign", "nothing was asked for on this key")
             message = decode(payload)
@@ -115,7 +115,7 @@ class Node:
     def _ask(self, name: str, instance: str) -> None:
         """Ask a process who it is."""
         key = self.keys.nameplate(name, instance)
-        self._routes[key] = Route(name, (Nameplate,), partial(self._on_nameplate, instance), early=True)
+        self.routes[key] = Route(name, (Nameplate,), partial(self._on_nameplate, instance), early=True)
         self._actions.append(Fetch(key))
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
@@ -127,7 +127,7 @@ class Node:
 
     def _forget_process(self, name: str, instance: str) -> bool:
         """Note that the token of a process is gone; whether it counted."""
-        self._routes.pop(self.keys.nameplate(name, instance), None)
+        self.routes.pop(self.keys.nameplate(name, instance), None)
         return self.members.vanished(name, instance)
 
     # ---------------------------------------------------------------- checks

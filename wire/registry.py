@@ -65,7 +65,7 @@ class Registry(Generic[T]):
     ) -> None:
         self.kind, self.plural = kind, plural
         self._objection = objection
-        self._own = dict(own or {})
+        self.own = dict(own or {})
         self._added: dict[str, T] = {}
 
     @property
@@ -76,7 +76,7 @@ class Registry(Generic[T]):
     @property
     def names(self) -> tuple[str, ...]:
         """Names that can be resolved, gridpeers' own first."""
-        return tuple(dict.fromkeys((*self._own, *self._added, *_entry_points(self.group))))
+        return tuple(dict.fromkeys((*self.own, *self._added, *entry_points_of(self.group))))
 
     def register(self, name: str) -> Callable[[T], T]:
         """Return a decorator that adds an object under a name, for this process; a name is never taken over.
@@ -94,7 +94,7 @@ class Registry(Generic[T]):
         def add(it: T) -> T:
             before = self._added.get(name)
             same = before is not None and _home(before) == _home(it)  # a cell of a notebook that is run again
-            if name in self._own or (before is not None and not same):
+            if name in self.own or (before is not None and not same):
                 raise PluginError(f'there is a {self.kind} "{name}" already; choose another name')
             self._check(it, name)
             self._added[name] = it
@@ -119,10 +119,10 @@ class Registry(Generic[T]):
         """
         if reference in self._added:
             return self._added[reference]
-        if reference in self._own:
-            return self._imported(self._own[reference], "")
-        if reference in _entry_points(self.group):
-            return self._imported(_entry_points(self.group)[reference], "")
+        if reference in self.own:
+            return self._imported(self.own[reference], "")
+        if reference in entry_points_of(self.group):
+            return self._imported(entry_points_of(self.group)[reference], "")
         if ":" in reference:
             return self._imported(reference, folder)
         text = f'there is no {self.kind} "{reference}"; {suggestion(reference, self.names, self.plural)}'
@@ -253,7 +253,7 @@ def _home(it: Any) -> tuple[str, str]:
 
 
 @cache
-def _entry_points(group: str) -> dict[str, str]:
+def entry_points_of(group: str) -> dict[str, str]:
     """References of a group's entry points, by name."""
     from importlib import metadata  # a quarter of an agent's start, which resolves names of our own alone
 

@@ -60,9 +60,9 @@ class RealtimeAgent(AgentNode):
         if config.speed <= 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
         super().__init__(config, instance, links, law, rate=FASTER / config.T_c)
-        self._routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
-        self._routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
-        self._first_routes = dict(self._routes)
+        self.routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
+        self.routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
+        self._first_routes = dict(self.routes)
         self.phase: Phase = "seeking"
         self.session_broken = False
         """Whether it closes only to begin again with a new session."""
@@ -89,7 +89,7 @@ class RealtimeAgent(AgentNode):
     def _forget_everybody(self) -> None:
         """Know nothing of the others, as before the first session."""
         self.phase = "seeking"
-        self._routes = dict(self._first_routes)
+        self.routes = dict(self._first_routes)
         self._plants.clear()
         self.admission.release(PLANT)
         for name in self.members.nameplates:

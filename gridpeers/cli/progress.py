@@ -29,7 +29,7 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
     cases : tuple[str, ...]
         Names of the cases, in the order in which they run.
     """
-    with _explained(lambda: console.print(COMPILING, highlight=False, soft_wrap=True)) as started:
+    with explained(lambda: console.print(COMPILING, highlight=False, soft_wrap=True)) as started:
         if console.is_terminal:
             with _bars(console, cases) as tell:
                 yield _both(started, tell)
@@ -38,7 +38,7 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
 
 
 @contextmanager
-def _explained(explain: Callable[[], None]) -> Iterator[Tell]:
+def explained(explain: Callable[[], None]) -> Iterator[Tell]:
     """Explain a start that takes long; it is over when time has moved, as the plant's first step is compiled last."""
     timer = threading.Timer(PATIENCE, explain)
     timer.daemon = True

@@ -161,7 +161,7 @@ class Results(Mapping[str, "Result"]):
         found = find(self._spec, self._feeder, nameplates, histories, came)
         opened = {case: windows(came[case], self._spec.time.end_s) for case in came}
         saved = {
-            case: {label: of.get("messages_saved") or 0.0 for label, of in frames.windows_of(result._whole).items()}
+            case: {label: of.get("messages_saved") or 0.0 for label, of in frames.windows_of(result._whole).items()}  # noqa: SLF001
             for case, result in self.items()
         }
         own = own_measures(self._spec, self._feeder, nameplates, histories, opened, saved)

@@ -111,13 +111,13 @@ class RealtimePlant(PlantNode):
         self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
         keys = self.keys
         for name in plant.inverters:
-            self._routes[keys.state(name)] = self._routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
-            self._routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
-            self._routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
-            self._routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
-            self._routes[keys.link_acknowledgement(name)] = Route(name, (LinkAcknowledgement,), self._on_link_answer)
-        self._routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
-        self.subscriptions = tuple(self._routes)
+            self.routes[keys.state(name)] = self.routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
+            self.routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
+            self.routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
+            self.routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            self.routes[keys.link_acknowledgement(name)] = Route(name, (LinkAcknowledgement,), self._on_link_answer)
+        self.routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
 
     # ---------------------------------------------------------------- what the driver needs

@@ -27,9 +27,9 @@ class TelemetryEndpoint(PlantFollower):
         self._name, self._stream = name, stream
         self._questions = 0
         self._recordable: list[Recordable] = []
-        self._routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkRequest), self._on_recordable)
+        self.routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkRequest), self._on_recordable)
         if stream is not None:
-            self._routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
+            self.routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
 
     @property
     def finished(self) -> bool:
@@ -39,7 +39,7 @@ class TelemetryEndpoint(PlantFollower):
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the token is declared."""
-        return tuple(self._routes)
+        return tuple(self.routes)
 
     def appeared(self, key: str) -> None:
         """Note a token. That it goes is not noted: a link that breaks takes it away from a plant that goes on."""

@@ -190,7 +190,7 @@ class Loop:
         return self._built[0]
 
     @cached_property
-    def _free(self) -> Floats:
+    def free_map(self) -> Floats:
         """The map without what is constant by itself: the load and who does not run the law."""
         matrix = self.matrix
         frozen = np.zeros(matrix.shape[0], bool)
@@ -205,14 +205,14 @@ class Loop:
 
         One for each further group that nothing connects with the leaders' frequency; delays do not change it.
         """
-        free = Loop(fleet=self.fleet, plant="quasi-steady")._free
+        free = Loop(fleet=self.fleet, plant="quasi-steady").free_map
         singular = np.linalg.svd(np.eye(len(free)) - free, compute_uv=False)
         return int((singular < AT_REST).sum())
 
     @cached_property
     def spectral_radius(self) -> float:
         """Largest magnitude of an eigenvalue (1), those of what never moves left out; below 1 the loop is stable."""
-        values = np.linalg.eigvals(self._free)
+        values = np.linalg.eigvals(self.free_map)
         values = values[np.argsort(np.abs(values - 1.0))][self.resting :]
         return float(np.abs(values).max(initial=0.0))
 

@@ -108,7 +108,7 @@ class Links:
         self._born += 1
         return LockstepAgent(config, f"p{self._born}")
 
-    def _start(self, name: str) -> None:
+    def start(self, name: str) -> None:
         """Start an agent, perhaps once more: all others hear of it, and it of them, each at another time."""
         config = self._configs[name]
         self._configs[name] = msgspec.structs.replace(config, epoch=config.epoch + 1)
@@ -148,7 +148,7 @@ class Links:
             assert isinstance(telemetry, Telemetry)
             self.telemetry.append(telemetry)
             for name in telemetry.awaited:
-                self._start(name)
+                self.start(name)
         for to, side in self._living.items():
             if (sender, to, key) in self._subscribed:
                 self._send(sender, to, partial(side.received, key, payload, 0.0))

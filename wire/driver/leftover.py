@@ -30,7 +30,7 @@ def leave(status: int, tell: Callable[[str], None]) -> None:
         thread.join(max(0.0, until - monotonic()))
     if still := [thread.name for thread in left if thread.is_alive()]:
         tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
-        atexit._run_exitfuncs()  # what Python would do once they had ended
+        atexit._run_exitfuncs()  # noqa: SLF001  what Python would do once they had ended
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

@@ -249,6 +249,11 @@ class Session:
                 allowed_destination=self._zenoh.Locality.REMOTE,
             )
 
+    def may_drop(self, key: str) -> bool:
+        """Return whether a message on a key is dropped rather than waited for, on a link that does not keep up."""
+        self.prepare(key)
+        return bool(self._publishers[key].congestion_control == self._zenoh.CongestionControl.DROP)
+
     def peers(self) -> int:
         """Number of peers and routers connected now."""
         info = self._session.info

@@ -21,7 +21,7 @@ _R = TypeVar("_R")
 _HERE = Path(__file__).parent
 
 
-def _cache_folder() -> str:
+def cache_folder() -> str:
     """Folder of this source's kernels: beside the source, or the user's cache where that is read-only."""
     digest = hashlib.sha256()
     for source in sorted(_HERE.glob("*.py")):
@@ -35,7 +35,7 @@ def _cache_folder() -> str:
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    numba.config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]  # numba.config fills itself at import
+    numba.config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]  # numba.config fills itself at import
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:

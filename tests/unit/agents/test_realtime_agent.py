@@ -308,7 +308,7 @@ def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     def broken(*_: object) -> None:
         raise KeyError("\x1b[31m")
 
-    lab.side._routes[KEYS.state("inv2")] = lab.side._routes[KEYS.state("inv2")]._replace(handle=broken)
+    lab.side.routes[KEYS.state("inv2")] = lab.side.routes[KEYS.state("inv2")]._replace(handle=broken)
     for k in range(1, 4):
         lab.state("inv2", k)
     lab.measure(1)

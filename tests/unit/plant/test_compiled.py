@@ -15,9 +15,9 @@ def test_an_edit_of_compiled_code_renames_its_cache(
     """Whichever file with compiled code is edited, machine code of the text before is not loaded again."""
     folder = Path(shutil.copytree(source.parent, tmp_path / "dynamics", ignore=shutil.ignore_patterns("__pycache__")))
     monkeypatch.setattr(compiled, "_HERE", folder)
-    before = compiled._cache_folder()
+    before = compiled.cache_folder()
 
     with (folder / source.name).open("a") as file:
         file.write("\n")
 
-    assert compiled._cache_folder() != before
+    assert compiled.cache_folder() != before

@@ -18,9 +18,9 @@ def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         metadata.EntryPoint("broken", "agents.graphs:nowhere", "gridpeers.graphs"),
     )
     monkeypatch.setattr(metadata, "entry_points", lambda group: points if group == GRAPHS.group else ())
-    registry._entry_points.cache_clear()
+    registry.entry_points_of.cache_clear()
     yield
-    registry._entry_points.cache_clear()
+    registry.entry_points_of.cache_clear()
 
 
 def test_an_entry_point_adds_to_a_registry(entry_points: None) -> None:

@@ -14,7 +14,7 @@ def test_a_command_that_cannot_be_imported_leaves_the_others_alone(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It says why when it is called, with exit code 2; the command line starts."""
-    monkeypatch.setitem(COMMANDS._own, "mine", "no_such_module:command")
+    monkeypatch.setitem(COMMANDS.own, "mine", "no_such_module:command")
     commands = dict(contributed())
 
     with pytest.raises(SystemExit) as ended:

@@ -74,7 +74,7 @@ def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     explained = threading.Event()
 
-    with progress._explained(explained.set) as tell:
+    with progress.explained(explained.set) as tell:
         tell("I", 0.0, 1.0)
         assert explained.wait(timeout=10.0)
 
@@ -85,7 +85,7 @@ def test_a_start_that_is_quick_is_not_explained(monkeypatch: pytest.MonkeyPatch)
     explained = threading.Event()
     before = set(threading.enumerate())
 
-    with progress._explained(explained.set) as tell:
+    with progress.explained(explained.set) as tell:
         tell("I", 0.0, 1.0)
         tell("I", 0.0, 1.0)
         assert len(set(threading.enumerate()) - before) == 1  # threads of other tests may end meanwhile

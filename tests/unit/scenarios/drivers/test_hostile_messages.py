@@ -181,7 +181,7 @@ def _join(scene: _Played) -> None:
 
 def flood(side: Node, rng: random.Random) -> list[tuple[str, bytes]]:
     """All that is hostile to a core, in some order."""
-    truth = {key: (route.sender, route.types) for key, route in side._routes.items()}
+    truth = {key: (route.sender, route.types) for key, route in side.routes.items()}
     truth |= {KEYS.state("inv9"): ("inv9", ()), KEYS.telemetry: ("plant", ())}
     return list(hostile(truth, dict.fromkeys(("plant", *NAMES), EPOCH), rng))
 

@@ -131,7 +131,7 @@ def test_a_newcomer_that_does_not_come_is_named_by_the_deadline() -> None:
     """The tick is held for the newcomer; who waits in vain says for whom."""
     plant, agents = configured()
     run = Links(plant, agents, random.Random(3))
-    run._start = lambda name: None  # type: ignore[method-assign]
+    run.start = lambda name: None  # type: ignore[method-assign]
     while run.plant.phase != "joining":
         assert run.step()
     assert run.plant.tick == 15
