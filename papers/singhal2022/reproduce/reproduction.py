@@ -37,6 +37,12 @@ class PartResult:
     cpu_s: float
     """Processor time that it took, of all processes (s)."""
 
+    def verdicts_beside(self, figure: str) -> list[Verdict]:
+        """Return the verdicts to show below a figure, by its key; "" for those of claims without a shown figure."""
+        figured = {picture.key for picture in self.figures}
+        shown = [(one.claim.figure if one.claim.figure in figured else "", one) for one in self.verdicts]
+        return [verdict for key, verdict in shown if key == figure]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduction:

@@ -9,10 +9,9 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.headline import within
-from papers.singhal2022.reproduce.grid import lines
 from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
-from papers.singhal2022.reproduce.report_page import html
-from papers.singhal2022.reproduce.report_writing import markdown
+from papers.singhal2022.reproduce.report_tables import lines
+from papers.singhal2022.reproduce.report_writing import render
 from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
 from papers.singhal2022.reproduce.settings import settings
 from papers.singhal2022.reproduce.topology_study import graphs
@@ -68,17 +67,17 @@ def whole(*results: PartResult) -> Reproduction:
 
 def test_the_page_needs_nothing_but_itself(tmp_path: Path) -> None:
     """Every image is inside, nothing is fetched: no script, no link to a style, no address."""
-    page = html(whole(result(tmp_path)), settings({"islanding": load_scenario("islanding")[0]}))
+    page = render("report.html.jinja", whole(result(tmp_path)), settings({"islanding": load_scenario("islanding")[0]}))
 
     assert page.count("data:image/png;base64,") == len(ISLANDING.pictures)
     assert not re.findall(r"https?://|<script|<link|src=\"(?!data:)|url\(", page)
 
 
-@pytest.mark.parametrize("of", [html, markdown])
-def test_every_number_verdict_and_reason_is_told(tmp_path: Path, of: object) -> None:
+@pytest.mark.parametrize("template", ["report.html.jinja", "report.md.jinja"])
+def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) -> None:
     """The paper's number, ours with a digit more, the difference, each claim with its status and each known miss."""
     one = result(tmp_path)
-    text = of(whole(one), [("k_p", "0.0007 s", "speed")])  # type: ignore[operator]
+    text = render(template, whole(one), [("k_p", "0.0007 s", "speed")])
 
     assert all(token in text for token in ("0.14", "0.136", "-0.004", "0.0007 s"))
     for verdict in one.verdicts:

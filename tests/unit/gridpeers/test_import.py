@@ -13,7 +13,7 @@ import gridpeers as gp
 
 def test_importing_gridpeers_loads_nothing_heavy() -> None:
     """The command line and every process start through this package: heavy modules are loaded on use."""
-    heavy = {"numpy", "pandas", "scipy", "numba", "matplotlib", "msgspec", "rich", "zenoh"}
+    heavy = {"numpy", "pandas", "jinja2", "scipy", "numba", "matplotlib", "msgspec", "rich", "zenoh"}
     code = f"import sys, gridpeers; print(sorted({heavy} & set(sys.modules)))"
 
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
