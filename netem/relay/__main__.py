@@ -1,4 +1,4 @@
-"""``python -m netem.relay tcp/127.0.0.1:7500 tcp/127.0.0.1:7447 --delay 0.1``: a relay by hand."""
+"""``python -m netem.relay tcp/127.0.0.1:7500 tcp/127.0.0.1:7447 --delay 0.1``: a relay from the command line."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import argparse
 import signal
 import sys
 
-from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError, WordError
-from netem.relay.faults import UNITS
-from netem.relay.relay_commands import HELP
+from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayCommandError, RelayError
+from netem.relay.relay_command import FAULTS, HELP
 from wire.driver.output import speaking
+from wire.table_schema import fields_of
 
 OK, USAGE = 0, 2
 
 
 def main(arguments: list[str]) -> int:
-    """Relay until the word "end", Ctrl-C or SIGTERM; exit status 2 if it cannot be."""
+    """Relay until the command "end", Ctrl-C or SIGTERM; return exit status 2 if that is impossible."""
     options = _parser().parse_args(arguments)
-    given = {name: getattr(options, name) for name in UNITS}
-    returning = {name: value for name in UNITS if (value := getattr(options, f"back_{name}")) is not None}
+    given = {name: getattr(options, name) for name in FAULTS}
+    returning = {name: value for name in FAULTS if (value := getattr(options, f"back_{name}")) is not None}
     try:
         there, back = Faults(**given), Faults(**{**given, **returning})
         relay = Relay(options.listen, options.connect, there=there, back=back, seed=options.seed)
@@ -33,7 +33,7 @@ def main(arguments: list[str]) -> int:
                 print(_answer(relay, line), flush=True)
                 if line.strip() == "end":
                     return OK
-            while True:  # no more lines, as in the background: go on until told to end
+            while True:  # no more lines, as in the background: go on until a signal ends it
                 signal.pause()
     except KeyboardInterrupt:
         return OK
@@ -42,26 +42,24 @@ def main(arguments: list[str]) -> int:
 def _answer(relay: Relay, line: str) -> str:
     try:
         return relay.do(line)
-    except (WordError, FaultsError) as error:
+    except (RelayCommandError, FaultsError) as error:
         return "refused: " + "; ".join(str(error).splitlines())
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m netem.relay",
-        description="Relay Zenoh's traffic between two endpoints, and hurt it on the way.",
+        description="Relay Zenoh's traffic between two endpoints, and delay and lose it on the way.",
         epilog="Lines on standard input change it while it runs; each is answered by one line:\n\n" + HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("listen", help="where peers connect to, e.g. tcp/127.0.0.1:7500; port 0 for any free one")
     parser.add_argument("connect", help="where it goes on to, e.g. tcp/127.0.0.1:7447")
-    blank = Faults()
-    for name, unit in UNITS.items():
-        default = getattr(blank, name)
-        metavar = unit.strip() or "P"
-        both = parser.add_argument(f"--{name}", type=float, default=default, metavar=metavar)
-        both.help = f"both ways (default {default:g})"
-        parser.add_argument(f"--back-{name}", type=float, metavar=metavar, help="only from the target back")
+    for field in fields_of(Faults):
+        metavar, default = field.unit or "P", field.default
+        text = f"both ways (default {default:g})"
+        parser.add_argument(f"--{field.name}", type=float, default=default, metavar=metavar, help=text)
+        parser.add_argument(f"--back-{field.name}", type=float, metavar=metavar, help="only from the target back")
     parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
     return parser
 

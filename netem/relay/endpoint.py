@@ -33,18 +33,7 @@ class Endpoint(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Endpoint:
-        """Read an endpoint as Zenoh writes it.
-
-        Parameters
-        ----------
-        text : str
-            E.g. ``tcp/127.0.0.1:7447``.
-
-        Raises
-        ------
-        EndpointError
-            If it is none, or of a transport that a relay does not know.
-        """
+        """Read an endpoint as Zenoh writes it; raise EndpointError if it is none that a relay knows."""
         transport, _, place = text.partition("/")
         host, _, port = place.rpartition(":")
         host = host.removeprefix("[").removesuffix("]")

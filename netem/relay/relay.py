@@ -1,27 +1,30 @@
-"""The relay itself: a thread with an event loop, told what to do line by line."""
+"""The relay itself: an event loop in a thread of its own, which obeys commands line by line."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
 import threading
+from concurrent.futures import Future
 from types import TracebackType
 from typing import Any
 
-from netem.relay import relay_commands as words
-from netem.relay.bottleneck import NEVER
-from netem.relay.datagrams import UdpRelay
-from netem.relay.direction import Counts, Direction, Road
+import msgspec
+
+from netem.relay.direction import Direction, Faults, FaultsError, PacketCounts
 from netem.relay.endpoint import Endpoint
-from netem.relay.faults import Faults, FaultsError
-from netem.relay.streams import TcpRelay
+from netem.relay.flow import RelayedLink
+from netem.relay.packets import NEVER
+from netem.relay.relay_command import RelayCommand, read_command
+from netem.relay.tcp_relay import TcpRelay
+from netem.relay.udp_relay import UdpRelay
 
 PATIENCE = 10.0
 """Longest wait (s) for the own thread to answer: it never waits for the network."""
 
 
 class RelayError(ValueError):
-    """A relay cannot be had; the message says why and what to do."""
+    """A relay that cannot be; the message says why and what to do."""
 
 
 class Relay:
@@ -57,122 +60,109 @@ class Relay:
         near, self._target = Endpoint.parse(listen), Endpoint.parse(connect)
         if near.transport != self._target.transport:
             raise RelayError(f"{listen} -> {connect}: a relay does not turn {near.transport} into another transport")
+        self._link = RelayedLink(Direction("there", there or Faults()), Direction("back", back or Faults()), seed)
         self._transport = near.transport
-        self._road = Road(Direction("there", there or Faults()), Direction("back", back or Faults()), seed)
-        self._check(self._road.there.faults, self._road.back.faults)
-        target = _resolve(self._target)
-        self._near = _bind(near)
-        self.endpoint = str(near._replace(port=self._near.getsockname()[1]))
+        self._check(self._link.there.faults, self._link.back.faults)
+        target, sock = _resolve(self._target), _bind(near)
+        self.endpoint = str(near._replace(port=sock.getsockname()[1]))
         """Where it listens."""
         make = TcpRelay if near.transport == "tcp" else UdpRelay
-        self._relay: TcpRelay | UdpRelay = make(self._road, self._near, target)
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="netem relay", daemon=True)
+        self._relay: TcpRelay | UdpRelay = make(self._link, sock, target)
+        self._ended = asyncio.Event()
+        self._loop: Future[asyncio.AbstractEventLoop] = Future()
+        self._thread = threading.Thread(target=asyncio.run, args=(self._run(),), name="netem relay", daemon=True)
+
+    async def _run(self) -> None:
+        await self._relay.start()
+        self._loop.set_result(asyncio.get_running_loop())
+        await self._ended.wait()
+        self._relay.close()
+        for _ in range(3):  # turns of the loop: a task's last callback, the end of its transport, the end of its socket
+            await asyncio.sleep(0)
 
     def __enter__(self) -> Relay:
         self._thread.start()
-        self._wait(self._relay.start())
+        self._loop.result(PATIENCE)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._wait(self._relay.close())
-        self._wait(_settle())
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.result().call_soon_threadsafe(self._ended.set)
         self._thread.join(PATIENCE)
-        self._loop.close()
 
     def do(self, line: str) -> str:
-        """Do what a line says; see `netem.relay.relay_commands.HELP`.
+        """Obey a command; see `netem.relay.relay_command.HELP`.
 
         Returns
         -------
         str
-            One line: what is so now.
+            One line: the new state.
 
         Raises
         ------
-        WordError
-            If the line is not understood.
+        RelayCommandError
+            If the line is no command.
         FaultsError
             If its values cannot be meant; nothing has changed then.
         """
-        word = words.read(line)
-        return str(self._wait(self._obey(word)))
+        work = self._obey(read_command(line))
+        return asyncio.run_coroutine_threadsafe(work, self._loop.result()).result(PATIENCE)
 
-    def counts(self) -> tuple[Counts, Counts]:
-        """What was counted towards the target, and from it."""
-        return self._road.there.counts, self._road.back.counts
+    def counts(self) -> tuple[PacketCounts, PacketCounts]:
+        """Return the counts of packets towards the target, and from it."""
+        return self._link.there.counts, self._link.back.counts
 
-    async def _obey(self, word: words.Word) -> str:
-        road = self._road
-        match word:
-            case words.Change():
-                return self._change(word)
-            case words.Stall():
-                road.opens = asyncio.get_running_loop().time() + word.duration
-                road.changed()
-                return "stalled until heal" if word.duration == NEVER else f"stalled for {word.duration:g} s"
+    async def _obey(self, command: RelayCommand) -> str:
+        link, answer = self._link, ""
+        match command.name:
+            case "set":
+                answer = self._set_faults(command)
+            case "stall":
+                link.stalled_until = asyncio.get_running_loop().time() + command.duration
+                answer = "stalled until heal" if command.duration == NEVER else f"stalled for {command.duration:g} s"
             case "reset":
-                ended = len(self._relay)
-                await self._relay.reset()
-                return f"{ended} {self._noun(ended)} reset"
+                answer = f"{self._connections()} reset"
+                self._relay.reset()
             case "cut":
-                road.is_cut = True
-                await self._relay.cut()
-                return "cut until heal"
+                link.is_cut, answer = True, "cut until heal"
+                self._relay.cut()
             case "heal":
-                road.is_cut, road.opens = False, -NEVER
+                link.is_cut, link.stalled_until, answer = False, -NEVER, "healed"
                 await self._relay.heal()
-                road.changed()
-                return "healed"
             case "show":
                 return self._show()
             case "end":
                 return "ending"
+        link.changed()
+        return answer
 
-    def _change(self, change: words.Change) -> str:
-        ways = [way for way in (self._road.there, self._road.back) if way.name in change.directions]
+    def _set_faults(self, command: RelayCommand) -> str:
+        directions = [one for one in (self._link.there, self._link.back) if one.name in command.directions]
         try:
-            new = [change.on(way.faults) for way in ways]
+            faults = [Faults(**(msgspec.structs.asdict(one.faults) | command.values)) for one in directions]
         except FaultsError as error:
-            raise FaultsError(f"{'/'.join(change.directions)}: {error}") from None
-        self._check(*new)
-        for way, faults in zip(ways, new, strict=True):
-            way.faults = faults
-        self._road.changed()
-        return "; ".join(f"{way.name}: {way.faults}" for way in ways)
+            raise FaultsError(f"{'/'.join(command.directions)}: {error}") from None
+        self._check(*faults)
+        for direction, new in zip(directions, faults, strict=True):
+            direction.faults = new
+        return "; ".join(f"{direction.name}: {direction.faults}" for direction in directions)
 
     def _check(self, *faults: Faults) -> None:
         if self._transport == "tcp" and any(one.reorder for one in faults):
             raise FaultsError("reorder: a TCP connection keeps its order; it is for udp endpoints")
 
     def _show(self) -> str:
-        road, count = self._road, len(self._relay)
-        states = [f"{count} {self._noun(count)}"]
-        if road.is_cut:
+        link, states = self._link, [self._connections()]
+        if link.is_cut:
             states.append("cut")
-        if road.opens > asyncio.get_running_loop().time():
+        if link.stalled_until > asyncio.get_running_loop().time():
             states.append("stalled")
-        return f"{self.endpoint} -> {self._target}: {', '.join(states)}; {road.there}; {road.back}"
+        return f"{self.endpoint} -> {self._target}: {', '.join(states)}; {link.there}; {link.back}"
 
-    def _noun(self, count: int) -> str:
-        noun = "connection" if self._transport == "tcp" else "conversation"
-        return noun if count == 1 else f"{noun}s"
-
-    def _wait(self, work: Any) -> Any:
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(PATIENCE)
-
-
-async def _settle() -> None:
-    """Let asyncio finish what it has begun, e.g. with a connection that came in the very last moment."""
-    while others := asyncio.all_tasks() - {asyncio.current_task()}:
-        for other in others:
-            other.cancel()
-        await asyncio.gather(*others, return_exceptions=True)
-    for _ in range(3):  # turns of the loop: a task's last callback, the end of its transport, the end of its socket
-        await asyncio.sleep(0)
+    def _connections(self) -> str:
+        count = len(self._relay)
+        return f"{count} {self._relay.noun}{'s' if count != 1 else ''}"
 
 
 def _resolve(endpoint: Endpoint) -> tuple[int, tuple[Any, ...]]:

@@ -1,7 +1,7 @@
-"""What TCP makes of a lossy link, as a model.
+"""A model of TCP on a lossy link.
 
 A relay in user space ends one TCP connection and begins another, so it never sees a segment, and a byte that it left
-out would break the stream. So it does to the bytes what TCP would: what is lost is sent again, and everything behind
+out would break the stream. So it treats the bytes as TCP would: a lost segment is sent again, and everything behind
 waits for it (head-of-line blocking; TCP hands over bytes in order only). The rules, with R the round trip that the
 relay is set to (delay there + delay back):
 
@@ -12,8 +12,8 @@ relay is set to (delay there + delay back):
   the sum are Linux's), RTTVAR being half of the jitter both ways, the mean deviation of a uniform delay.
 
 Not in it: congestion windows (so no drop of the throughput with many bytes on the way), lost acknowledgements, the tail
-loss probe, and the time-outs of opening a connection. A segment is what one read from the socket gave, at most 1448
-bytes; at the rates of control every message is one.
+loss probe, and the time-outs of opening a connection. A segment is the result of one read from the socket, at most
+1448 bytes; at the rates of control every message is one.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from collections import deque
 from collections.abc import Callable
 
 from netem.draws import Stream
-from netem.relay.bottleneck import NEVER
-from netem.relay.faults import Faults
+from netem.relay.direction import Direction
+from netem.relay.packets import NEVER, Packet
 
 SIZE = 1448
 """Bytes of a full segment on Ethernet: 1500 less the headers of IPv4 and TCP with time stamps."""
@@ -38,11 +38,12 @@ RTO_MAX = 120.0
 class _Segment:
     """One segment on its way."""
 
-    __slots__ = ("arrives", "data", "number", "resend", "sent", "turn")
+    __slots__ = ("arrives", "packet", "resend", "sent", "transmissions")
 
-    def __init__(self, data: bytes, number: int) -> None:
-        self.data, self.number, self.turn = data, number, 0
+    def __init__(self, packet: Packet) -> None:
+        self.packet, self.transmissions = packet, 0
         self.sent = 0.0
+        """When it was sent last (s)."""
         self.arrives = NEVER
         """When it arrives (s); never, if its last transmission was lost."""
         self.resend = NEVER
@@ -52,55 +53,39 @@ class _Segment:
 class Segments:
     """One direction of a TCP connection across a lossy link. Time is an argument (s) and never goes back.
 
-    Parameters
-    ----------
-    stream : Callable[[str], Stream]
-        The random numbers of this connection and direction, for a purpose.
-    ways : Callable[[], tuple[Faults, Faults]]
-        What is set now: for this direction, and for the one in which acknowledgements go.
-    on_loss : Callable[[], None], optional
-        Called at each lost transmission.
+    Their random numbers come from `stream`, by purpose; acknowledgements go in the direction `back`.
     """
 
-    def __init__(
-        self,
-        stream: Callable[[str], Stream],
-        ways: Callable[[], tuple[Faults, Faults]],
-        on_loss: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, stream: Callable[[str], Stream], direction: Direction, back: Direction) -> None:
         self._loss, self._delay = stream("loss"), stream("delay")
-        self._ways, self._on_loss = ways, on_loss
+        self._direction, self._back = direction, back
         self._flight: deque[_Segment] = deque()
         self._lost: list[_Segment] = []
-        self._sent = 0
         self.bytes = 0
-        """How many are on the way."""
 
     def __len__(self) -> int:
         return len(self._flight)
 
-    def send(self, data: bytes, now: float) -> None:
+    def send(self, packet: Packet, now: float) -> None:
         """Put a segment on its way."""
         self._send_again(now)
-        self._sent += 1
-        self.bytes += len(data)
-        segment = _Segment(data, self._sent)
+        self.bytes += len(packet.data)
+        segment = _Segment(packet)
         self._flight.append(segment)
         self._transmit(segment, now)
 
     def take(self, now: float) -> list[bytes]:
-        """What the receiver's TCP hands over by now: in order, up to the first segment that is missing."""
+        """Return what the receiver's TCP hands over by now: in order, up to the first segment that is missing."""
         self._send_again(now)
         ready = []
         while self._flight and self._flight[0].arrives <= now:
-            segment = self._flight.popleft()
-            self.bytes -= len(segment.data)
-            ready.append(segment.data)
+            ready.append(self._flight.popleft().packet.data)
+            self.bytes -= len(ready[-1])
         return ready
 
     @property
     def until(self) -> float:
-        """When something is to be done next (s)."""
+        """When the next segment arrives or is sent again (s)."""
         first = self._flight[0].arrives if self._flight else NEVER
         return min([first, *(segment.resend for segment in self._lost)])
 
@@ -113,18 +98,19 @@ class Segments:
             self._transmit(segment, segment.resend)
 
     def _transmit(self, segment: _Segment, at: float) -> None:
-        faults, back = self._ways()
+        faults, back = self._direction.faults, self._back.faults
         segment.sent = at
-        segment.turn += 1
+        segment.transmissions += 1
+        draw = segment.packet.number, segment.transmissions
         R = faults.delay + back.delay
-        if self._loss.uniform(segment.number, segment.turn) < faults.loss:
+        if self._loss.uniform(*draw) < faults.loss:
             rto = R + max(RTO_MIN, 4.0 * (faults.jitter + back.jitter) / 2.0)
             segment.arrives = NEVER
-            segment.resend = at + min(rto * 2.0 ** (segment.turn - 1), RTO_MAX)
+            segment.resend = at + min(rto * 2.0 ** (segment.transmissions - 1), RTO_MAX)
             self._lost.append(segment)
-            self._on_loss()
+            self._direction.counts.lost += 1
             return
-        segment.arrives = at + faults.delayed(self._delay.uniform(segment.number, segment.turn))
+        segment.arrives = at + faults.delayed(self._delay.uniform(*draw))
         known = segment.arrives + back.delay + R / 4.0
         for lost in self._lost:
             if lost.sent < at:

@@ -6,11 +6,10 @@ import pytest
 from scipy.stats import binom, kstest
 
 from netem.draws import Stream
-from netem.relay.bottleneck import NEVER
-from netem.relay.datagrams import Datagrams
-from netem.relay.direction import Direction
-from netem.relay.faults import Faults, FaultsError
-from netem.relay.relay_commands import WordError, read
+from netem.relay.direction import Direction, Faults, FaultsError
+from netem.relay.line import Line
+from netem.relay.packets import NEVER, Datagrams
+from netem.relay.relay_command import RelayCommandError, read_command
 
 N = 4000
 SURE = 1e-4
@@ -19,7 +18,8 @@ SURE = 1e-4
 
 def carried(faults: Faults, count: int = N, gap: float = 1.0, *, size: int = 4, seed: int = 1) -> dict[int, float]:
     """Delay of each datagram that arrived, in the order of arrival."""
-    line, delays = Datagrams(Direction("there", faults), partial(Stream, seed, "1", "there")), {}
+    direction, delays = Direction("there", faults), {}
+    line = Line(direction, Datagrams(partial(Stream, seed, "1", "there"), direction))
 
     def take(now: float) -> None:
         for data in line.take(now):
@@ -90,8 +90,8 @@ def test_a_full_queue_drops_what_comes_and_the_rate_is_kept() -> None:
 )
 def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -> None:
     """Whoever types something else is told what there is."""
-    with pytest.raises(WordError, match=complaint):
-        read(line)
+    with pytest.raises(RelayCommandError, match=complaint):
+        read_command(line)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -
         ({"delay": 100.0}, r"did you mean 0.1 \(100 ms\)\?"),
         ({"loss": 2.0}, r"did you mean 0.02 \(2 %\)\?"),
         ({"delay": float("nan")}, "delay: a delay must be a finite number"),
-        ({"queue": float("nan")}, "queue: nan bytes"),
+        ({"queue": float("nan")}, "queue: a queue must be a finite number"),
         ({"jitter": 0.1}, "nothing arrives early"),
         ({"reorder": 0.1}, "needs a delay"),
         ({"rate": -1.0, "loss": -1.0}, "(?s)loss: .*rate: "),

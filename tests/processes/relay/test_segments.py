@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netem.draws import Stream
-from netem.relay.bottleneck import NEVER, Bottleneck
-from netem.relay.faults import Faults
+from netem.relay.direction import Direction, Faults
+from netem.relay.packets import NEVER, Bottleneck, Packet
 from netem.relay.segments import RTO_MIN, Segments
 
 DELAYS = st.floats(0.0, 1.0)
@@ -38,6 +38,11 @@ def streams(seed: int) -> Callable[[str], Stream]:
     return partial(Stream, seed, "1", "there")
 
 
+def line_of(stream: Callable[[str], Stream], there: Faults, back: Faults) -> Segments:
+    """A direction with these faults, and others on the way back."""
+    return Segments(stream, Direction("there", there), Direction("back", back))
+
+
 def carried(line: Segments, sent: list[float]) -> list[float]:
     """When each segment, sent at these times, is handed over."""
     numbers: dict[int, float] = {}
@@ -48,7 +53,7 @@ def carried(line: Segments, sent: list[float]) -> list[float]:
     for number, at in enumerate(sent):
         while line.until <= at:
             take(line.until)
-        line.send(number.to_bytes(2, "big"), at)
+        line.send(Packet(number + 1, number.to_bytes(2, "big")), at)
     while line.until < NEVER:
         take(line.until)
     assert list(numbers) == list(range(len(sent))), "all of them, in order"
@@ -63,8 +68,8 @@ def test_tcp_loses_nothing_and_keeps_the_order(
     faults = Faults(delay=delay, jitter=jitter * delay, loss=loss)
     sent = [sum(gaps[: n + 1]) for n in range(len(gaps))]
 
-    lossy = carried(Segments(streams(seed), lambda: (faults, Faults(delay=back))), sent)
-    sound = carried(Segments(streams(seed), lambda: (Faults(delay=delay), Faults(delay=back))), sent)
+    lossy = carried(line_of(streams(seed), faults, Faults(delay=back)), sent)
+    sound = carried(line_of(streams(seed), Faults(delay=delay), Faults(delay=back)), sent)
 
     assert all(a <= b for a, b in pairwise(lossy))
     shortest = delay - jitter * delay
@@ -78,7 +83,7 @@ def test_a_lost_segment_comes_after_fast_retransmit_or_the_time_out_whichever_is
 ) -> None:
     """One loss costs the gap to the next segment, a round trip and a quarter, or RTO; those behind wait for it."""
     R = delay + back
-    line = Segments(Chosen((2, 1)), lambda: (Faults(delay=delay, loss=0.5), Faults(delay=back)))
+    line = line_of(Chosen((2, 1)), Faults(delay=delay, loss=0.5), Faults(delay=back))
 
     came = carried(line, [0.0, gap, 2.0 * gap, 3.0 * gap])
 
@@ -90,7 +95,7 @@ def test_a_lost_segment_comes_after_fast_retransmit_or_the_time_out_whichever_is
 
 def test_the_last_segment_of_all_waits_for_time_outs_that_double() -> None:
     """With nothing behind it to tell of its loss, a segment lost three times comes after 1 + 2 + 4 RTO."""
-    line = Segments(Chosen((1, 1), (1, 2), (1, 3)), lambda: (Faults(delay=0.1, loss=0.5), Faults(delay=0.1)))
+    line = line_of(Chosen((1, 1), (1, 2), (1, 3)), Faults(delay=0.1, loss=0.5), Faults(delay=0.1))
 
     assert carried(line, [0.0]) == pytest.approx([7.0 * (0.2 + RTO_MIN) + 0.1])
 
@@ -107,7 +112,7 @@ def test_a_bottleneck_serves_one_packet_after_the_other_at_its_rate(
     for size, gap in packets:
         now += gap
         left += slow.take(now)
-        slow.put(bytes(size), now)
+        slow.put(Packet(1, bytes(size)), now)
         free = max(free, now) + size / rate
         expected.append(free)
     left += slow.take(1e9)
@@ -120,7 +125,7 @@ def test_a_bottleneck_serves_one_packet_after_the_other_at_its_rate(
 def test_a_change_of_the_rate_counts_for_the_rest_of_the_packet_that_leaves() -> None:
     """Half of a packet at 100 bytes/s and half at 50: half a second and one second."""
     slow = Bottleneck(100.0)
-    slow.put(bytes(100), 0.0)
+    slow.put(Packet(1, bytes(100)), 0.0)
 
     slow.set_rate(50.0, 0.5)
 

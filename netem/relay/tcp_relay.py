@@ -1,0 +1,159 @@
+"""The relay of TCP: every connection to it goes on to the target, byte for byte, in order."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+from functools import partial
+from typing import Any, cast
+
+from netem.draws import Stream
+from netem.relay.direction import Direction
+from netem.relay.flow import Flow, RelayedLink
+from netem.relay.line import Line
+from netem.relay.segments import SIZE, Segments
+
+_LINGER = struct.pack("ii", 1, 0)
+"""Close at once: what is unsent is thrown away, and the other side gets RST."""
+
+
+class _End(asyncio.Protocol):
+    """One end of a connection: what comes in here leaves at the other end."""
+
+    def __init__(self, relay: TcpRelay, name: str, direction: Direction, back: Direction) -> None:
+        way = Segments(partial(Stream, relay.link.seed, name, direction.name), direction, back)
+        self.flow = Flow(relay.link, Line(direction, way), self._forward, self._after_look)
+        self.flow.is_blocked = True
+        self.other = self
+        self.transport: asyncio.Transport | None = None
+        """None before it is connected and after it is closed."""
+        self._relay = relay
+        self._has_ended = self._is_done = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = cast("asyncio.Transport", transport)
+        if self._relay.admit(self):
+            self.resume_writing()
+        else:
+            self.close(reset=True)
+
+    def data_received(self, data: bytes) -> None:
+        for start in range(0, len(data), SIZE):
+            self.flow.put(data[start : start + SIZE])
+
+    def eof_received(self) -> bool:
+        self._has_ended = True
+        self.flow.look()
+        return True  # bytes on the way go on, and so does the other direction
+
+    def pause_writing(self) -> None:
+        self.other.flow.is_blocked = True
+
+    def resume_writing(self) -> None:
+        self.other.flow.unblock()
+
+    def connection_lost(self, error: Exception | None) -> None:
+        self.transport = None
+        self._relay.end(self, reset=error is not None)
+
+    def close(self, *, reset: bool) -> None:
+        """Close it: with RST, and what is on the way to it lost, or after the last byte."""
+        self.flow.close()
+        if self.transport is None:
+            return
+        sock = self.transport.get_extra_info("socket")
+        if not reset:
+            self.transport.close()
+        elif sock is not None and sock.fileno() >= 0:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER)
+            self.transport.abort()
+
+    def _forward(self, data: bytes) -> None:
+        assert self.other.transport is not None
+        self.other.transport.write(data)
+
+    def _after_look(self) -> None:
+        """Read on only if there is room; after the last byte, end the other end too."""
+        if self.transport is None or self.other.transport is None:
+            return
+        if not self._has_ended:
+            (self.transport.resume_reading if self.flow.line.has_room else self.transport.pause_reading)()
+        elif not self.flow.line and not self._is_done:
+            self._is_done = True
+            self.other.transport.write_eof()
+            if self.other._is_done:
+                self._relay.end(self, reset=False)
+
+
+class TcpRelay:
+    """Relays connections from a bound socket to the target, which is a family and an address."""
+
+    noun = "connection"
+
+    def __init__(self, link: RelayedLink, near: socket.socket, target: tuple[int, tuple[Any, ...]]) -> None:
+        self.link, self._near, self._target = link, near, target
+        self._server: asyncio.Server | None = None
+        self._connections: dict[_End, asyncio.Task[None]] = {}
+        """Near ends of all connections, with the tasks that connect their far ends."""
+
+    def __len__(self) -> int:
+        return len(self._connections)
+
+    async def start(self) -> None:
+        """Accept connections."""
+        self._server = await asyncio.get_running_loop().create_server(self._accepted, sock=self._near)
+
+    def reset(self) -> None:
+        """Close all connections with RST."""
+        for near in list(self._connections):
+            self.end(near, reset=True)
+
+    def cut(self) -> None:
+        """Reset, and refuse new connections."""
+        family, address = self._near.family, self._near.getsockname()
+        self.close()
+        # bound but not listening: the port stays ours, and the kernel answers SYN with RST
+        self._near = socket.socket(family, socket.SOCK_STREAM)
+        self._near.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self._near.bind(address)
+
+    async def heal(self) -> None:
+        """Accept again."""
+        if self._server is None:
+            await self.start()
+
+    def close(self) -> None:
+        """End."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+        self._near.close()
+        self.reset()
+
+    def _accepted(self) -> _End:
+        link, name = self.link, self.link.new_connection()
+        near, far = _End(self, name, link.there, link.back), _End(self, name, link.back, link.there)
+        near.other, far.other = far, near
+        return near
+
+    def admit(self, end: _End) -> bool:
+        """Connect the far end of a new connection; return whether it is still wanted."""
+        if end.other.transport is None and self._server is not None:
+            self._connections[end] = asyncio.get_running_loop().create_task(self._connect(end))
+        return end in self._connections or end.other in self._connections
+
+    async def _connect(self, near: _End) -> None:
+        family, address = self._target
+        try:
+            await asyncio.get_running_loop().create_connection(lambda: near.other, *address[:2], family=family)
+        except OSError:  # nobody listens there: the near end learns it as from the kernel
+            self.end(near, reset=True)
+
+    def end(self, end: _End, *, reset: bool) -> None:
+        """Close both ends of a connection, and forget it when both are closed."""
+        near = end if end in self._connections else end.other
+        for one in (end, end.other):
+            one.close(reset=reset)
+        if end.transport is None and end.other.transport is None and near in self._connections:
+            self._connections.pop(near).cancel()
