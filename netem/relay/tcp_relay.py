@@ -29,7 +29,7 @@ class _End(asyncio.Protocol):
         self.transport: asyncio.Transport | None = None
         """None before it is connected and after it is closed."""
         self._relay = relay
-        self._has_ended = self._is_done = False
+        self._has_ended = self.is_done = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = cast("asyncio.Transport", transport)
@@ -79,10 +79,10 @@ class _End(asyncio.Protocol):
             return
         if not self._has_ended:
             (self.transport.resume_reading if self.flow.line.has_room else self.transport.pause_reading)()
-        elif not self.flow.line and not self._is_done:
-            self._is_done = True
+        elif not self.flow.line and not self.is_done:
+            self.is_done = True
             self.other.transport.write_eof()
-            if self.other._is_done:
+            if self.other.is_done:
                 self._relay.end(self, reset=False)
 
 
