@@ -147,7 +147,7 @@ def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:
     tables.pop("as_run", None)
     cases = tables.pop("case")
     tables["case"] = cases[runs[0].case] if len(runs) == 1 else {run.case: cases[run.case] for run in runs}
-    return dict(flatten(tables, lambda value: False))
+    return dict(flatten(tables))
 
 
 def _shown(keys: dict[str, Any], key: str) -> str:

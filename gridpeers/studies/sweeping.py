@@ -21,8 +21,9 @@ from scenarios.schema.portability import check_portable
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file.plan import Plan, Run
+from scenarios.sweep.file.samples import BaseScenario
 from scenarios.sweep.file.sweep_model import Sweep
-from scenarios.sweep.file.sweep_reading import Base, plan_of
+from scenarios.sweep.file.sweep_reading import plan_of
 from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of, run_one, run_with_history
 from wire.suggestion import suggestion
 
@@ -158,7 +159,7 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
         problems.add("seeds", f"must be a whole number, got {seeds!r}")
     problems.raise_if_any()
     request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
-    return plan_of(request, Base(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
+    return plan_of(request, BaseScenario(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 
 
 def _names(given: str | Iterable[str]) -> tuple[str, ...]:

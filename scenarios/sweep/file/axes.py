@@ -3,53 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Annotated, Any, Literal, TypeGuard
-
-import msgspec
+from typing import Any, NamedTuple
 
 from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
 from scenarios.sweep.file.paths import flatten
-from scenarios.sweep.file.sweep_model import GraphAxis
-from wire.plausible import Range
+from scenarios.sweep.file.sweep_model import GraphAxis, ValueRange
 from wire.table_reading import read_table
-from wire.table_schema import Problem, fields_of, problems_of
-
-MOST_POINTS = 1_000_000
-"""Most values of one range: more are a slip, and would fill the memory before anybody could be told."""
+from wire.table_schema import fields_of, problems_of
 
 
-class Spread(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A range of values in place of their list."""
-
-    low: float = msgspec.field(name="from")
-    """First value."""
-    high: float = msgspec.field(name="to")
-    """Last value."""
-    count: Annotated[int, Range(2, MOST_POINTS)]
-    """How many values."""
-    spacing: Literal["lin", "log"] = "lin"
-    """Whether their differences or their ratios are equal."""
-
-    def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
-        low, high = self.low, self.high
-        if low == high:
-            return [Problem("", f"a range goes from one number to another, got {low:g} twice")]
-        if self.spacing == "log" and min(low, high) <= 0:
-            text = f"spacing log needs two numbers above 0, got {low:g} and {high:g}; or use spacing lin"
-            return [Problem("", text)]
-        return []
-
-
-_RANGE = tuple(field.key for field in fields_of(Spread))
-
-
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """One point of an axis."""
 
     shown: Mapping[str, Any]
@@ -58,27 +25,27 @@ class Setting:
     """Keys of the scenario, by path."""
 
 
-Axis = Sequence[Setting]
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together."""
+
+    origin: Mapping[str, str]
+    """Key of the sweep file by key of the scenario."""
+    settings: Callable[[], Sequence[Setting]]
+    """Makes the points; of use only when no problem is noted."""
 
 
-def size(axes: Sequence[Axis]) -> int:
-    """How many samples there are."""
-    return math.prod(len(axis) for axis in axes)
+def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
+    """Return every combination, the last axis fastest."""
+    for points in product(*settings):
+        yield Setting(
+            {name: value for point in points for name, value in point.shown.items()},
+            {path: value for point in points for path, value in point.put.items()},
+        )
 
 
-def samples(axes: Sequence[Axis]) -> Iterator[Setting]:
-    """Every combination, the last axis fastest."""
-    for settings in product(*axes):
-        shown: dict[str, Any] = {}
-        put: dict[str, Any] = {}
-        for setting in settings:
-            shown |= setting.shown
-            put |= setting.put
-        yield Setting(shown, put)
-
-
-def of_values(values: Mapping[str, Sequence[Any]]) -> Axis:
-    """Keys that go together, first values with first.
+def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
+    """Return the points of keys that go together, first values with first.
 
     Examples
     --------
@@ -89,56 +56,30 @@ def of_values(values: Mapping[str, Sequence[Any]]) -> Axis:
     return [Setting(row, row) for row in rows]
 
 
-def of_graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Axis:
-    """Random connected graphs of the inverters, each put into every case as its listed links."""
-    n = len(inverters)
-    points = []
-    for links in axis.links:
-        for number, edges in enumerate(connected_graphs(n, links, axis.per_count, axis.seed)):
-            pairs = [[inverters[i], inverters[j]] for i, j in edges]
-            shown = {
-                "graph.links": links,
-                "graph.number": number,
-                "graph.lambda_2": algebraic_connectivity(n, edges),
-                "graph.edges": " ".join("-".join(pair) for pair in pairs),
-            }
-            put = {f"case.{case}.graph": "links" for case in cases} | {f"case.{case}.links": pairs for case in cases}
-            points.append(Setting(shown, put))
-    return points
+def value_axis(values: Mapping[str, Sequence[Any]], table: str) -> Axis:
+    """Return the axis of keys of one table that go together."""
+    return Axis({path: f"{table}.{path}" for path in values}, lambda: of_values(values))
 
 
-def values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict[str, list[Any]]:
-    """Values of each key of `[grid]` or `[zip]`, problems noted."""
-    found = {}
-    for path, value in flatten(table, _is_range):
-        at = f"{where}.{path}"
-        if isinstance(value, Mapping) and _is_range(value):
-            values = _spread(value, at, problems)
-        elif isinstance(value, list):
-            values = value
-            if not value:
-                problems.add(at, "has no value; list at least one")
-            elif where == "grid" and (twice := _twice(value)) is not None:
-                problems.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
-        else:
-            problems.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
-            values = []
-        found[path] = values
-    return found
+def grid_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
+    """Return an axis for each key of `[grid]`."""
+    return [value_axis({path: values}, "grid") for path, values in _values_of(table, "grid", problems).items()]
 
 
-def check_zip(values: Mapping[str, Sequence[Any]], problems: Problems) -> None:
-    """Keys that go together have equally many values."""
+def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
+    """Return the one axis of the keys of `[zip]`, or none; they have equally many values."""
+    values = _values_of(table, "zip", problems)
     counts = {path: len(items) for path, items in values.items()}
     if len(set(counts.values())) > 1 and all(counts.values()):
         listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
         problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
     elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
         problems.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+    return [value_axis(values, "zip")] if values else []
 
 
-def check_graph(axis: GraphAxis, inverters: Sequence[str], problems: Problems) -> None:
-    """Each number of links can join the inverters, and is no more than all pairs."""
+def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
+    """Return the one axis of random graphs, or none; each number of links can join the inverters."""
     n = len(inverters)
     low, high = n - 1, n * (n - 1) // 2
     for i, links in enumerate(axis.links):
@@ -147,11 +88,55 @@ def check_graph(axis: GraphAxis, inverters: Sequence[str], problems: Problems) -
             problems.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
         elif links in axis.links[:i]:
             problems.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
+    keys = [f"case.{case}.{key}" for case in cases for key in ("graph", "links")]
+    return [Axis(dict.fromkeys(keys, "graph"), lambda: _graphs(axis, inverters, cases))] if axis.links else []
+
+
+def _graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Sequence[Setting]:
+    """Draw the graphs; each is put into every case as its listed links."""
+    points = []
+    for links in axis.links:
+        for number, edges in enumerate(connected_graphs(len(inverters), links, axis.per_count, axis.seed)):
+            pairs = [[inverters[i], inverters[j]] for i, j in edges]
+            shown = {
+                "graph.links": links,
+                "graph.number": number,
+                "graph.lambda_2": algebraic_connectivity(len(inverters), edges),
+                "graph.edges": " ".join("-".join(pair) for pair in pairs),
+            }
+            put = {f"case.{case}.graph": "links" for case in cases} | {f"case.{case}.links": pairs for case in cases}
+            points.append(Setting(shown, put))
+    return points
+
+
+_RANGE = tuple(field.key for field in fields_of(ValueRange))
+
+
+def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict[str, list[Any]]:
+    """Return the values of each key of `[grid]` or `[zip]`; a key with a problem has none."""
+    found: dict[str, list[Any]] = {}
+    for path, value in flatten(table, _is_range):
+        at, found[path] = f"{where}.{path}", []
+        if _is_range(value):
+            values, wrong = read_table(ValueRange, value)
+            wrong = wrong or problems_of(values)
+            for key, text in wrong:
+                problems.add(f"{at}.{key}" if key else at, text)
+            found[path] = [] if wrong else values.listed()
+        elif not isinstance(value, list):
+            problems.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
+        elif not value:
+            problems.add(at, "has no value; list at least one")
+        elif where == "grid" and (twice := _twice(value)) is not None:
+            problems.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+        else:
+            found[path] = value
+    return found
 
 
 def _twice(items: Sequence[Any]) -> Any:
-    """First item that comes again, or None. They are compared as written: lists and tables are among them."""
-    seen = set()
+    """Return the first item that comes again, or None; items are compared as written, as lists are among them."""
+    seen: set[str] = set()
     for item in items:
         if repr(item) in seen:
             return item
@@ -159,24 +144,10 @@ def _twice(items: Sequence[Any]) -> Any:
     return None
 
 
-def is_number(value: Any) -> TypeGuard[float]:
-    """Whether a value of the file is a finite number."""
+def is_number(value: Any) -> bool:
+    """Return whether a value of the file is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _is_range(value: Any) -> bool:
     return isinstance(value, Mapping) and any(key in value for key in _RANGE)
-
-
-def _spread(value: Mapping[str, Any], at: str, problems: Problems) -> list[float]:
-    """Return the values of a range, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
-    spread, wrong = read_table(Spread, value)
-    wrong = wrong or problems_of(spread)
-    for path, text in wrong:
-        problems.add(f"{at}.{path}" if path else at, text)
-    if wrong:
-        return []
-    low, high = spread.low, spread.high
-    fractions = [i / (spread.count - 1) for i in range(spread.count)]
-    log = spread.spacing == "log"
-    return [float(f"{low * (high / low) ** x if log else low + (high - low) * x:.12g}") for x in fractions]

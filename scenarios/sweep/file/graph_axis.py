@@ -1,8 +1,8 @@
 """Random connected graphs with a given number of links.
 
-The law: a spanning tree, uniform among all labelled trees (by its Pruefer code), and then links drawn uniformly among
-the pairs that are still free. So every connected graph can come; a graph's probability is proportional to the number
-of its spanning trees, which prefers evenly meshed graphs to those with a dense core and a long tail.
+The distribution: a spanning tree, uniform among all labelled trees (by its Pruefer code), and then links drawn
+uniformly among the pairs that are still free. So every connected graph can come; a graph's probability is proportional
+to the number of its spanning trees, which prefers evenly meshed graphs to those with a dense core and a long tail.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, 
 
 
 def connected_graph(n: int, links: int, rng: random.Random) -> Edges:
-    """Draw one graph by the law above; only `rng.random()` is used, which is the same in every version of Python."""
+    """Draw one graph by this distribution; only `rng.random()` is used, the same in every version of Python."""
     assert n - 1 <= links <= n * (n - 1) // 2
     tree = _tree([int(rng.random() * n) for _ in range(n - 2)])
     free = [pair for pair in combinations(range(n), 2) if pair not in tree]

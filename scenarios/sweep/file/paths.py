@@ -24,7 +24,7 @@ class PathError(ValueError):
 
 
 def steps(path: str) -> list[str | int]:
-    """Steps of a path through tables (by name) and lists (by number).
+    """Return the steps of a path through tables (by name) and lists (by number).
 
     Raises
     ------
@@ -38,7 +38,7 @@ def steps(path: str) -> list[str | int]:
     """
     if not _PATH.fullmatch(path):
         raise PathError("is no path of a key; write it as gains.k_p, case.IV.graph or event[0].t_s")
-    return [int(part) if part.isdigit() and bracket else part for bracket, part in _parts(path)]
+    return [int(number) if number else name for number, name in re.findall(r"\[(\d+)\]|([^.\[\]]+)", path)]
 
 
 def put(tree: Tree, path: str, value: Any) -> None:
@@ -93,12 +93,18 @@ def _parent(tree: Tree, way: list[str | int], *, whole: bool) -> Any:
             break
         if step in ("law", "graph") and isinstance(node.get(step), str):
             node[step] = {"use": node[step]}  # what is given by its name alone is this table, which takes parameters
-        node = node[step] if isinstance(step, int) else node.setdefault(step, [] if _numbered(following) else {})
+        node = node[step] if isinstance(step, int) else node.setdefault(step, [] if isinstance(following, int) else {})
     return node
 
 
-def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], path: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys with their values, whether the path was written in quotes or is nested tables of TOML.
+def _no_leaf(_: Any) -> bool:
+    return False
+
+
+def flatten(
+    table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = _no_leaf, path: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Return keys with their values, whether the path was written in quotes or is nested tables of TOML.
 
     Examples
     --------
@@ -113,22 +119,13 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool], path: str 
             yield below, value
 
 
-def _parts(path: str) -> Iterator[tuple[bool, str]]:
-    for match in re.finditer(r"\[(\d+)\]|([^.\[\]]+)", path):
-        yield match[1] is not None, match[1] or match[2]
-
-
 def _written(way: list[str | int]) -> str:
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in way)
     return text.removeprefix(".")
 
 
-def _numbered(step: str | int | None) -> bool:
-    return isinstance(step, int)
-
-
 @cache
 def _named_tables() -> frozenset[str]:
-    """Keys of the scenario below which the user names the tables himself; a new name there is a slip."""
+    """Return the keys of the scenario below which the user names the tables himself; a new name there is a slip."""
     fields = msgspec.structs.fields(Scenario)
     return frozenset(field.encode_name for field in fields if typing.get_origin(field.type) is dict)

@@ -1,4 +1,4 @@
-"""What a sweep comes to: every run of it, checked, in order."""
+"""The plan of a sweep: every run of it, checked, in order."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ import msgspec
 
 from plant.equipment import Feeder
 from scenarios.schema import Scenario
-
-SECONDS_PER_SECOND = 0.05
-"""Roughly what a second of the nine-inverter feeder costs (s on one core, bench/sweep_speed.py); only for saying "2
-h"."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +51,7 @@ class Plan:
 
 
 def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
-    """Hash of what decides the runs. Comments and layout of the files do not; the feeders' tables do."""
+    """Return the hash of runs and feeders; comments and layout of the files do not change it."""
     whole = hashlib.sha256()
     for run in runs:
         whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))

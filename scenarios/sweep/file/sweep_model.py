@@ -7,7 +7,39 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from wire.plausible import Range
-from wire.table_schema import Example
+from wire.table_schema import Example, Problem
+
+MOST_POINTS = 1_000_000
+"""Most values of one range: more are a slip, and would fill the memory before any message."""
+
+
+class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A range of values in place of their list."""
+
+    low: float = msgspec.field(name="from")
+    """First value."""
+    high: float = msgspec.field(name="to")
+    """Last value."""
+    count: Annotated[int, Range(2, MOST_POINTS)]
+    """How many values."""
+    spacing: Literal["lin", "log"] = "lin"
+    """Whether their differences or their ratios are equal."""
+
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        if self.low == self.high:
+            return [Problem("", f"a range goes from one number to another, got {self.low:g} twice")]
+        if self.spacing == "log" and min(self.low, self.high) <= 0:
+            text = f"spacing log needs two numbers above 0, got {self.low:g} and {self.high:g}; or use spacing lin"
+            return [Problem("", text)]
+        return []
+
+    def listed(self) -> list[float]:
+        """Return the values, rounded to 12 digits: 0.1 + 0.2 is meant to be 0.3."""
+        log, ratio = self.spacing == "log", self.high / self.low if self.low else 0.0
+        fractions = [i / (self.count - 1) for i in range(self.count)]
+        raw = [self.low * ratio**x if log else self.low + (self.high - self.low) * x for x in fractions]
+        return [float(f"{value:.12g}") for value in raw]
 
 
 class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -18,9 +50,9 @@ class RandomAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     seed: Annotated[int, Range(low=0)] = 1
     """Seed of the draws; it has nothing to do with the seed of the scenario."""
     method: Literal["latin-hypercube", "plain"] = "latin-hypercube"
-    """How: "latin-hypercube" spreads each key's samples evenly over its law, "plain" draws them independently."""
+    """How: "latin-hypercube" spreads each key's samples evenly over its distribution, "plain" draws each by itself."""
     keys: dict[str, Any] = {}
-    """Table `[random.keys]`: a law per key: {uniform = [low, high]}, {loguniform = [low, high]}, {choice = [...]}."""
+    """Table `[random.keys]`, distributions: {uniform = [low, high]}, {loguniform = [low, high]}, {choice = [...]}."""
 
 
 class GraphAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
