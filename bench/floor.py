@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from time import monotonic, perf_counter
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from wire.driver.session import Session
 
 ROOT = "gridpeers/floor"
@@ -23,7 +23,7 @@ HELLO_PERIOD = 0.02
 
 def measure(peers: int, rounds: int) -> float:
     """Return the time (s) of so many rounds with so many peers, their start not counted."""
-    endpoint = rendezvous(())
+    endpoint = free_endpoint()
     names = [f"p{i}" for i in range(peers)]
     command = [sys.executable, __file__, endpoint, str(rounds), json.dumps(names)]
     others = [subprocess.Popen([*command, name]) for name in names]

@@ -22,7 +22,7 @@ from latency import two_hosts
 from machine import load, machine, say
 from watched import NotInTimeError, Watched, describe
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.hosts import Hosts
 
 AWAY = ("inv7", "inv8", "inv9")
@@ -111,7 +111,7 @@ def main() -> int:
             return 1
         listen = f"tcp/{hosts.address(1)}:0"
         elsewhere = {name: (f"tcp/{hosts.address(2)}:0", hosts.at(2)) for name in AWAY}
-        fleet = Watched(Path(folder), rendezvous((listen,)), listen, elsewhere)
+        fleet = Watched(Path(folder), free_endpoint(listen), listen, elsewhere)
         say("the fleet starts")
         with fleet:
             took, disturbed, deaf = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))

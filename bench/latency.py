@@ -27,7 +27,7 @@ from machine import load, machine, say
 from ping import TICK, one_way, round_trip
 from watched import HOLD, RUN, NotInTimeError, Watched, describe
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.results.metrics import F_BAND, MPSI_BAND
 from tests.processes.hosts import Hosts, NoHostsError
 
@@ -216,7 +216,7 @@ def main() -> int:
         address = "127.0.0.1" if hosts is None else hosts.address(1)
         elsewhere = {} if hosts is None else {CUT: (f"tcp/{hosts.address(2)}:0", hosts.at(2))}
         listen = f"tcp/{address}:0"
-        fleet = Watched(Path(folder), rendezvous((listen,)), listen, elsewhere)
+        fleet = Watched(Path(folder), free_endpoint(listen), listen, elsewhere)
         say("the fleet starts")
         with fleet:
             size, key = fleet.size, fleet.keys.state("probe")
@@ -232,8 +232,8 @@ def main() -> int:
             pacing = None if fleet.telemetry is None else fleet.telemetry.pacing
         loaded = load()
         say("the same messages with the fleet gone")
-        bare = one_way(size, messages, key=key, receiver=(rendezvous((listen,)),), sender=(listen,), connect=())
-        trips = round_trip(size, 10 * messages, key=f"gridpeers/{RUN}/state/ping", endpoint=rendezvous((listen,)))
+        bare = one_way(size, messages, key=key, receiver=(free_endpoint(listen),), sender=(listen,), connect=())
+        trips = round_trip(size, 10 * messages, key=f"gridpeers/{RUN}/state/ping", endpoint=free_endpoint(listen))
     print(f"load at the end of the run {loaded}")
     if pacing is not None:
         late = (

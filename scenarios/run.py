@@ -19,8 +19,8 @@ import msgspec
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from plant.realtime.pacer import sentence
+from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.ports import endpoint
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
@@ -231,7 +231,7 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
 
 def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Configurations of a case in the kind of time asked for."""
-    listen = endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
+    listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
     real = request.clock == "wall"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
     if request.clock == "simulated":

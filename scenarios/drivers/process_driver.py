@@ -15,8 +15,8 @@ from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from plant.plant_process import READY
 from scenarios.drivers.children import Child, Children
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.rendezvous import rendezvous
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, Word
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
@@ -82,12 +82,12 @@ def run_processes(
 
     Raises
     ------
-    SessionError
-        If the port is in use or Zenoh is missing; nothing has been started then.
+    EndpointError, SessionError
+        If the port is in use, or Zenoh is missing; nothing has been started then.
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"
-    endpoint = rendezvous(plant_config.listen)
+    endpoint = free_endpoint(*plant_config.listen[:1])
     deadline = "deadline" if wall else "plant_wait"  # an agent that waits for the plant waits for its compiler too
     configs = [replace(config, **{deadline: BUILD_DEADLINE}, connect=(endpoint,)) for config in agents.values()]
     plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))

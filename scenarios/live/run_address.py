@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-import errno
 import re
 import socket
 from dataclasses import dataclass
 
-from scenarios.drivers.ports import probe
+from scenarios.drivers.free_endpoint import parse_endpoint
 from wire.keys import check_name
 
 RUN = "gridpeers"
-"""Name of a run that nobody has named."""
+"""Default name of a run."""
 
 ENDPOINT = "tcp/127.0.0.1:7447"
-"""Where the plant listens and the others connect, unless told otherwise; 7447 is Zenoh's own port."""
+"""Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
 
 LONGEST = 1e9
-"""Longest time (s) that anything is told to take, some 30 years: clocks cannot tell much more."""
+"""Longest time (s) of any option, some 30 years; clocks do not reach much further."""
 
 PROBE = 1.0
-"""Longest wait (s) for a TCP connection, to see whether anybody listens."""
+"""Longest wait (s) for a TCP connection, to see whether anything listens."""
 
-_FORM = re.compile(
-    r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
-)
 _PROTOCOLS = ("tcp", "tls", "quic", "udp")
 _LOOPBACKS = ("127.", "localhost", "[::1]")
 
 
 class UsageError(ValueError):
-    """Something that was typed cannot be used; the message says what would be right."""
-
-
-class InUseError(UsageError):
-    """Something listens at an endpoint already."""
+    """An option or argument cannot be used; the message says what would be right."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +39,7 @@ class RunAddress:
     """Endpoints to connect to; one that answers is enough."""
 
     def __str__(self) -> str:
-        """As it stands in messages.
+        """Return it as messages name it.
 
         Examples
         --------
@@ -58,7 +50,7 @@ class RunAddress:
 
 
 def address_of(run: str, connect: list[str] | None) -> RunAddress:
-    """Check what the options `--run` and `--connect` say.
+    """Return the address that the options `--run` and `--connect` give.
 
     Parameters
     ----------
@@ -139,77 +131,40 @@ def check_endpoint(option: str, text: str) -> str:
     >>> check_endpoint("--connect", "tcp/lab.example:7447")
     'tcp/lab.example:7447'
     """
-    match = _FORM.fullmatch(text)
-    if match is None:
+    endpoint = parse_endpoint(text)
+    if endpoint is None:
         host = re.fullmatch(r"(?:\w+/)?([\w.-]+)(?::(\d+))?", text)
         example = f"tcp/{host[1]}:{host[2] or 7447}" if host else ENDPOINT
         raise UsageError(f'{option}: "{text}" is no endpoint; write PROTOCOL/HOST:PORT, e.g. {example}')
-    if match["protocol"] not in _PROTOCOLS:
-        raise UsageError(f'{option}: {text}: no protocol "{match["protocol"]}"; protocols are {", ".join(_PROTOCOLS)}')
-    port, lowest = int(match["port"]), 0 if option == "--listen" else 1
-    if not lowest <= port <= 65535:
-        raise UsageError(f"{option}: {text}: a port is a number from {lowest} to 65535, got {port}")
+    if endpoint.protocol not in _PROTOCOLS:
+        raise UsageError(f'{option}: {text}: no protocol "{endpoint.protocol}"; protocols are {", ".join(_PROTOCOLS)}')
+    lowest = 0 if option == "--listen" else 1
+    if not lowest <= endpoint.port <= 65535:
+        raise UsageError(f"{option}: {text}: a port is a number from {lowest} to 65535, got {endpoint.port}")
     return text
 
 
-def listenable(option: str, text: str) -> str:
-    """Return an endpoint that this process will be able to listen on; a free port is chosen for port 0.
-
-    Raises
-    ------
-    UsageError
-        If the port is in use, or the address is not one of this machine.
-    """
-    match = _FORM.fullmatch(check_endpoint(option, text))
-    assert match is not None
-    if match["protocol"] not in ("tcp", "tls"):
-        return text
-    host, port = match["host"], int(match["port"])
-    try:
-        port = probe(host, port)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        kind = InUseError if error.errno == errno.EADDRINUSE else UsageError
-        raise kind(f"{option}: {text} cannot be listened on: {reason}; {_way_out(host, error)}") from None
-    return f"{match['protocol']}/{host}:{port}{match['rest'] or ''}"
-
-
-def _way_out(host: str, error: OSError) -> str:
-    """Return what to do when an address cannot be listened on."""
-    if isinstance(error, socket.gaierror):
-        return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
-    if error.errno == errno.EADDRINUSE:
-        return (
-            "end what uses it (gridpeers down ends a run there; a frozen plant goes on with kill -CONT, or ends by its "
-            "process id), or choose another port, here by --listen and for the others by --connect"
-        )
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
-    return "choose another address or port, here by --listen and for the others by --connect"
-
-
 def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of some endpoints that accept a TCP connection, whether or not anything is said on it.
+    """Return the endpoints that accept a TCP connection, whether or not anything is said on it.
 
-    Of a stopped process the system accepts connections in its stead.
+    The system accepts connections to a stopped process in its stead.
     """
     return tuple(text for text in connect if _accepts(text))
 
 
 def _accepts(text: str) -> bool:
-    match = _FORM.fullmatch(text)
-    assert match is not None
-    if match["protocol"] not in ("tcp", "tls"):
+    endpoint = parse_endpoint(text)
+    if endpoint is None or not endpoint.connects:
         return False
     try:
-        with socket.create_connection((match["host"].strip("[]"), int(match["port"])), PROBE):
+        with socket.create_connection((endpoint.host.strip("[]"), endpoint.port), PROBE):
             return True
     except OSError:
         return False
 
 
 def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Where a process must listen so that those it will be told of can connect to it.
+    """Return where a process must listen so that others of the run can connect to it.
 
     Examples
     --------
@@ -223,7 +178,7 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def is_loopback(connect: tuple[str, ...]) -> bool:
-    """Whether all endpoints are on this machine's loopback.
+    """Return whether all endpoints are on this host's loopback.
 
     Examples
     --------
@@ -234,12 +189,11 @@ def is_loopback(connect: tuple[str, ...]) -> bool:
 
 
 def _hosts(connect: tuple[str, ...]) -> list[str]:
-    matches = [_FORM.fullmatch(text) for text in connect]
-    return [match["host"] for match in matches if match is not None]
+    return [endpoint.host for text in connect if (endpoint := parse_endpoint(text))]
 
 
 def loopback_of(listen: str) -> str:
-    """Where a process of the same machine connects to who listens there.
+    """Return where a process of this host connects to one that listens there.
 
     Examples
     --------
@@ -257,7 +211,6 @@ def next_port(listen: str) -> str:
     >>> next_port("tcp/127.0.0.1:7447"), next_port("tcp/[::1]:65535")
     ('tcp/127.0.0.1:7448', 'tcp/[::1]:65534')
     """
-    match = _FORM.fullmatch(listen)
-    assert match is not None
-    port = int(match["port"])
-    return f"{match['protocol']}/{match['host']}:{port + 1 if port < 65535 else port - 1}"
+    endpoint = parse_endpoint(listen)
+    assert endpoint is not None
+    return str(endpoint._replace(port=endpoint.port + 1 if endpoint.port < 65535 else endpoint.port - 1, rest=""))

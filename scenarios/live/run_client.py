@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
+from scenarios.drivers.free_endpoint import EndpointError, free_endpoint
 from scenarios.live.run_address import (
     ENDPOINT,
     RUN,
-    InUseError,
     RunAddress,
     UsageError,
     accepting,
-    listenable,
+    check_endpoint,
     loopback_of,
     next_port,
 )
@@ -239,13 +239,15 @@ def endpoint_for_run(listen: str) -> str:
     Raises
     ------
     UsageError
-        If it cannot be listened on. If another run is there, the message names it.
+        If it is no endpoint, or another run is there, which the message names.
+    EndpointError
+        If it cannot be listened on.
     """
     try:
-        return listenable("--listen", listen)
-    except InUseError:
+        return free_endpoint(check_endpoint("--listen", listen), option="--listen")
+    except EndpointError as error:
         where = loopback_of(listen)
-        there = runs_at(where) if accepting((where,)) else []
+        there = runs_at(where) if error.in_use and accepting((where,)) else []
         if not there:
             raise
         first = "" if (there[0], where) == (RUN, ENDPOINT) else f" --run {there[0]} --connect {where}"

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.ports import endpoint
 from scenarios.drivers.process_driver import run_processes
 from scenarios.schema import Event, load_scenario
 from scenarios.schema.configs import configs
@@ -22,7 +22,7 @@ def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str)
     scenario, feeder = load_scenario(name)
     events: tuple[Event, ...] = tuple(replace(event, t_s=0.1 + 0.1 * i) for i, event in enumerate(scenario.events[:2]))
     short = replace(scenario, events=events, time=replace(scenario.time, end_s=0.6))
-    plant, agents = configs(short, feeder, case, endpoint(0))
+    plant, agents = configs(short, feeder, case, local_endpoint(0))
     rows: dict[str, Rows] = {"alone": [], "together": []}
     alone = run_inprocess(plant, agents, lambda telemetry: rows["alone"].extend(telemetry.rows))
     together = run_processes(plant, agents, tmp_path, lambda telemetry: rows["together"].extend(telemetry.rows))

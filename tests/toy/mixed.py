@@ -14,8 +14,8 @@ from msgspec.structs import replace
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Children
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.rendezvous import rendezvous
 from tests.toy.toy_runs import FleetRun
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"
@@ -27,7 +27,7 @@ class Mixed(FleetRun):
     def __init__(
         self, plant: PlantConfig, agents: Sequence[AgentConfig], log_dir: Path, foreign: Sequence[str]
     ) -> None:
-        self.endpoint = rendezvous()
+        self.endpoint = free_endpoint()
         ours = [agent for agent in agents if agent.name not in foreign]
         super().__init__(replace(plant, listen=(self.endpoint,)), ours, log_dir)
         self._first = {agent.name: agent for agent in agents if agent.name in foreign}

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.results.link_record import LinkRecord
 from tests.toy.toy_configs import toy_configs
@@ -77,7 +77,7 @@ class Town:
     ) -> None:
         plant, agents = toy_configs(n, run=run) if configs is None else configs
         run, links = plant.run, links or plant.links
-        self.endpoint = rendezvous(())
+        self.endpoint = free_endpoint()
         self.plant_config = replace(
             plant,
             clock="wall",

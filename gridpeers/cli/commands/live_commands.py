@@ -164,15 +164,16 @@ def agent(
     """
     require({"zenoh": "an agent"})
     with usage_errors():
+        from scenarios.drivers.free_endpoint import free_endpoint
         from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import address_of, check_inverter, check_wait, listenable
+        from scenarios.live.run_address import address_of, check_endpoint, check_inverter, check_wait
 
         where = address_of(run, connect)
         check_inverter(inverter)
         check_wait(wait)
         watch_readers(quits=False)
-        listening = tuple(listenable("--listen", text) for text in listen) if listen else None
-        _finish(agent_here(where, inverter, listening, wait, trusts=own_code))
+        listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())
+        _finish(agent_here(where, inverter, listening or None, wait, trusts=own_code))
 
 
 def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:

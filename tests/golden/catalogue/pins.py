@@ -12,9 +12,9 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from scenarios.catalogue_files import CATALOGUE, names_in
+from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.ports import endpoint
 from scenarios.results.record import Recorded, Recorder
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
@@ -44,7 +44,7 @@ def cases() -> list[tuple[str, str]]:
 def ran(name: str, case: str) -> tuple[Recorded, Outcome]:
     """Run one case in this process, once for all who ask."""
     scenario, feeder = load_scenario(name)
-    plant, agents = configs(scenario, feeder, case, endpoint(0))
+    plant, agents = configs(scenario, feeder, case, local_endpoint(0))
     recorder = Recorder()
     outcome = run_inprocess(plant, agents, recorder)
     return recorder.finish(scenario.time.end_s, plant.record_step), outcome

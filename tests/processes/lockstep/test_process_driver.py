@@ -16,12 +16,11 @@ from time import monotonic
 import msgspec
 import pytest
 
+from scenarios.drivers.free_endpoint import EndpointError, free_endpoint
 from scenarios.drivers.process_driver import run_processes
-from scenarios.drivers.rendezvous import rendezvous
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_runs import FleetRun
-from wire.driver.session import SessionError
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -117,7 +116,7 @@ def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
 
 def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
     """A namesake started in mid-run leaves with status 3 and a word why; the run does not notice."""
-    endpoint = rendezvous()
+    endpoint = free_endpoint()
     plant, agents = toy_configs(3, end=LONG)
     run, refused = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
 
@@ -143,7 +142,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
         plant, agents = toy_configs(2)
         run = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
 
-        with pytest.raises(SessionError, match=r"listen: cannot use tcp/127.* in use; choose another port, or 0"):
+        with pytest.raises(EndpointError, match=r"listen: tcp/127.* in use; .* choose another port, or 0"):
             run()
     assert run.children is None
     assert not (tmp_path / "log").exists()

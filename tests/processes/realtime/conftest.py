@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 CALM = """
@@ -24,5 +24,5 @@ graph = "full"
 def desk(tmp_path: Path) -> Iterator[Desk]:
     """Terminals of one run, at a port of its own."""
     (tmp_path / "calm.toml").write_text(CALM)
-    with Desk(tmp_path, "--run", "lab", "--connect", rendezvous()) as terminals:
+    with Desk(tmp_path, "--run", "lab", "--connect", free_endpoint()) as terminals:
         yield terminals

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from scenarios.drivers.ports import HOST, endpoint, probe
+from scenarios.drivers.free_endpoint import free_endpoint
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"
 
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"
 def test_a_live_run_is_changed_by_commands_and_read_at_its_end(tmp_path: Path) -> None:
     """A link is made late, an agent leaves, and the record has both."""
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), endpoint(probe(HOST, 0))],
+        [sys.executable, str(SCRIPT), free_endpoint()],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from plant.plant_config import PlantConfig
 from plant.plant_process import run_plant
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.codec import decode
@@ -31,7 +31,7 @@ class Broken(ToyPlant):
 @pytest.mark.parametrize("clock", ["wall", "simulated"])
 def test_agents_are_told_to_close_whatever_broke_the_plant(clock: Literal["wall", "simulated"]) -> None:
     """An error that is no PlantError, too, ends the run with a Stop to all: no agent outlives its plant."""
-    endpoint = rendezvous()
+    endpoint = free_endpoint()
     config, _ = toy_configs(1, end=5.0)
     config = replace(config, clock=clock, listen=(endpoint,), agents=(), recorders=("visitor",))
     keys = Keys(config.run)

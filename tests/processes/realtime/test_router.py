@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'
@@ -20,7 +20,7 @@ class Router:
     """A Zenoh router on the loopback, that can be taken away and brought back."""
 
     def __init__(self) -> None:
-        self.endpoint = rendezvous()
+        self.endpoint = free_endpoint()
         self._session: Any = None
 
     def start(self) -> None:

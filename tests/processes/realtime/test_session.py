@@ -7,13 +7,13 @@ from time import monotonic
 
 import pytest
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from wire.driver.session import Session, SessionError
 
 
 def test_a_port_in_use_is_explained() -> None:
     """Who listens second is told which endpoint, and what to do."""
-    endpoint = rendezvous()
+    endpoint = free_endpoint()
     first = Session("plant", listen=(endpoint,))
     try:
         with pytest.raises(SessionError, match=r"plant: cannot listen on tcp/127.* the port is in use; choose another"):
@@ -33,7 +33,7 @@ def test_a_missing_zenoh_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_subscription_proven_by_a_query_is_in_place() -> None:
     """What discovery relies on: once a neighbour has answered after the subscription, its next publication arrives."""
     for _ in range(20):
-        endpoint = rendezvous()
+        endpoint = free_endpoint()
         sender, receiver = Session("a", listen=(endpoint,)), Session("b", connect=(endpoint,))
         try:
             sender.answer("gridpeers/t/nameplate", b"me")
@@ -75,7 +75,7 @@ session.close()
 
 def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_of_a_second_not_five() -> None:
     """A message that may not be dropped waits so long for a full link; then the link is closed, and made anew."""
-    endpoint = rendezvous()
+    endpoint = free_endpoint()
     sender = Session("a", listen=(endpoint,), clock="wall", rendezvous=True)
     holder = subprocess.Popen([sys.executable, "-c", HOLDER, endpoint], stdin=subprocess.PIPE)
     try:

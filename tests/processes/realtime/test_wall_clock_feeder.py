@@ -11,8 +11,8 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from scenarios.drivers.children import Child
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.rendezvous import rendezvous
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.schema import load_scenario
 from tests.toy.toy_runs import FleetRun
@@ -26,7 +26,7 @@ class Feeder:
     def __init__(self, folder: Path, end: float) -> None:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
-        self.endpoint = rendezvous()
+        self.endpoint = free_endpoint()
         plant, agents = configure(
             scenario, feeder, LiveOptions(run="feeder", case="IV", duration=end, speed=0.5), self.endpoint
         )

@@ -12,7 +12,7 @@ from time import monotonic
 
 import pytest
 
-from scenarios.drivers.rendezvous import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 pty = pytest.importorskip("pty")
@@ -32,7 +32,7 @@ def read_until(file: int, wanted: bytes, deadline: float = 40.0) -> bytes:
 def test_watch_is_a_table_until_a_key_quits(tmp_path: Path) -> None:
     """The table is on the alternate screen; q and Ctrl-C leave it, and echo is on again."""
     (tmp_path / "calm.toml").write_text('[time]\nend_s = 1.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n')
-    endpoint = rendezvous()
+    endpoint = free_endpoint()
     with Desk(tmp_path, "--run", "lab") as desk:
         desk.open("plant", "calm.toml", "--listen", endpoint, "--wait", "0").expect("t = 0; speed")
         for key, status in ((b"q", 0), (b"", 130)):

@@ -1,14 +1,12 @@
 """What is told while a run, or many, are on their way."""
 
 import io
-import socket
 import threading
 
 import pytest
 from rich.console import Console
 
 from gridpeers.cli import progress, remaining
-from scenarios.drivers.ports import PortError, check_port
 
 
 def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:
@@ -92,13 +90,3 @@ def test_a_start_that_is_quick_is_not_explained(monkeypatch: pytest.MonkeyPatch)
         tell("I", 0.02, 1.0)
 
     assert not explained.is_set()
-
-
-def test_a_port_in_use_is_told() -> None:
-    """Port 0 can always be used; one in use is told with what to do."""
-    check_port(0)
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        with pytest.raises(PortError, match=r"processes.port: port \d+ .* write 0 to take a free one"):
-            check_port(taken.getsockname()[1])

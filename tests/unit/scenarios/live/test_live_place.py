@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from scenarios.live.run_address import UsageError, accepting, address_of, check_endpoint, listenable, return_path
+from scenarios.live.run_address import UsageError, accepting, address_of, check_endpoint, return_path
 
 
 def test_without_options_there_is_one_run_on_this_machine() -> None:
@@ -50,19 +50,6 @@ def test_endpoints_of_zenoh_are_taken_as_they_are(text: str) -> None:
     assert check_endpoint("--connect", text) == text
 
 
-def test_a_port_in_use_is_told_before_anything_starts() -> None:
-    """The endpoint, the reason and the two ways out."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
-
-        with pytest.raises(
-            UsageError, match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT"
-        ):
-            listenable("--listen", text)
-
-
 def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
     """As of a frozen process; a port that is only taken is none, nor is one of a protocol without connections."""
     with socket.socket() as mute, socket.socket() as taken:
@@ -74,25 +61,6 @@ def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
         found = accepting((f"tcp/{deaf}", f"udp/{listening}", f"tcp/{listening}"))
 
     assert found == (f"tcp/{listening}",)
-
-
-def test_port_0_becomes_a_free_port() -> None:
-    """The endpoint to be told to others has a number."""
-    assert int(listenable("--listen", "tcp/127.0.0.1:0").rpartition(":")[2]) > 0
-
-
-def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
-    """192.0.2.0/24 belongs to nobody: there is nothing to end there, and the line does not say so."""
-    with pytest.raises(UsageError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host") as told:
-        listenable("--listen", "tcp/192.0.2.1:7447")
-
-    assert "end what" not in str(told.value)
-
-
-def test_a_name_without_an_address_cannot_be_listened_on() -> None:
-    """The names under .invalid never have one."""
-    with pytest.raises(UsageError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
-        listenable("--listen", "tcp/lab.invalid:7447")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,126 @@
+"""Endpoints where a process of this host can listen: their form, and a check before anything is started or written."""
+
+from __future__ import annotations
+
+import errno
+import random
+import re
+import socket
+from typing import NamedTuple
+
+_FORM = re.compile(
+    r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
+)
+
+_OWN = range(20_000, 32_000)
+"""Ports that no system gives to a process that asks for any (Linux begins at 32768). One of those would now and then go
+to the agents, which start with the plant: for listening, or as the near end of a call to the plant."""
+
+_TRIES = 100
+
+
+class EndpointError(ValueError):
+    """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
+
+    def __init__(self, text: str, *, in_use: bool = False) -> None:
+        super().__init__(text)
+        self.in_use = in_use
+        """Whether something listens there already."""
+
+
+class Endpoint(NamedTuple):
+    """A Zenoh endpoint, e.g. tcp/127.0.0.1:7447."""
+
+    protocol: str
+    host: str
+    """Name or address; an IPv6 address in brackets."""
+    port: int
+    rest: str = ""
+    """Zenoh's own suffix, e.g. "#iface=eth0"."""
+
+    def __str__(self) -> str:
+        return f"{self.protocol}/{self.host}:{self.port}{self.rest}"
+
+    @property
+    def connects(self) -> bool:
+        """Whether its protocol has TCP connections."""
+        return self.protocol in ("tcp", "tls")
+
+
+def parse_endpoint(text: str) -> Endpoint | None:
+    """Return the endpoint of a text; None if the text has not the form of one.
+
+    Examples
+    --------
+    >>> parse_endpoint("tcp/[::1]:7447")
+    Endpoint(protocol='tcp', host='[::1]', port=7447, rest='')
+    """
+    match = _FORM.fullmatch(text)
+    return match and Endpoint(match["protocol"], match["host"], int(match["port"]), match["rest"] or "")
+
+
+def local_endpoint(port: int) -> str:
+    """Return the endpoint at a port of this host's loopback.
+
+    Examples
+    --------
+    >>> local_endpoint(7447)
+    'tcp/127.0.0.1:7447'
+    """
+    return f"tcp/127.0.0.1:{port}"
+
+
+def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> str:
+    """Return an endpoint where a process of this host will be able to listen; port 0 becomes a free port.
+
+    Parameters
+    ----------
+    text : str, optional
+        The endpoint.
+    option : str, optional
+        The option or key that gives it, for the error.
+
+    Raises
+    ------
+    EndpointError
+        If the port is in use, or the address is not one of this host.
+    """
+    endpoint = parse_endpoint(text)
+    if endpoint is None:
+        raise EndpointError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
+    if not endpoint.connects:
+        return text
+    ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_OWN, _TRIES)
+    for port in ports:
+        try:
+            _listen_for_a_moment(endpoint.host, port)
+            return str(endpoint._replace(port=port))
+        except OSError as error:
+            reason = error
+    raise EndpointError(
+        f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
+        f"{_way_out(endpoint.host, reason)}",
+        in_use=reason.errno == errno.EADDRINUSE,
+    )
+
+
+def _listen_for_a_moment(host: str, port: int) -> None:
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as trial:
+        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        trial.bind((host.strip("[]"), port))
+        trial.listen()
+
+
+def _way_out(host: str, error: OSError) -> str:
+    """Return what to do when an address cannot be listened on."""
+    if isinstance(error, socket.gaierror):
+        return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
+    if error.errno == errno.EADDRNOTAVAIL:
+        return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
+    other = "choose another port, or 0 for a free one, here and for those that connect to it"
+    if error.errno == errno.EADDRINUSE:
+        ends = "gridpeers down ends a live run; a frozen plant goes on with kill -CONT, or ends by its process id"
+        return f"end what uses it ({ends}), or {other}"
+    return other
