@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import Annotated
+from math import isfinite
+from typing import Annotated, Any
 
 import msgspec
 
@@ -43,13 +44,23 @@ Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
 """What people call something in their tables: up to 200 printable characters."""
 
 Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
-"""A sentence for people, or a link command, which no core reads: up to 4000 printable characters on one line."""
+"""A sentence for people: up to 4000 printable characters on one line."""
 
 Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
 """What somebody asked for: printable, and only as long as a message may be."""
 
 Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
 """Bytes that no core looks into."""
+
+Tree = Annotated[dict[str, Any], msgspec.Meta(max_length=16)]
+"""Maps, lists, texts, numbers, booleans and nil, such as a table of a scenario file; no core reads it, and `check_tree`
+bounds it."""
+
+TREE_DEPTH = 8
+"""Most levels of a tree."""
+
+TREE_SIZE = 1000
+"""Most values in a tree."""
 
 MOST_COUNT = 2**53 - 1
 """Largest `Count`."""
@@ -116,6 +127,8 @@ QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
 
 _PATTERN = re.compile(NAME)
 
+_TEXT = re.compile(_PRINTABLE)
+
 
 def is_name(text: str) -> bool:
     """Whether a text is a `Name`.
@@ -133,3 +146,39 @@ def check_names(*names: str) -> None:
     """Check all names of a message at once; those of a sender are the same each time."""
     if not all(map(is_name, names)):
         raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
+
+
+def check_tree(tree: Any) -> None:
+    """Check that a tree is finite, printable, at most `TREE_DEPTH` deep, and has at most `TREE_SIZE` values.
+
+    Examples
+    --------
+    >>> check_tree({"fault": {"on": "inv1 -> inv4", "loss": float("nan")}})
+    Traceback (most recent call last):
+    ...
+    ValueError: a number in it is not finite
+    """
+    level, size = [tree], 0
+    for _ in range(TREE_DEPTH):
+        inner: list[Any] = []
+        for value in level:
+            size += 1
+            if isinstance(value, dict):
+                if not all(isinstance(key, str) for key in value):
+                    raise ValueError("a key in it is no text")
+                inner += [*value, *value.values()]
+            elif isinstance(value, list | tuple):
+                inner += value
+            elif isinstance(value, str):
+                if len(value) > 4000 or not _TEXT.match(value):
+                    raise ValueError(f"a text in it is too long, or not printable: {ascii(value)[:100]}")
+            elif isinstance(value, int | float):
+                if not isfinite(value):
+                    raise ValueError("a number in it is not finite")
+            elif value is not None:
+                raise ValueError(f"a value in it is no text, number, boolean, list or map: {ascii(value)[:100]}")
+        level = inner
+        if size + len(level) > TREE_SIZE:
+            raise ValueError(f"more than {TREE_SIZE} values are in it")
+    if level:
+        raise ValueError(f"more than {TREE_DEPTH} levels are in it")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
-from typing import NamedTuple, Protocol
+from collections.abc import Iterator, Mapping, Sequence, Set
+from typing import Any, NamedTuple, Protocol
 
 from wire.admission import Admission
 from wire.codec import RejectedError, RejectedMessages, decode
@@ -75,13 +75,13 @@ class Links(Protocol):
         """Return whether the receiver itself is paused at t (s of run time)."""
         ...
 
-    def command(self, text: str, t: float) -> CommandEffect:
+    def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Change what the links do to messages sent at t (s of run time) or later.
 
         Raises
         ------
         ValueError
-            If the text is no command to links, or its values are wrong; nothing has changed then.
+            If the tree is no command to links, or its values are wrong; nothing has changed then.
         """
         ...
 

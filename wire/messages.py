@@ -39,8 +39,10 @@ from wire.bounds import (
     Shared,
     Text,
     Time,
+    Tree,
     Voltage,
     check_names,
+    check_tree,
 )
 
 PLANT = "plant"
@@ -215,42 +217,52 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
 
 
 class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What emulated links shall do to messages sent at `t` or later; number 0 asks how they stand (plant -> agent)."""
+    """A command to emulated links for messages sent at `t` or later; number 0 asks for status (plant -> agent)."""
 
-    text: Text
-    """What a person ordered, for the agent's links."""
+    link_command: Tree
+    """The command; empty for number 0."""
     reply_to: Name
-    """Who wants to know: last part of the key under which the plant passes the `LinkAcknowledgement` on."""
+    """Last part of the key under which the plant passes the `LinkAcknowledgement` on."""
+
+    def __post_init__(self) -> None:
+        check_names(self.sender)
+        check_tree(self.link_command)
 
 
 class LinkAcknowledgement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """Links have taken the order of number `seq`, or stand as asked (agent -> plant -> command line)."""
+    """Links have taken the command of number `seq`, or report their status (agent -> plant -> command line)."""
 
     ok: bool
     """Whether it was done."""
     text: Text
-    """Which links it concerned, or why it was not done."""
+    """The links that it changed, or why it was not done."""
     reply_to: Name
-    """Of the order."""
+    """That of the `LinkRequest`."""
     data: Data = b""
-    """How the links stand, to number 0; no core looks into it."""
+    """The status of the links, to number 0; no core reads it."""
 
 
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """A person wants something of the plant (command line -> plant, wall-clock time)."""
+    """A command that a person gives the plant (command line -> plant, wall-clock time)."""
 
     verb: Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links", "telemetry"]
-    """Open or close a switch; close it if its sides are in step; have an agent leave; end the run; tell how it stands;
-    order emulated links to do something; ask all of them how they stand; publish telemetry again that a recorder has
-    not got."""
+    """Open or close a switch; close it if its sides are in step; have an agent leave; end the run; answer with its
+    status; give emulated links a command; ask all of them for their status; publish telemetry again that a recorder has
+    missed."""
     argument: Text = ""
-    """Name of the switch or of the agent; the order; number of the first Telemetry wanted; empty for the others."""
+    """Name of the switch or of the agent; number of the first Telemetry needed; empty for the others."""
+    link_command: Tree = {}
+    """The command to emulated links; empty for the others."""
     reply_to: Name
-    """Unique id of who asks: last part of the key of the `Answer`."""
+    """Unique id of the client: last part of the key of the `Answer`."""
+
+    def __post_init__(self) -> None:
+        check_names(self.sender)
+        check_tree(self.link_command)
 
 
 class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What became of a command; `seq` is the command's (plant -> command line)."""
+    """The result of a command; `seq` is the command's (plant -> command line)."""
 
     ok: bool
     """Whether it was done."""

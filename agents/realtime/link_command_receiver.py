@@ -46,7 +46,7 @@ class LinkCommandReceiver:
             return self._answer(request, ok=True, text="done before")
         self._last = request.seq
         try:
-            return self._answer(request, ok=True, text=self._links.command(request.text, request.t).changed)
+            return self._answer(request, ok=True, text=self._links.command(request.link_command, request.t).changed)
         except ValueError as error:
             return self._answer(request, ok=False, text=str(error))
 

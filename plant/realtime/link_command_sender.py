@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from wire.codec import encode
 from wire.keys import Keys
@@ -52,7 +53,7 @@ class LinkCommandSender:
             raise ValueError(NO_LINKS)
         return self._links
 
-    def give(self, text: str, t: float, reply_to: str) -> tuple[LinkRequest, str, tuple[str, ...]]:
+    def give(self, tree: dict[str, Any], t: float, reply_to: str) -> tuple[LinkRequest, str, tuple[str, ...]]:
         """Have links carry out a person's command, for messages sent at t (s of run time) or later.
 
         It is in force for the plant's own links, and published for recorders; `send` sends it to the agents.
@@ -67,8 +68,8 @@ class LinkCommandSender:
         ValueError
             If it is no command to links, or the run has no emulated links.
         """
-        said, receivers, _ = self.links.command(text, t)
-        request = self._request(len(self._given) + 1, text, t, reply_to)
+        said, receivers, _ = self.links.command(tree, t)
+        request = self._request(len(self._given) + 1, tree, t, reply_to)
         self._given.append(request)
         self._publish(self._keys.telemetry, encode(request))
         return request, said, receivers
@@ -87,7 +88,7 @@ class LinkCommandSender:
 
     def ask(self, names: Iterable[str], t: float, reply_to: str) -> None:
         """Have these agents report the status of the links to them at t (s of run time), and report the plant's own."""
-        question = encode(self._request(0, "", t, reply_to))
+        question = encode(self._request(0, {}, t, reply_to))
         for name in names:
             self._publish(self._keys.link_request(name), question)
         own = self.links.status(t)
@@ -111,8 +112,8 @@ class LinkCommandSender:
         """Agents between whom and the plant a fault holds at t (s of run time)."""
         return () if self._links is None else self._links.impaired(t)
 
-    def _request(self, number: int, text: str, t: float, reply_to: str) -> LinkRequest:
-        return LinkRequest(sender=PLANT, epoch=self._epoch, seq=number, t=t, text=text, reply_to=reply_to)
+    def _request(self, number: int, tree: dict[str, Any], t: float, reply_to: str) -> LinkRequest:
+        return LinkRequest(sender=PLANT, epoch=self._epoch, seq=number, t=t, link_command=tree, reply_to=reply_to)
 
     def _pass_on(self, answer: LinkAcknowledgement) -> None:
         self._publish(self._keys.answer(answer.reply_to), encode(answer))

@@ -84,15 +84,15 @@ class EmulatedLinks:
         """Return whether the receiver itself is paused at t (s of run time)."""
         return any(at.holds(t) and math.isinf(at.slow) for at in self._intervals.get(self._name, ()))
 
-    def command(self, text: str, t: float) -> CommandEffect:
+    def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Change what the links do to messages sent at t (s of run time) or later.
 
         Raises
         ------
         ValueError
-            If the text is no command to links, or its values are wrong; nothing has changed then.
+            If the tree is no command to links, or its values are wrong; nothing has changed then.
         """
-        command = LinkCommand.of_text(text)
+        command = LinkCommand.of_tree(tree)
         problems = command.problems(self._microgrids)
         if problems:
             raise ValueError("; ".join(f"{path}: {what}" for path, what in problems))

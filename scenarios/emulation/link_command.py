@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 
@@ -95,16 +96,17 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             return f"{'all links' if self.on == EVERYTHING else self.on}: no link has a fault, nothing to heal"
         return f"{_listed(impaired)}: healed"
 
-    def to_text(self) -> str:
-        """Return it as it travels."""
-        return msgspec.json.encode(self).decode()
+    def to_tree(self) -> dict[str, Any]:
+        """Return it as it travels in a message."""
+        tree: dict[str, Any] = msgspec.to_builtins(self)
+        return tree
 
     @classmethod
-    def of_text(cls, text: str) -> LinkCommand:
-        """Return the command in a text; raise ValueError if it is none."""
+    def of_tree(cls, tree: Mapping[str, Any]) -> LinkCommand:
+        """Return the command in a message; raise ValueError if it is none."""
         try:
-            command = msgspec.json.decode(text, type=cls)
-        except msgspec.DecodeError as error:
+            command = msgspec.convert(tree, type=cls)
+        except msgspec.ValidationError as error:
             raise ValueError(f"no command to links: {error}") from None
         if command.fault is not None and command.fault.own:  # else anybody who reaches the run could import any module
             raise ValueError("no command to links: a fault of your own is written in the scenario before the run")

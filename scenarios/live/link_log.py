@@ -50,7 +50,7 @@ class LinkLog:
 
     def __call__(self, message: LinkRequest) -> None:
         """Take a command to links."""
-        self._orders[message.seq] = LinkCommand.of_text(message.text).at(message.t)
+        self._orders[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
         self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:

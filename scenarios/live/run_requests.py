@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from time import monotonic
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -54,15 +54,15 @@ def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
     NobodyError
         If it does not answer.
     """
-    answer, _ = _request(client, verb, argument, lambda text: set())
+    answer, _ = _request(client, lambda text: set(), verb=verb, argument=argument)
     return answer
 
 
 def _request(
-    client: RunClient, verb: Verb, argument: str, receivers: Callable[[str], set[str]]
+    client: RunClient, receivers: Callable[[str], set[str]], **command_fields: Any
 ) -> tuple[str, dict[str, LinkAcknowledgement]]:
     """Return the plant's answer, and the answers that come in time of the receivers that follow from it."""
-    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb=verb, argument=argument, reply_to=client.id)
+    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, reply_to=client.id, **command_fields)
     client.publish(client.keys.command, encode(command))
     text: str | None = None
     answers: dict[str, LinkAcknowledgement] = {}
@@ -233,7 +233,7 @@ def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> N
 
 def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
-    reply, answers = _request_links(client, "link", command.to_text())
+    reply, answers = _request_links(client, verb="link", link_command=command.to_tree())
     refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
     silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
     return LinkCommandResult(
@@ -248,7 +248,7 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
 
 def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    reply, answers = _request_links(client, "links", "")
+    reply, answers = _request_links(client, verb="links")
     found: dict[tuple[str, str], LinkStatus] = {}
     for name, answer in answers.items():
         if answer.ok:
@@ -260,8 +260,8 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
     return reply.t, found, tuple(name for name in reply.asked if name not in answers)
 
 
-def _request_links(client: RunClient, verb: Verb, argument: str) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
-    text, answers = _request(client, verb, argument, lambda text: _link_reply(text).answers_needed)
+def _request_links(client: RunClient, **command_fields: Any) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
+    text, answers = _request(client, lambda text: _link_reply(text).answers_needed, **command_fields)
     return _link_reply(text), answers
 
 

@@ -31,9 +31,9 @@ BODIES: dict[str, dict[str, Any]] = {
     "Stop": dict(reason="enough", refused=False),
     "Leave": {},
     "LinkReport": dict(data=b"book", instance="a", final=False),
-    "LinkRequest": dict(text="{}", reply_to="z1"),
+    "LinkRequest": dict(link_command={"heal": {"on": "*"}}, reply_to="z1"),
     "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
-    "Command": dict(verb="status", argument="", reply_to="z1"),
+    "Command": dict(verb="status", argument="", link_command={"x": 1.0}, reply_to="z1"),
     "Answer": dict(ok=True, text="done"),
     "AgentStatus": dict(
         phase="running", waits_for="", island="inv1", neighbours=("inv2",), ages=(0.02,), used=("inv2",), received=9,
@@ -146,7 +146,7 @@ def plain(type_: Any) -> Any:
 def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
     """Values on both sides of what a type allows, and whether it does; None where it depends on other fields."""
     types = _parts(type_)
-    none = any(isinstance(part, inspect.NoneType) for part in types)
+    none = any(isinstance(part, inspect.NoneType | inspect.AnyType) for part in types)
     yield None, none
     for part in types:
         match part:
@@ -171,11 +171,25 @@ def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
                 yield [None] * ((part.max_length or 10_000) + 1), False
                 yield ("inv1", "inv1"), None
                 yield {"0": "inv1"}, False
+            case inspect.AnyType():
+                yield from ((1.0, True), ("x", True), ({"a b": [None, True]}, True), (math.nan, False), (b"x", False))
+                yield from (("\x1b[2J", False), ("x" * 4001, False), ({"x": {"\x1b": 1}}, False), ({1: 2}, False))
+                yield from ((_nested(6), True), (_nested(7), False), ([1] * 900, True), ([1] * 1001, False))
+            case inspect.DictType(value_type=inspect.AnyType()):
+                yield from (({}, True), ({"\x1b": 0.1}, False), (7, False))
+                yield {f"x{i}": 0.1 for i in range(part.max_length + 1)}, False
             case inspect.DictType():
                 yield from (({}, True), ({"a b": 0.1}, False), ({"\x1b": 0.1}, False), ({"x": "1"}, False), (7, False))
                 yield {f"x{i}": 0.1 for i in range(part.max_length + 1)}, False
             case inspect.StructType() | inspect.TupleType():
                 yield from ((7, False), ([], False))
+
+
+def _nested(depth: int) -> Any:
+    value: Any = 1
+    for _ in range(depth):
+        value = [value]
+    return value
 
 
 def _numbers(part: Any) -> Iterator[tuple[Any, bool | None]]:

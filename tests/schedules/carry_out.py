@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -141,7 +142,9 @@ class _Run:
         if self.broke is not None:
             return
         town, (_, kind, subject) = self._town, action
-        if kind == "start":
+        if not isinstance(subject, str):
+            self._command(kind, subject)
+        elif kind == "start":
             town.start(subject)
         elif kind in ("kill", "freeze", "thaw"):
             number = {"kill": signal.SIGKILL, "freeze": signal.SIGSTOP, "thaw": signal.SIGCONT}[kind]
@@ -149,7 +152,7 @@ class _Run:
         else:
             self._command(kind, subject)
 
-    def _command(self, verb: str, argument: str) -> None:
+    def _command(self, verb: str, argument: str | dict[str, Any]) -> None:
         """Give the plant a command; it need not answer if it ends meanwhile."""
         try:
             self._town.command(verb, argument)

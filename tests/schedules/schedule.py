@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from random import Random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from netem.models.delay import Uniform
 from netem.schema.change import Heal
@@ -28,11 +28,11 @@ class Action(NamedTuple):
     """Run time (s)."""
     kind: str
     """kill, start, freeze, thaw (of an agent's process), link (an order to emulated links), open, close."""
-    subject: str
-    """The inverter, the switch, or the order as text."""
+    subject: str | dict[str, Any]
+    """The inverter, the switch, or the command to links."""
 
     def __str__(self) -> str:
-        shown = str(LinkCommand.of_text(self.subject)) if self.kind == "link" else self.subject
+        shown = self.subject if isinstance(self.subject, str) else LinkCommand.of_tree(self.subject)
         return f"{self.t:.2f} s {self.kind} {shown}"
 
 
@@ -62,7 +62,7 @@ def draw(seed: int, microgrids: Mapping[str, str], *, switchings: bool = True) -
         draws.append(lambda t: _switch(random, t))
     for t in sorted(round(random.uniform(BEGIN, HEAL - 0.2), 2) for _ in range(random.randint(10, 20))):
         actions += random.choice(draws)(t)
-    actions.append(Action(HEAL, "link", LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()))
+    actions.append(Action(HEAL, "link", LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_tree()))
     return tuple(sorted(actions, key=lambda action: action.t))
 
 
@@ -108,7 +108,7 @@ def _link(random: Random, t: float, names: Sequence[str], microgrids: Sequence[s
             Fault(on=on, duplicate=0.3, corrupt=0.1),
         ]
     )
-    return Action(t, "link", LinkCommand(fault=fault).to_text())
+    return Action(t, "link", LinkCommand(fault=fault).to_tree())
 
 
 def _switch(random: Random, t: float) -> list[Action]:

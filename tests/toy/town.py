@@ -157,11 +157,17 @@ class Town:
         """Send a signal to the process of a name."""
         self.children[name].signal(number)
 
-    def command(self, verb: Any, argument: str = "") -> Answer:
-        """Send the plant a command, and wait for its answer."""
+    def command(self, verb: Any, argument: str | dict[str, Any] = "") -> Answer:
+        """Send the plant a command with a name, or with a command to links, and wait for its answer."""
         count = len(self.answers)
         command = Command(
-            sender="observer", epoch=1, seq=count, t=0.0, verb=verb, argument=argument, reply_to="observer"
+            sender="observer",
+            epoch=1,
+            seq=count,
+            t=0.0,
+            verb=verb,
+            reply_to="observer",
+            **({"argument": argument} if isinstance(argument, str) else {"link_command": argument}),
         )
         self.session.publish(self.keys.command, encode(command))
         self.until(lambda: len(self.answers) > count, f"answer to {verb}")

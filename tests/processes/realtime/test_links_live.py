@@ -65,7 +65,7 @@ def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTr
 def give(town: Town, order: LinkCommand, *receivers: str) -> float:
     """Give a link command and wait until the receivers have taken it; from when on (s) it holds."""
     before = len(town.acknowledgements)
-    answer = town.command("link", order.to_text())
+    answer = town.command("link", order.to_tree())
     assert answer.ok, answer.text
     taken = json.loads(answer.text)
     town.until(
@@ -113,7 +113,7 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
         assert town.command("down").ok
         assert [town.until_ended(name) for name in (*FOUR, "plant")] == [0] * 5
         traces = town.link_record.by_link()
-        changes = [LinkCommand.of_text(order.text).at(order.t) for order in town.orders]
+        changes = [LinkCommand.of_tree(order.link_command).at(order.t) for order in town.orders]
 
     heard_at = [event.t for event in town.events if event.kind == "link"]
     cut = [*verdicts(traces["inv3", "inv4"]), *verdicts(traces["inv4", "inv3"])]

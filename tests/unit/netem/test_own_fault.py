@@ -217,7 +217,7 @@ def test_nobody_can_have_a_running_run_import_a_module(folder: str) -> None:
 
     assert EmulationConfig.of_tree(setup.to_tree()) == setup
     with pytest.raises(ValueError, match="a fault of your own is written in the scenario before the run"):
-        LinkCommand.of_text(LinkCommand(fault=entry).to_text())
+        LinkCommand.of_tree(LinkCommand(fault=entry).to_tree())
 
 
 def test_a_decorator_adds_a_fault_and_takes_over_none_of_ours() -> None:

@@ -88,9 +88,10 @@ class Lab:
         """An agent says that it leaves."""
         self.hear(KEYS.leave(name), Leave(sender=name, epoch=life, seq=0, t=0.0))
 
-    def ask(self, verb: Any, argument: str = "") -> Answer:
-        """Send a command."""
-        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, argument=argument, reply_to="z1")
+    def ask(self, verb: Any, argument: str | dict[str, Any] = "") -> Answer:
+        """Send a command with a name, or with a command to links."""
+        content = {"argument": argument} if isinstance(argument, str) else {"link_command": argument}
+        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **content)
         self.hear(KEYS.command, command)
         key, answer = next((key, m) for key, m in reversed(self.sent) if isinstance(m, Answer))
         assert (key, answer.seq) == (KEYS.answer("z1"), 7)

@@ -41,7 +41,7 @@ from wire.links import CommandEffect
 from wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
 
 SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
-CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_text()
+CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_tree()
 
 
 def agent_lab() -> agent_side.Lab:
@@ -54,9 +54,9 @@ def agent_lab() -> agent_side.Lab:
     return lab
 
 
-def order(lab: agent_side.Lab, number: int, t: float, text: str = CUT, life: int = 1) -> None:
+def order(lab: agent_side.Lab, number: int, t: float, tree: dict[str, Any] = CUT, life: int = 1) -> None:
     """An order of the plant comes in."""
-    message = LinkRequest(sender="plant", epoch=life, seq=number, t=t, text=text, reply_to="z1")
+    message = LinkRequest(sender="plant", epoch=life, seq=number, t=t, link_command=tree, reply_to="z1")
     lab.hear(agent_side.KEYS.link_request("inv1"), message)
 
 
@@ -68,17 +68,17 @@ def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
 @given(st.integers(0, 10_000))
 def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
     """Whatever is lost on either way, and however often the agent's process is a new one."""
-    rng, taken, now = random.Random(seed), list[str](), 0.0
+    rng, taken, now = random.Random(seed), list[int](), 0.0
     wire: list[LinkRequest] = []
 
     class Note:
-        def command(self, text: str, t: float) -> CommandEffect:
-            return CommandEffect(text, (), "")
+        def command(self, tree: dict[str, Any], t: float) -> CommandEffect:
+            return CommandEffect("", (), "")
 
     class Taking(Note):
-        def command(self, text: str, t: float) -> CommandEffect:
-            taken.append(text)
-            return super().command(text, t)
+        def command(self, tree: dict[str, Any], t: float) -> CommandEffect:
+            taken.append(tree["number"])
+            return super().command(tree, t)
 
     def publish(key: str, payload: bytes) -> None:
         message = decode(payload)
@@ -93,7 +93,7 @@ def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
         now += 0.4
         if rng.random() < 0.3 and step < 45:
             given_so_far += 1
-            plant.give(str(given_so_far), now, "z1")
+            plant.give({"number": given_so_far}, now, "z1")
         if rng.random() < 0.05 and step < 45:
             plant.forget("inv1")
             agent = LinkCommandReceiver("inv1", 1, Taking())  # type: ignore[arg-type]
@@ -106,7 +106,7 @@ def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
                 plant.answered(answer)
     plant.send(("inv1",), now + 10.0)
 
-    assert taken == [str(number + 1) for number in range(given_so_far)]
+    assert taken == [number + 1 for number in range(given_so_far)]
     assert wire == []
 
 
@@ -135,9 +135,9 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
         "number": 1, "t": 0.08, "asked": ["inv1", "inv2"], "said": "inv2 -> inv1: cut", "receivers": ["inv1"]
     }  # fmt: skip
     assert kinds == [LinkRequest, Measurement]
-    assert {(m.seq, m.t, m.text) for m in orders} == {(1, 0.08, CUT)}
+    assert [(m.seq, m.t, m.link_command) for m in orders] == [(1, 0.08, CUT)] * len(orders) != []
     assert again == [(plant_side.KEYS.link_request("inv2"), 1)]
-    assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_text()).ok
+    assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_tree()).ok
     assert [event.text for event in lab.events("link")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
 
 
@@ -153,7 +153,7 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
     lab.join("inv1", "inv2")
     lab.ask("link", CUT)
     lab.step()
-    heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_text()
+    heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)).to_tree()
     first = json.loads(lab.ask("link", heal).text)
     lab.step()
     again = json.loads(lab.ask("link", heal).text)
@@ -208,7 +208,7 @@ def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
     lab.state("inv2", 1, 0.02, P_set=90e3)
     lab.go(0.0)
     before = lab.age("inv2")
-    order(lab, 2, 0.04, LinkCommand(heal=Heal(on="* -> inv1", from_s=0.0)).to_text())
+    order(lab, 2, 0.04, LinkCommand(heal=Heal(on="* -> inv1", from_s=0.0)).to_tree())
     lab.measure(2)
     lab.state("inv2", 2, 0.04, P_set=70e3)
     lab.go(0.02)
@@ -242,7 +242,7 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
     lab.measure(0, epoch=2)
     order(lab, 2, 0.0, life=1)
     lab.go(0.5)
-    order(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_text(), life=2)
+    order(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_tree(), life=2)
     lab.measure(1, epoch=2)
     lab.go(0.5)
 
