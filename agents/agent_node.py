@@ -17,7 +17,7 @@ from agents.own_nameplate import check_nameplate
 from wire.actions import Listen
 from wire.codec import RejectedError, encode
 from wire.links import Links, arrived, is_usable
-from wire.messages import PLANT, LinkReport, Measurement, Nameplate, State, Stop
+from wire.messages import PLANT, Measurement, Nameplate, State, Stop
 from wire.node import Route
 from wire.plant_follower import PlantFollower
 
@@ -158,15 +158,5 @@ class AgentNode(PlantFollower):
 
     def _report_links(self, *, final: bool = False) -> None:
         """Send what the emulated links did since the last report."""
-        parts = () if self._links is None else self._links.report(last=final)
-        for data in parts:
-            report = LinkReport(
-                sender=self._name,
-                epoch=self._config.epoch,
-                seq=0,
-                t=0.0,
-                data=data,
-                instance=self._instance,
-                final=final and data is parts[-1],
-            )
-            self._publish(self.keys.report(self._name), encode(report))
+        key, epoch = self.keys.report(self._name), self._config.epoch
+        self._publish_link_reports(key, self._links, epoch, instance=self._instance, last=final)

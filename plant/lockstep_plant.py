@@ -24,7 +24,7 @@ from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.telemetry_reporter import measurement_of
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, PlantEvent, Prepare, Ready, State
+from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Prepare, Ready, State
 from wire.node import Route
 from wire.tick_barrier import Awaited, TickBarrier
 
@@ -248,7 +248,7 @@ class LockstepPlant(PlantNode):
             self.stop(self.keys.stop_request(name, instance), text)
 
     def _note(self, name: str, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=name, text=text))
+        self._note_event("roster", name, text)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
         """Put an inverter on the network, or take it off."""
@@ -305,11 +305,7 @@ class LockstepPlant(PlantNode):
             if (state := self._states.get(name)) is not None:
                 self._plant.hold(name, state.P_set, state.V_set)
         self._states = {}
-        try:
-            self._plant.advance()
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(str(error), now)
+        if not self._operate(self._plant.advance, now):
             return
         self.tick += 1
         self._reporter.collect()

@@ -7,7 +7,7 @@ the links let through, passes on what emulated links did, and tells recorders. W
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import inf
 
 from plant.plant_config import PlantConfig
@@ -18,7 +18,7 @@ from wire.clock import ticks_until, time_of
 from wire.codec import encode
 from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, LinkReport, Pacing, PlantEvent, State, Stop
+from wire.messages import PLANT, EventKind, LinkReport, Pacing, PlantEvent, State, Stop
 from wire.node import Node
 from wire.printable import printable
 
@@ -132,7 +132,27 @@ class PlantNode(Node):
         """End the wait for the others to close, if that is over."""
         raise NotImplementedError
 
+    # ---------------------------------------------------------------- the plant itself
+
+    def abort(self, reason: str, now: float) -> None:
+        """End the run because something went wrong."""
+        raise NotImplementedError
+
+    def _operate(self, operation: Callable[[], object], now: float) -> bool:
+        """Have the plant do something; abort the run and return False if the network has no solution."""
+        try:
+            operation()
+        except RuntimeError as error:
+            self.cause = error
+            self.abort(str(error), now)
+            return False
+        return True
+
     # ---------------------------------------------------------------- what is told
+
+    def _note_event(self, kind: EventKind, subject: str, text: str) -> None:
+        """Note an event at the plant's time."""
+        self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
         """Tell one agent, or all, to close."""
@@ -144,7 +164,7 @@ class PlantNode(Node):
         """Note what a state says beside its set-points: a law that has failed, or that does not tell its neighbours."""
         if state.fault:
             text = f"{state.sender}: {state.fault}; its agent stands still, its inverter stays on primary droop"
-            self._reporter.note(PlantEvent(t=self.t, kind="law", subject=state.sender, text=printable(text)))
+            self._note_event("law", state.sender, text)
         if state.quiet:
             self._reporter.note_quiet(self.t)
 
@@ -160,9 +180,7 @@ class PlantNode(Node):
 
     def _report_links(self, *, last: bool = False) -> None:
         """Send what the emulated links to the plant did since the last report."""
-        for data in () if self._links is None else self._links.report(last=last):
-            report = LinkReport(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, data=data)
-            self._publish(self.keys.telemetry, encode(report))
+        self._publish_link_reports(self.keys.telemetry, self._links, self.config.epoch, t=self.t, last=last)
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         """Send telemetry; name the agents that are to be started."""

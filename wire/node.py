@@ -25,10 +25,11 @@ from typing import Any, NamedTuple
 
 from wire.actions import Action, Fetch, Log, Publish
 from wire.admission import Admission
-from wire.codec import RejectedError, RejectedMessages, decode
+from wire.codec import RejectedError, RejectedMessages, decode, encode
 from wire.keys import Keys
+from wire.links import Links
 from wire.membership import Membership
-from wire.messages import AnyMessage, Message, Nameplate
+from wire.messages import AnyMessage, LinkReport, Message, Nameplate
 
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of one of its route's types, its bytes, and the time; RejectedError if it is not for here and now."""
@@ -150,6 +151,16 @@ class Node:
 
     def _publish(self, key: str, payload: bytes) -> None:
         self._actions.append(Publish(key, payload))
+
+    def _publish_link_reports(
+        self, key: str, links: Links | None, epoch: int, *, t: float = 0.0, instance: str = "", last: bool = False
+    ) -> None:
+        """Publish what the emulated links into this node did since the last report."""
+        parts = () if links is None else links.report(last=last)
+        for data in parts:
+            final = last and bool(instance) and data is parts[-1]
+            report = LinkReport(sender=self._name, epoch=epoch, seq=0, t=t, data=data, instance=instance, final=final)
+            self._publish(key, encode(report))
 
     def _say(self, text: str) -> None:
         """Have a line logged."""

@@ -16,14 +16,15 @@ whoever joins is missing, and the run goes on meanwhile.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.plant_node import CLOSING, STAYS, PlantNode
-from plant.realtime.kept_telemetry import KeptTelemetry
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.pacer import RealTimePacer
+from plant.realtime.recorder_feed import RecorderFeed
 from plant.realtime.run_commands import RunCommands
 from plant.realtime.silence_detector import SilenceDetector
 from plant.telemetry_reporter import measurement_of
@@ -66,9 +67,6 @@ RECORDING = 15.0
 WAITING = 0.5
 """Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
 
-REFUSALS = 20
-"""Refused processes that are logged: anybody may hold tokens."""
-
 
 class RealtimePlant(PlantNode):
     """The plant under real time.
@@ -91,7 +89,6 @@ class RealtimePlant(PlantNode):
         self.plant = plant
         self.pacer = RealTimePacer(config.T_c / config.speed, 0.0)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
-        self._refusals = 0
         self._came: dict[str, float] = {}
         """When the last state of each agent came off the wire (s, driver's clock)."""
         self._states: dict[str, State] = {}
@@ -102,10 +99,7 @@ class RealtimePlant(PlantNode):
         self._waiting_timer, self._ask_timer = Timer(WAITING, 0.0), Timer(AGAIN, 0.0)
         self._warnings = RateLimit(burst=5)
         self._commands = RunCommands(self)
-        self.kept = KeptTelemetry()
-        """What recorders can have again."""
-        self._lost_recorders: set[str] = set()
-        """Recorders whose token went while the run went on, and has not come back."""
+        self.recorder_feed = RecorderFeed(config.recorders, partial(super()._publish, self.keys.telemetry))
         self._stays = False
         """Whether the end is kept back only for recorders."""
         self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
@@ -167,7 +161,7 @@ class RealtimePlant(PlantNode):
             self._ask_again(now)
         elif self.phase == "closing":
             self._send_the_last()
-            if self._stays or not self._awaits_recorders():
+            if self._stays or not self.recorder_feed.awaits(self._recorders):
                 self.phase = "over"
             else:
                 self._stays, self._deadline = True, now + RECORDING - CLOSING
@@ -195,7 +189,7 @@ class RealtimePlant(PlantNode):
             self.outcome = reason
             self._report(final=True)
             self.phase = "over"
-            self._publish_again(self.kept.take_all())
+            self.recorder_feed.end()
 
     def close(self, reason: str, now: float) -> None:
         """End the run and tell everybody."""
@@ -204,21 +198,17 @@ class RealtimePlant(PlantNode):
         self._say(f"ends: {reason}. {self.pacer}")
         self._tell_the_end(reason)
         self.phase = "closing"
-        self._publish_again(self.kept.take_all())
+        self.recorder_feed.end()
         self._deadline = now + CLOSING
         if self._all_have_gone():
             self.phase = "over"
 
     def _all_have_gone(self) -> bool:
-        """Whether all tokens have; a recorder that is out of reach may yet come for what it has not got."""
-        return super()._all_have_gone() and not self._lost_recorders
-
-    def _awaits_recorders(self) -> bool:
-        """Whether a recorder is out of reach, or has not left, which it does once it has the whole run."""
-        return not (self._recorders | self._lost_recorders).isdisjoint(self.config.recorders)
+        return super()._all_have_gone() and self.recorder_feed.complete
 
     def _close_if_alone(self) -> None:
-        if self.phase == "closing" and (self._all_have_gone() or (self._stays and not self._awaits_recorders())):
+        feed, present = self.recorder_feed, self._recorders
+        if self.phase == "closing" and (self._all_have_gone() or (self._stays and not feed.awaits(present))):
             self.phase = "over"
 
     # ---------------------------------------------------------------- liveliness
@@ -241,10 +231,7 @@ class RealtimePlant(PlantNode):
         return ""
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
-        self._refusals += 1
-        if self._refusals <= REFUSALS:
-            more = "" if self._refusals < REFUSALS else "; further refusals are not logged"
-            self._say(f"refused {reason}{more}")
+        self._say(f"refused {reason}")
         super()._refuse(name, instance, reason)
 
     def _ask_again(self, now: float) -> None:
@@ -255,15 +242,13 @@ class RealtimePlant(PlantNode):
                 self._ask(name, instance)
 
     def _recorder_came(self, name: str, now: float) -> None:
-        if name in self._lost_recorders:
-            self._lost_recorders.discard(name)
-            self._say(f"recorder {name} is back")
+        if news := self.recorder_feed.came(name):
+            self._say(news)
         self._gather(now)
 
     def _recorder_gone(self, name: str) -> None:
-        if self.phase == "running" and name in self.config.recorders:
-            self._lost_recorders.add(name)
-            self._say(f"recorder {name} is out of reach; what it misses is kept for a while")
+        if self.phase == "running" and (news := self.recorder_feed.gone(name)):
+            self._say(news)
 
     def _met(self, nameplate: Nameplate, now: float) -> None:
         name = nameplate.sender
@@ -320,15 +305,11 @@ class RealtimePlant(PlantNode):
         if answer.ok:
             self._commands.follow_up(command, now)
         if command.verb == "telemetry" and self.phase != "running":
-            self._publish_again(self.kept.take_all())
+            self.recorder_feed.replay()
 
     def _connect(self, name: str, on: bool, now: float) -> None:
         """Put an inverter on the network, or take it off."""
-        try:
-            self.plant.connect(name, on)
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(str(error), now)
+        self._operate(lambda: self.plant.connect(name, on), now)
 
     # ---------------------------------------------------------------- steps
 
@@ -340,6 +321,7 @@ class RealtimePlant(PlantNode):
 
     def _begin(self, now: float) -> None:
         self.phase = "running"
+        self.recorder_feed.paced = True
         self.pacer = RealTimePacer(self.pacer.period, now + LEAD)
         absent = [name for name in self.config.agents if name not in self.members.nameplates]
         if absent:
@@ -392,16 +374,12 @@ class RealtimePlant(PlantNode):
         if not self._step_due:
             return False
         self._step_due = False
-        self._publish_again(self.kept.take())
+        self.recorder_feed.replay()
         self._states.update((state.sender, state) for state in self._late_states(now * self.config.speed))
         states, self._states = self._states, {}
         for state in states.values():
             self.plant.hold(state.sender, state.P_set, state.V_set)
-        try:
-            self.plant.advance()
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(str(error), now)
+        if not self._operate(self.plant.advance, now):
             return True
         self.tick += 1
         for name, text in self._silence.take(now):
@@ -422,10 +400,10 @@ class RealtimePlant(PlantNode):
 
     def note_links(self, text: str) -> None:
         """Note a command to links among the events."""
-        self._reporter.note(PlantEvent(t=self.t, kind="link", subject="links", text=text))
+        self._note_event("link", "links", text)
 
     def _note(self, subject: str, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self.t, kind="roster", subject=subject, text=f"{text}, at t = {self.t:.2f} s"))
+        self._note_event("roster", subject, f"{text}, at t = {self.t:.2f} s")
         self._say(f"{text}, at t = {self.t:.2f} s")
 
     def _warn(self, text: str, now: float) -> None:
@@ -434,19 +412,14 @@ class RealtimePlant(PlantNode):
             self._tell_warning(line)
 
     def _tell_warning(self, text: str) -> None:
-        self._reporter.note(PlantEvent(t=self.t, kind="warning", subject=PLANT, text=text))
+        self._note_event("warning", PLANT, text)
         self._say(text)
 
     def _publish(self, key: str, payload: bytes) -> None:
-        """Publish bytes; those for recorders are kept, and wait if others before them are published again."""
-        if key != self.keys.telemetry or self.kept.add(self._reporter.seq, payload):
+        if key == self.keys.telemetry:
+            self.recorder_feed.publish(self._reporter.seq, payload)
+        else:
             super()._publish(key, payload)
-        elif self.phase != "running":
-            self._publish_again(self.kept.take_all())
-
-    def _publish_again(self, payloads: list[bytes]) -> None:
-        for payload in payloads:
-            super()._publish(self.keys.telemetry, payload)
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
@@ -456,5 +429,5 @@ class RealtimePlant(PlantNode):
             missing_agents=missing_agents,
             pacing=self.pacer.report(),
             impaired=self.link_commands.impaired(self.t),
-            others=self.kept.others(self._reporter.seq),
+            others=self.recorder_feed.kept.others(self._reporter.seq),
         )

@@ -65,7 +65,7 @@ class RunCommands:
         if verb == "telemetry":
             if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
                 raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
-            return str(node.kept.again_from(int(argument)))
+            return str(node.recorder_feed.kept.again_from(int(argument)))
         if verb == "down":
             return f"run {node.config.run} ends at t = {node.t:.2f} s"
         if verb == "stop":

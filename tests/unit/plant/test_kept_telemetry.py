@@ -97,7 +97,7 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
 def test_what_the_plant_has_no_more_is_a_gap_that_is_known() -> None:
     """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
     lab = running(end=None)
-    lab.side.kept = KeptTelemetry(limit=4_000)
+    lab.side.recorder_feed.kept = KeptTelemetry(limit=4_000)
     link = Link(lab)
     lab.step(50)
     link.carry()
