@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from math import inf
+from typing import Literal
 
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
@@ -18,7 +19,7 @@ from wire.clock import ticks_until, time_of
 from wire.codec import encode
 from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, EventKind, LinkReport, Pacing, PlantEvent, State, Stop
+from wire.messages import PLANT, LinkReport, Pacing, PlantEvent, State, Stop
 from wire.node import Node
 from wire.printable import printable
 
@@ -150,7 +151,7 @@ class PlantNode(Node):
 
     # ---------------------------------------------------------------- what is told
 
-    def _note_event(self, kind: EventKind, subject: str, text: str) -> None:
+    def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
         """Note an event at the plant's time."""
         self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 

@@ -311,16 +311,12 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
             raise ValueError(f"ages: {len(self.ages)} of {len(self.neighbours)} neighbours")
 
 
-EventKind = Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "law", "warning"]
-"""Kinds of events."""
-
-
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Something that happened in the plant or to the roster, for `events.csv`."""
 
     t: Time
     """Run time (s)."""
-    kind: EventKind
+    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "law", "warning"]
     """What sort of event."""
     subject: Label
     """The switch, island or agent concerned."""

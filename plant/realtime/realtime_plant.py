@@ -49,6 +49,9 @@ from wire.timer import Timer
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
+REFUSALS = 20
+"""Refused processes that are logged: anybody may hold tokens."""
+
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""
 
@@ -94,6 +97,7 @@ class RealtimePlant(PlantNode):
         self._states: dict[str, State] = {}
         """States that the links let through and that are not held yet."""
         self._silence = SilenceDetector(config.max_age, config.T_c, self.pacer.period)
+        self._refusals = 0
         self._step_due = False
         self._deadline = 0.0
         self._waiting_timer, self._ask_timer = Timer(WAITING, 0.0), Timer(AGAIN, 0.0)
@@ -231,7 +235,9 @@ class RealtimePlant(PlantNode):
         return ""
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
-        self._say(f"refused {reason}")
+        self._refusals += 1
+        if self._refusals <= REFUSALS:
+            self._say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
         super()._refuse(name, instance, reason)
 
     def _ask_again(self, now: float) -> None:

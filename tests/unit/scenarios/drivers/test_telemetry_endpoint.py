@@ -56,7 +56,7 @@ def test_a_report_that_the_plant_passes_on_is_taken_and_an_order_of_anybody_else
     it = recorder()
     it.core.appeared(KEYS.alive_plant(7))
     report = LinkReport(sender="inv1", epoch=3, seq=0, t=0.0, data=b"book")
-    order = LinkRequest(sender="inv1", epoch=3, seq=1, t=0.0, text="{}", reply_to="z1")
+    order = LinkRequest(sender="inv1", epoch=3, seq=1, t=0.0, link_command={}, reply_to="z1")
     it.hear(report)
     it.hear(order)
     it.hear(telemetry(0, sender="inv1"))
