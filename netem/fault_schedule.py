@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
-from netem.models.instant import INSTANT
+from netem.models import INSTANT
 from netem.schema.fault import Span
 
 CUTS = ("cut", "partition")

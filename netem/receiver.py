@@ -15,8 +15,8 @@ import msgspec
 
 from netem.channel import FOREVER, NEVER, Channel
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
-from netem.models.corrupt import flip
-from netem.models.instant import INSTANT
+from netem.models import INSTANT
+from netem.models.copies import flip
 from netem.schema.change import Change, Heal, changed, schedule_of
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem

@@ -18,9 +18,9 @@ from scipy import special, stats
 from netem.check.loss_check import FEWEST, Finding
 from netem.check.rows import Messages
 from netem.draws import Stream
+from netem.models import INSTANT
 from netem.models.chain import RESTART
 from netem.models.delay import Constant, DelayModel, RandomDelay, Trace
-from netem.models.instant import INSTANT
 
 
 def check_delay(sent: Messages, model: DelayModel, stream: Stream) -> list[Finding]:

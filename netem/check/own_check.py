@@ -14,7 +14,7 @@ import numpy as np
 from netem.check.loss_check import Finding
 from netem.check.rows import UNSEEN, Array, Messages
 from netem.draws import Stream
-from netem.models.instant import INSTANT
+from netem.models import INSTANT
 from netem.models.own_fault import DROPPED_BY_OWN, judge_of
 from netem.schema.fault import Span
 from netem.schema.pattern import Link

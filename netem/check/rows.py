@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace, Outcome
-from netem.models.instant import INSTANT
+from netem.models import INSTANT
 from netem.schema.fault import Span
 
 Array = npt.NDArray[np.float64]

@@ -109,14 +109,14 @@ FAULTS: Registry[Any] = Registry(
     "link faults",
     _objection,
     own={
-        "cut": "netem.models.cut:Cut",
-        "flap": "netem.models.flap:Flap",
+        "cut": "netem.models.gates:Cut",
+        "flap": "netem.models.gates:Flap",
         "loss": "netem.models.loss:Bernoulli",
-        "rate": "netem.models.rate:Rate",
-        "slots": "netem.models.slots:Slots",
+        "rate": "netem.models.medium:Rate",
+        "slots": "netem.models.medium:Slots",
         "delay": "netem.models.delay:Constant",
-        "duplicate": "netem.models.duplicate:Duplicate",
-        "corrupt": "netem.models.corrupt:Corrupt",
+        "duplicate": "netem.models.copies:Duplicate",
+        "corrupt": "netem.models.copies:Corrupt",
     },
 )
 """Faults by name; those of gridpeers come first, each by the model that a bare number means."""

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
+from netem.models.delay import DELAY, LONGEST_DELAY
 from wire.plausible import Plausible, Probability, Unit
 from wire.table_schema import fields_of
 

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from netem.fault_schedule import FaultSchedule
-from netem.models.cut import Cut
+from netem.models.gates import Cut
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link, links_among, parse

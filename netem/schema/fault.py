@@ -8,15 +8,12 @@ from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
-from netem.models.corrupt import Corrupt
-from netem.models.cut import Cut
+from netem.models.copies import Corrupt, Duplicate
 from netem.models.delay import AnyDelay, Constant
-from netem.models.duplicate import Duplicate
-from netem.models.flap import Flap
+from netem.models.gates import Cut, Flap
 from netem.models.loss import AnyLoss, Bernoulli
+from netem.models.medium import Rate, Slots
 from netem.models.own_fault import FAULTS
-from netem.models.rate import Rate
-from netem.models.slots import Slots
 from netem.schema.pattern import parse
 from netem.schema.profiles import PROFILES
 from wire.path_text import is_no_path

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from netem.models.delay.delay_model import LONGEST_DELAY
+from netem.models.delay import LONGEST_DELAY
 from netem.schema.fault import RunTime, RunTimeOrNone, times_problems
 from wire.plausible import Plausible, Unit
 from wire.suggestion import suggestion

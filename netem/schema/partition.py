@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from netem.models.cut import Cut
+from netem.models.gates import Cut
 from netem.schema.fault import RunTime, RunTimeOrNone, Span, times_problems
 from wire.messages import PLANT
 from wire.suggestion import suggestion

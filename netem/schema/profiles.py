@@ -10,8 +10,7 @@ import msgspec
 
 from netem.models.delay import AnyDelay, Constant, Lognormal, Normal, Uniform
 from netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
-from netem.models.rate import Rate
-from netem.models.slots import Slots
+from netem.models.medium import Rate, Slots
 
 
 class Profile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

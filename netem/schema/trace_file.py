@@ -9,8 +9,7 @@ from typing import TextIO
 
 import msgspec
 
-from netem.models.delay import Trace
-from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
+from netem.models.delay import DELAY, LONGEST_DELAY, Trace
 from netem.schema.netem import Netem
 from wire.suggestion import suggestion
 from wire.table_schema import Problem

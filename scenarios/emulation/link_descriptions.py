@@ -6,10 +6,10 @@ from typing import Any
 
 import msgspec
 
-from netem.models.cut import Cut
 from netem.models.delay import Constant, Uniform
+from netem.models.gates import Cut
 from netem.models.loss import Bernoulli
-from netem.models.rate import Rate
+from netem.models.medium import Rate
 from netem.schema.profiles import PROFILES
 from wire.plugin import Plugin
 

@@ -86,7 +86,7 @@ def cut(
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
     with usage_errors():
-        from netem.models.cut import Cut
+        from netem.models.gates import Cut
 
         _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, run, connect, wait)
 
@@ -132,8 +132,7 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
-    from netem.models.delay import Uniform
-    from netem.models.delay.delay_model import DELAY, LONGEST_DELAY
+    from netem.models.delay import DELAY, LONGEST_DELAY, Uniform
     from scenarios.live.run_address import UsageError
     from wire.plausible import Plausible
 

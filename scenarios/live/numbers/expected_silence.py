@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import inf
 
-from netem.models.loss.bernoulli import Bernoulli
+from netem.models.loss import Bernoulli
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
 from plant.equipment import Feeder

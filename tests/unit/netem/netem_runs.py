@@ -8,13 +8,11 @@ from typing import Any
 
 from netem.check.verify import LEVEL, Report, verify
 from netem.ledger import LinkTrace
-from netem.models.corrupt import Corrupt
+from netem.models.copies import Corrupt, Duplicate
 from netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
-from netem.models.duplicate import Duplicate
-from netem.models.flap import Flap
+from netem.models.gates import Flap
 from netem.models.loss import GilbertElliott, Markov
-from netem.models.rate import Rate
-from netem.models.slots import Slots
+from netem.models.medium import Rate, Slots
 from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem

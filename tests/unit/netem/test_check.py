@@ -9,11 +9,9 @@ from scipy import stats
 
 from netem.check.verify import Report, verify
 from netem.ledger import LinkTrace
-from netem.models.corrupt import Corrupt
-from netem.models.cut import Cut
+from netem.models.copies import Corrupt, Duplicate
 from netem.models.delay import Constant, Lognormal, Normal, Trace, Uniform
-from netem.models.duplicate import Duplicate
-from netem.models.flap import Flap
+from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott, Markov
 from netem.receiver import Receiver
 from netem.schema.fault import Fault

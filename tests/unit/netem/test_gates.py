@@ -11,12 +11,10 @@ from hypothesis import strategies as st
 
 from netem.channel import Channel
 from netem.fault_schedule import FaultSchedule
-from netem.models.cut import Cut
+from netem.models.copies import Duplicate
 from netem.models.delay import Constant
-from netem.models.duplicate import Duplicate
-from netem.models.flap import Flap
-from netem.models.rate import Rate
-from netem.models.slots import Slots
+from netem.models.gates import Cut, Flap
+from netem.models.medium import Rate, Slots
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
 from tests.unit.netem.link_messages import T_C, channel, fates, steady

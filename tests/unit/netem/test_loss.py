@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.models.corrupt import Corrupt, flip
-from netem.models.duplicate import Duplicate
+from netem.models.copies import Corrupt, Duplicate, flip
 from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
 from tests.unit.netem.link_messages import channel, fates, steady
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netem.models.cut import Cut
 from netem.models.delay import Constant, Lognormal, Normal
+from netem.models.gates import Cut
 from netem.models.loss import Bernoulli, GilbertElliott
 from netem.schema.change import Change, Heal, replayed, schedule_of
 from netem.schema.fault import Fault

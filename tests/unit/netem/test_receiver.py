@@ -10,14 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netem.ledger import LinkTrace
-from netem.models.corrupt import Corrupt
-from netem.models.cut import Cut
+from netem.models.copies import Corrupt, Duplicate
 from netem.models.delay import Lognormal, Uniform
-from netem.models.duplicate import Duplicate
-from netem.models.flap import Flap
+from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott
-from netem.models.rate import Rate
-from netem.models.slots import Slots
+from netem.models.medium import Rate, Slots
 from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem

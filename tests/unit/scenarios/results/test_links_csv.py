@@ -9,8 +9,7 @@ import msgspec
 import pytest
 
 from netem.ledger import LinkCounts
-from netem.models.corrupt import Corrupt
-from netem.models.duplicate import Duplicate
+from netem.models.copies import Corrupt, Duplicate
 from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem

@@ -1,4 +1,4 @@
-"""One bit of some messages is flipped."""
+"""Messages that arrive twice, or with a flipped bit."""
 
 from __future__ import annotations
 
@@ -8,10 +8,25 @@ from typing import Annotated
 import msgspec
 
 from netem.draws import Stream
-from wire.plausible import Probability
+from netem.models.delay import DELAY
+from wire.plausible import Probability, Unit
 
 _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
-"""Indices of the draws of the first copy; those of the next follow."""
+"""Indices of the draws of the first copy of a corrupted message; those of the next follow."""
+
+
+class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """With probability p a copy follows, a fixed time later; in a file `duplicate = 0.01` says: at once."""
+
+    p: Annotated[float, Probability("a duplicate")]
+    """Probability that a delivered message has a copy."""
+    extra_delay_s: Annotated[float, Unit("s"), DELAY] = 0.0
+    """How much later the copy arrives (s)."""
+
+    def sampler(self, stream: Stream) -> Callable[[int], bool]:
+        """From a message number to whether there is a copy."""
+        uniform, p = stream.uniform, self.p
+        return lambda seq: uniform(seq) < p
 
 
 class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -1,4 +1,4 @@
-"""A link that goes up and down and up again."""
+"""Links that are down: for the time of an entry, or up and down in turn."""
 
 from __future__ import annotations
 
@@ -11,6 +11,17 @@ from wire.plausible import Plausible, Unit
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""
+
+
+class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Nothing passes as long as the entry holds; in a file `cut = true` says the same."""
+
+    hold: bool = False
+    """False: messages are lost, reason "cut". True: they are kept, and all go on when the cut ends."""
+
+    def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
+        """Until when the link is down at t (s of run time), None if it is up."""
+        return to_s if from_s <= t < to_s else None
 
 
 class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

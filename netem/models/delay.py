@@ -1,0 +1,230 @@
+r"""Delays of single messages: constant, from a law, or measured. Each may keep the order of messages (FIFO).
+
+A random delay of message n is :math:`d_n = F^{-1}(u_n)`. Without correlation the u_n are independent. With correlation
+:math:`\varphi` they come from a normal AR(1) process in the message number,
+
+.. math:: x_n = \varphi x_{n-1} + \sqrt{1-\varphi^2}\, z_n, \qquad u_n = \Phi(x_n),
+
+so that whatever the law F, every single delay keeps it exactly, and neighbours in number are alike (Cario, Nelson 1996,
+"ARTA"). `tc netem` mixes u_n and u_{n-1} linearly instead, which does not keep the law.
+
+References
+----------
+Cario, Nelson, Operations Research Letters 19 (1996) 51-58. https://doi.org/10.1016/0167-6377(96)00017-X
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from statistics import NormalDist
+from typing import Annotated
+
+import msgspec
+
+from netem.draws import Stream
+from netem.models.chain import Chain
+from wire.plausible import Plausible, Unit, in_percent
+from wire.table_schema import Problem
+
+LONGEST_DELAY = 10.0
+"""Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
+
+DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
+"""Delay of one message (s)."""
+
+STANDARD = NormalDist()
+"""The standard normal law."""
+
+MOST_SHOWN = 5
+"""So many wrong delays of a trace are named; a file in milliseconds has thousands."""
+
+Sampler = Callable[[int], float]
+"""From a message number to its delay (s)."""
+
+
+class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
+    """What every delay has."""
+
+    fifo: bool = False
+    """Whether messages keep their order: one that would overtake arrives together with the one before it."""
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """How the delays (s) of one link are drawn."""
+        raise NotImplementedError
+
+
+class RandomDelay(DelayModel, frozen=True, kw_only=True):
+    """What every delay from a law has."""
+
+    correlation: Annotated[float, Plausible("a correlation", 0.0, 0.999999, hint=in_percent)] = 0.0
+    """phi of the AR(1) process behind the draws, from 0 (independent) to below 1."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) that a share u of all messages do not exceed, 0 < u < 1."""
+        raise NotImplementedError
+
+    def cdf(self, delay_s: float) -> float:
+        """Share of messages whose delay does not exceed `delay_s`: the inverse of `quantile`."""
+        raise NotImplementedError
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """Draw one delay from one number of the stream."""
+        quantile = self.quantile
+        if not self.correlation:
+            uniform = stream.uniform
+            return lambda seq: quantile(uniform(seq))
+        phi, rest = self.correlation, math.sqrt(1.0 - self.correlation**2)
+        normal, share = stream.normal, STANDARD.cdf
+        latent = Chain(normal, lambda x, seq: phi * x + rest * normal(seq))
+        # The normal law ends, in doubles, at 8.3 standard deviations, where the quantile function is not defined.
+        return lambda seq: quantile(min(max(share(latent.at(seq)), 2.0**-53), 1.0 - 2.0**-53))
+
+
+class Constant(DelayModel, frozen=True, kw_only=True, tag="constant"):
+    """Delay d for every message; in a file `delay = 0.1` says the same."""
+
+    delay_s: Annotated[float, Unit("s"), DELAY]
+    """d (s)."""
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """Draw nothing."""
+        delay_s = self.delay_s
+        return lambda seq: delay_s
+
+
+class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
+    """Delay uniform on (low, high): F^-1(u) = low + u (high - low)."""
+
+    low_s: Annotated[float, Unit("s"), DELAY]
+    """Shortest delay (s)."""
+    high_s: Annotated[float, Unit("s"), DELAY]
+    """Longest delay (s)."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) at share u."""
+        return self.low_s + u * (self.high_s - self.low_s)
+
+    def cdf(self, delay_s: float) -> float:
+        """Share up to a delay (s)."""
+        return min(max((delay_s - self.low_s) / (self.high_s - self.low_s), 0.0), 1.0)
+
+    def relations(self) -> list[Problem]:
+        """Return what its values ask of each other."""
+        found = []
+        if self.low_s >= self.high_s:
+            text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
+            found.append(Problem("low_s", text))
+        return found
+
+
+class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):
+    r"""Normal law, truncated at 0 (the law given that the delay is not negative, not a heap of zeros).
+
+    .. math:: F^{-1}(u) = \mu + \sigma \Phi^{-1}(c + u (1 - c)), \qquad c = \Phi(-\mu / \sigma)
+
+    With mu above 3 sigma the truncation moves mean and spread by less than half a percent of sigma.
+    """
+
+    mean_s: Annotated[float, Unit("s"), Plausible("a mean delay", 0.0, LONGEST_DELAY)]
+    """mu (s), mean before the truncation."""
+    std_s: Annotated[float, Unit("s"), Plausible("the spread of a delay", 0.0, LONGEST_DELAY, above_zero=True)]
+    """sigma (s), standard deviation before the truncation: the jitter."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) at share u."""
+        below = STANDARD.cdf(-self.mean_s / self.std_s)
+        # from the upper side, where 1 - c is exact: c + u (1 - c) would round to 1 for u next to 1
+        return max(self.mean_s - self.std_s * STANDARD.inv_cdf((1.0 - u) * (1.0 - below)), 0.0)
+
+    def cdf(self, delay_s: float) -> float:
+        """Share up to a delay (s)."""
+        above = STANDARD.cdf(self.mean_s / self.std_s)
+        return 1.0 - STANDARD.cdf((self.mean_s - delay_s) / self.std_s) / above if delay_s > 0.0 else 0.0
+
+
+class Lognormal(RandomDelay, frozen=True, kw_only=True, tag="lognormal"):
+    r"""Lognormal law above a floor.
+
+    .. math:: F^{-1}(u) = d_0 + m \exp(\sigma \Phi^{-1}(u)), \qquad \mathrm{mean} = d_0 + m\, e^{\sigma^2/2}
+    """
+
+    median_s: Annotated[float, Unit("s"), Plausible("a median delay", 0.0, LONGEST_DELAY, above_zero=True)]
+    """m (s): half of the messages are delayed by less than offset_s + median_s."""
+    sigma: Annotated[float, Plausible("sigma", 0.001, 3.0, hint="; it is the spread of the logarithm, without a unit")]
+    """Standard deviation of the delay's logarithm; 0.5 is a moderate tail, 1 a long one."""
+    offset_s: Annotated[float, Unit("s"), DELAY] = 0.0
+    """d_0 (s): delay that every message has, e.g. propagation."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) at share u."""
+        return self.offset_s + self.median_s * math.exp(self.sigma * STANDARD.inv_cdf(u))
+
+    def cdf(self, delay_s: float) -> float:
+        """Share up to a delay (s)."""
+        above = delay_s - self.offset_s
+        return STANDARD.cdf(math.log(above / self.median_s) / self.sigma) if above > 0.0 else 0.0
+
+
+class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
+    r"""Pareto law of the first kind.
+
+    .. math:: F^{-1}(u) = d_\min (1 - u)^{-1/a}, \qquad \mathrm{mean} = d_\min\, a / (a - 1)
+
+    The variance is infinite for a <= 2, and so is the mean for a <= 1.
+    """
+
+    minimum_s: Annotated[float, Unit("s"), Plausible("the shortest delay", 0.0, LONGEST_DELAY, above_zero=True)]
+    """d_min (s), shortest delay."""
+    shape: Annotated[
+        float, Plausible("a Pareto shape", 1.01, 100.0, hint="; at 1 and below the mean delay is infinite")
+    ]
+    """a: the smaller, the heavier the tail; 3 is a usual choice."""
+
+    def quantile(self, u: float) -> float:
+        """Delay (s) at share u."""
+        return self.minimum_s * float((1.0 - u) ** (-1.0 / self.shape))
+
+    def cdf(self, delay_s: float) -> float:
+        """Share up to a delay (s)."""
+        return 1.0 - float((self.minimum_s / delay_s) ** self.shape) if delay_s > self.minimum_s else 0.0
+
+
+class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
+    """Message n has delay number (n + start) mod length of the trace.
+
+    In a scenario `file` names a CSV file with a column `delay_s`; `netem.schema.trace_file` reads it into `delays_s`,
+    so that an agent's configuration needs no file.
+    """
+
+    file: str = ""
+    """Path of the CSV file, seen from the scenario's."""
+    delays_s: tuple[float, ...] = ()
+    """The delays (s), in the order of the messages."""
+    spread: bool = True
+    """Whether each link starts at a place of its own, drawn once; else all links have the same delay at once."""
+
+    def sampler(self, stream: Stream) -> Sampler:
+        """Draw where the link starts, once."""
+        delays, start = self.delays_s, self.start(stream)
+        return lambda seq: delays[(seq + start) % len(delays)]
+
+    def start(self, stream: Stream) -> int:
+        """Index of the delay that message 0 has."""
+        return stream.below(len(self.delays_s), 0) if self.spread else 0
+
+    def relations(self) -> list[Problem]:
+        """Return the delays that cannot be meant, and whether there are none."""
+        if not self.delays_s:
+            return [] if self.file else [Problem("", 'a trace needs delays: write file = "delays.csv"')]
+        wrong = [
+            Problem(f"delays_s[{i}]", text)
+            for i, delay_s in enumerate(self.delays_s)
+            if (text := DELAY.objection(delay_s, "s"))
+        ]
+        more = len(wrong) - MOST_SHOWN
+        return wrong[:MOST_SHOWN] + ([Problem("delays_s", f"{more} more like these")] if more > 0 else [])
+
+
+AnyDelay = Constant | Uniform | Normal | Lognormal | Pareto | Trace
+"""Every delay a scenario may name."""
