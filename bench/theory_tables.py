@@ -16,7 +16,7 @@ import numpy as np
 import gridpeers as gp
 from gridpeers.theory import (
     LoadStep,
-    Spec,
+    ScenarioModel,
     delay_limit,
     feeder_of,
     first_window,
@@ -75,7 +75,7 @@ def name(title: str) -> str:
 
 
 @cache
-def calm() -> Spec:
+def calm() -> ScenarioModel:
     """Return the scenario with its first event alone."""
     return first_window(scenario().spec, 3.0)
 

@@ -11,7 +11,7 @@ from scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
-    from scenarios.schema import Scenario
+    from scenarios.schema import ScenarioModel
 
 __all__ = [
     "MPSI",
@@ -31,18 +31,17 @@ __all__ = [
 ]
 
 
-def nameplates_of(spec: Scenario, feeder: Feeder, case: str = "") -> Nameplates:
+def nameplates_of(spec: ScenarioModel, feeder: Feeder, case: str = "") -> Nameplates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
     Parameters
     ----------
-    spec, feeder : Scenario, Feeder
+    spec, feeder : ScenarioModel, Feeder
         What was run (`gridpeers.Scenario.spec`, `gridpeers.Scenario.feeder`).
     case : str, optional
         Leave out the inverters that have no agent in this case, as the sharing indices do.
     """
-    from scenarios.schema.agent_schedule import inverters_of
-    from scenarios.schema.agentless import without_agent
+    from scenarios.schema.participants import inverters_of, without_agent
 
     nameplates = Nameplates.of(inverters_of(spec, feeder))
     return nameplates.without(without_agent(spec, case)) if case else nameplates

@@ -248,12 +248,12 @@ class Scenario:
     @property
     def inverters(self) -> tuple[str, ...]:
         """Names of the inverters, those that join later last."""
-        from scenarios.schema.agent_schedule import inverters_of
+        from scenarios.schema.participants import inverters_of
 
         return tuple(row.name for row in inverters_of(self._spec, self._feeder))
 
     @property
-    def spec(self) -> model.Scenario:
+    def spec(self) -> model.ScenarioModel:
         """All keys as typed values, defaults included (`scenarios.schema.scenario_model`)."""
         return self._spec
 

@@ -17,8 +17,7 @@ from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
 from scenarios.predict.var_response import VarResponse, var_growth, var_response
 from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
-from scenarios.schema import Case
-from scenarios.schema import Scenario as Spec
+from scenarios.schema import Case, ScenarioModel
 from scenarios.schema.scenario_changes import as_in
 
 __all__ = [
@@ -27,8 +26,8 @@ __all__ = [
     "InverterGroup",
     "LoadStep",
     "Loop",
+    "ScenarioModel",
     "Sensitivity",
-    "Spec",
     "Ticks",
     "Times",
     "VarResponse",
@@ -47,17 +46,17 @@ __all__ = [
 ]
 
 
-def feeder_of(spec: Spec) -> Feeder:
+def feeder_of(spec: ScenarioModel) -> Feeder:
     """Return the feeder of a scenario, with what the scenario changes in it."""
     return as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
 
 
-def without_faults(spec: Spec) -> Spec:
+def without_faults(spec: ScenarioModel) -> ScenarioModel:
     """Return a scenario whose links do nothing to messages."""
     return replace(spec, netem=Netem())
 
 
-def first_window(spec: Spec, length_s: float) -> Spec:
+def first_window(spec: ScenarioModel, length_s: float) -> ScenarioModel:
     """Return a scenario without faults that ends a time (s) after its first event, and has no other."""
     (first, *_) = spec.events
     time = replace(spec.time, end_s=first.t_s + length_s)

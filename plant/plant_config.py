@@ -186,8 +186,8 @@ class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Upper bound of its P reference from then on (W)."""
 
 
-class Move(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An agent that the scenario lets leave, its inverter with it, die, without its inverter, or join."""
+class ScheduledAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An agent leaves with its inverter, dies without it, or joins."""
 
     t: float
     """Time (s), a multiple of T_c."""
@@ -257,7 +257,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     settings: PlantSettings
     agents: tuple[str, ...]
     """Agents the plant waits for before tick 0."""
-    moves: tuple[Move, ...] = ()
+    schedule: tuple[ScheduledAction, ...] = ()
     """Agents that leave and join on schedule; who joins need not be among `agents`."""
     T_c: float
     """Control period (s), a multiple of h."""

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable
 from math import inf
 from typing import Literal
 
+from plant.agent_schedule import AgentSchedule
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
-from plant.schedule import Schedule
 from plant.telemetry_reporter import Reporter
 from wire.clock import ticks_until, time_of
 from wire.codec import encode
@@ -63,7 +63,7 @@ class PlantNode(Node):
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
         """All tokens of agents and recorders that are there now, refused ones too."""
-        self._schedule = Schedule(config, plant.inverters)
+        self._schedule = AgentSchedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         self._last_due = False
         """Whether the last telemetry is yet to be sent, though the run has ended."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from plant.build import build_plant
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 
 
-def start_problem(scenario: Scenario, feeder: Feeder) -> str:
+def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
     """Why the plant has no operating point at t = 0, or cannot have its switches as an event wants them; "" if it has.
 
     All cases start from the same one.

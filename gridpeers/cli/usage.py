@@ -10,7 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
-    from scenarios.schema import Scenario, ScenarioError
+    from scenarios.schema import ScenarioError, ScenarioModel
 
 ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A name that `gridpeers list` shows, or the path of a file.")
@@ -20,7 +20,7 @@ ScenarioName = Annotated[
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 
 
-def load(name: str) -> tuple[Scenario, Feeder]:
+def load(name: str) -> tuple[ScenarioModel, Feeder]:
     """Read and check a scenario and its feeder, or end with every problem in them."""
     from gridpeers.scenario import load as load_face
     from scenarios.schema import ScenarioError
@@ -50,7 +50,7 @@ def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> 
         fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
 
 
-def chosen(spec: Scenario, case: str | None, seed: int | None) -> Scenario:
+def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioModel:
     """The scenario with the cases and the seed of the command line."""
     import msgspec
 

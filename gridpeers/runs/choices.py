@@ -15,7 +15,7 @@ from scenarios.schema import scenario_model as model
 from wire.suggestion import suggestion
 
 
-def with_cases(spec: model.Scenario, names: Iterable[str] | None, *, option: str = "") -> model.Scenario:
+def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option: str = "") -> model.ScenarioModel:
     """Return a scenario with some of its cases; all if none is named.
 
     An `option` of the command line heads every problem.

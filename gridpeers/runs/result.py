@@ -30,8 +30,8 @@ from scenarios.results.metrics import windows
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.schema import scenario_model as model
-from scenarios.schema.agent_schedule import inverters_of
 from scenarios.schema.own_modules import claims_of
+from scenarios.schema.participants import inverters_of
 from wire.messages import PlantEvent
 from wire.printable import printable
 from wire.suggestion import suggestion
@@ -48,7 +48,7 @@ class Results(Mapping[str, "Result"]):
     It is made by `Scenario.run()` and by `gridpeers.read`.
     """
 
-    def __init__(self, folder: RunFolder, spec: model.Scenario, feeder: Feeder) -> None:
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         self._folder, self._spec, self._feeder = folder, spec, feeder
         self.numbers = frames.read_metrics(folder.path)
         """What metrics.json holds."""
@@ -66,7 +66,7 @@ class Results(Mapping[str, "Result"]):
         return len(self._results)
 
     @property
-    def spec(self) -> model.Scenario:
+    def spec(self) -> model.ScenarioModel:
         """The scenario as it was run."""
         return self._spec
 
@@ -204,7 +204,7 @@ class Result:
         """Name of the case."""
 
     @property
-    def spec(self) -> model.Scenario:
+    def spec(self) -> model.ScenarioModel:
         """The scenario as it was run."""
         return self._run.spec
 

@@ -55,7 +55,7 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
 
 
-def predictions(spec: model.Scenario, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
+def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
     """Predict all cases of a scenario; the plant is asked once for its loads."""
     others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
     if others:

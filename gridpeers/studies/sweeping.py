@@ -15,7 +15,7 @@ from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.history import History
 from scenarios.results.own.metric import METRICS
-from scenarios.schema import Scenario as Spec
+from scenarios.schema import ScenarioModel
 from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.portability import check_portable
 from scenarios.schema.scenario_errors import Problems, ScenarioError
@@ -184,7 +184,7 @@ def _results(
     runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool
 ) -> Iterator[tuple[SweepRow, History | None]]:
     """Do all runs; each comes as soon as it is done, with its history if that is asked for."""
-    task: Callable[[int, Spec, str], tuple[SweepRow, History | None]] = (
+    task: Callable[[int, ScenarioModel, str], tuple[SweepRow, History | None]] = (
         run_with_history if histories else _without_history
     )
     if jobs == 1:
@@ -198,7 +198,7 @@ def _results(
         yield from results
 
 
-def _without_history(number: int, scenario: Spec, case: str) -> tuple[SweepRow, None]:
+def _without_history(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, None]:
     """Do one run whose history nobody wants, which spares its way between two processes."""
     return run_one(number, scenario, case), None
 

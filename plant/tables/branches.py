@@ -9,7 +9,7 @@ from typing import Literal, cast
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
 from plant.tables.buses import BusTable
-from plant.tables.csv_table import Row, Table
+from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.plausible_feeder import (
     LENGTH,
     MUTUAL,
@@ -30,10 +30,10 @@ def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig
     """Read line_configs.csv: the upper triangles of the matrices, one element per row. None if it is unreadable."""
     columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
-    last_row: dict[str, Row] = {}
+    last_row: dict[str, CsvRow] = {}
     mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
-    table = Table(folder, "line_configs.csv", columns, problems, required=True)
+    table = CsvTable(folder, "line_configs.csv", columns, problems, required=True)
     for row in table:
         name = row.text("config")
         first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
@@ -79,7 +79,7 @@ def read_lines(
     """Read lines.csv; lengths in m."""
     columns = ("line", "from_bus", "to_bus", "phases", "config", "length_m")
     lines: dict[str, Line] = {}
-    for row in Table(folder, "lines.csv", columns, problems, required=True):
+    for row in CsvTable(folder, "lines.csv", columns, problems, required=True):
         name, config, phases = row.text("line"), row.text("config"), row.phases()
         length = row.number("length_m", above=0.0, plausible=LENGTH)
         ends = buses.find_ends(row, phases)
@@ -111,7 +111,7 @@ def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[S
     columns = ("from_bus", "to_bus", "phases", "state")
     switches: list[Switch] = []
     names: set[str] = set()
-    for row in Table(folder, "switches.csv", columns, problems):
+    for row in CsvTable(folder, "switches.csv", columns, problems):
         phases = row.phases()
         ends = buses.find_ends(row, phases)
         closed = row.choice("state", "state of a switch", ("closed", "open")) == "closed"
@@ -133,7 +133,7 @@ def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple
     columns = ("regulator", "from_bus", "to_bus", "phases", "tap", "tap_step_pu")
     regulators: list[Regulator] = []
     seen: set[tuple[str, str]] = set()
-    for row in Table(folder, "regulators.csv", columns, problems):
+    for row in CsvTable(folder, "regulators.csv", columns, problems):
         name, phases = row.text("regulator"), row.phases()
         ends = buses.find_ends(row, phases)
         ratio = 1.0 + row.number("tap") * row.number("tap_step_pu", above=0.0)
@@ -159,7 +159,7 @@ def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tup
     """Read transformers.csv; impedances in percent of the rating."""
     columns = ("transformer", "from_bus", "to_bus", "connection", "S_rated_kVA", "R_percent", "X_percent")
     transformers: dict[str, Transformer] = {}
-    for row in Table(folder, "transformers.csv", columns, problems):
+    for row in CsvTable(folder, "transformers.csv", columns, problems):
         name = row.text("transformer")
         ends = buses.find_ends(row, "ABC")
         connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))

@@ -12,7 +12,7 @@ from wire.plausible import Plausible
 from wire.suggestion import suggestion
 
 
-class Row:
+class CsvRow:
     """One line of a table. Every reader notes a problem and returns a harmless stand-in when the cell is wrong.
 
     Attributes
@@ -101,7 +101,7 @@ def _unit_of(column: str) -> str:
     return {"m": "m", "kW": "kW", "kvar": "kvar", "pu": "pu", "percent": "%", "deg": "deg"}.get(last, "")
 
 
-class Table:
+class CsvTable:
     """A CSV file with one header line. Columns beyond the required ones are free (origin, note).
 
     Parameters
@@ -128,7 +128,7 @@ class Table:
     ) -> None:
         self.file = file
         self._problems = problems
-        self._rows: list[Row] = []
+        self._rows: list[CsvRow] = []
         before = len(problems)
         self._open(folder / file, columns, required)
         self.readable = len(problems) == before
@@ -164,12 +164,12 @@ class Table:
         for cells in reader:
             # DictReader files what stands beyond the last column under the key None.
             surplus = cells.pop(None, None)
-            row = Row(self.file, reader.line_num, {k: (v or "").strip() for k, v in cells.items()}, self._problems)
+            row = CsvRow(self.file, reader.line_num, {k: (v or "").strip() for k, v in cells.items()}, self._problems)
             if surplus:
                 row.problem(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
             self._rows.append(row)
 
-    def __iter__(self) -> Iterator[Row]:
+    def __iter__(self) -> Iterator[CsvRow]:
         return iter(self._rows)
 
     def __len__(self) -> int:

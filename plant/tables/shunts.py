@@ -10,7 +10,7 @@ from typing import Literal, cast
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
 from plant.tables.buses import BusTable
-from plant.tables.csv_table import Row, Table
+from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.plausible_feeder import (
     BRANCH_CURRENT,
     P_F_DROOP,
@@ -39,7 +39,7 @@ LOAD_COLUMNS = ("bus", "connection", "model", "P_a_kW", "Q_a_kvar", "P_b_kW", "Q
 def read_loads(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[Load, ...]:
     """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
-    for row in Table(folder, file, LOAD_COLUMNS, problems, required=True):
+    for row in CsvTable(folder, file, LOAD_COLUMNS, problems, required=True):
         bus = buses.find(row)
         connection = row.choice("connection", "connection of a load", ("Y", "D"))
         model = row.choice("model", "load model", ("P", "I", "Z"))
@@ -74,7 +74,7 @@ def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple
     """Read capacitors.csv: banks from phase to ground."""
     columns = ("bus", "Q_a_kvar", "Q_b_kvar", "Q_c_kvar", "V_rated_kV_LN")
     capacitors: list[Capacitor] = []
-    for row in Table(folder, "capacitors.csv", columns, problems):
+    for row in CsvTable(folder, "capacitors.csv", columns, problems):
         bus = buses.find(row)
         most = power_of("a capacitor bank", bus.V_nom, BRANCH_CURRENT, 1) if bus else None
         Q = tuple(1000.0 * row.number(f"Q_{p}_kvar", at_least=0.0, plausible=most) for p in "abc")
@@ -87,7 +87,7 @@ def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple
     return tuple(capacitors)
 
 
-def _require_bank_voltage(row: Row, V_rated: float, bus: Bus) -> None:
+def _require_bank_voltage(row: CsvRow, V_rated: float, bus: Bus) -> None:
     """Note a problem if a bank's rated voltage (V) is not near its bus's nominal one, as 4.16 kV L-L is not at 2.40."""
     ratio = V_rated / bus.V_nom
     if math.isnan(ratio) or 0.9 <= ratio <= 1.5:
@@ -112,7 +112,7 @@ def read_inverters(
     columns = ("name", "kind", "bus", "microgrid", "P_rated_kW", "m_p_pu", "m_q_pu")
     inverters: dict[str, InverterRow] = {}
     at: dict[str, str] = {}
-    for row in Table(folder, "inverters.csv", columns, problems):
+    for row in CsvTable(folder, "inverters.csv", columns, problems):
         name, microgrid = row.text("name"), row.text("microgrid")
         kind = row.choice("kind", "kind of inverter", ("GFM", "GFL"))
         bus = buses.find(row)
@@ -160,7 +160,7 @@ def _rating(bus: Bus | None, load: float) -> Plausible | None:
     return Plausible(what, 1.0, load * TIMES_THE_LOAD if among else most.high)
 
 
-def _require_name(row: Row, name: str) -> None:
+def _require_name(row: CsvRow, name: str) -> None:
     """Note a problem if an inverter's name cannot be a part of a key, or already means something else there."""
     try:
         check_name("name", name)
@@ -177,7 +177,7 @@ def _require_name(row: Row, name: str) -> None:
 def read_source(folder: Path, buses: BusTable, problems: list[str]) -> Source | None:
     """Read source.csv: the substation, at most one."""
     found: Source | None = None
-    for row in Table(folder, "source.csv", ("bus", "V_pu", "angle_deg"), problems):
+    for row in CsvTable(folder, "source.csv", ("bus", "V_pu", "angle_deg"), problems):
         bus = buses.find(row)
         V_pu = row.number("V_pu", above=0.0, plausible=SOURCE_VOLTAGE)
         angle = radians(row.number("angle_deg", plausible=SOURCE_ANGLE))

@@ -16,9 +16,9 @@ from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.run_address import UsageError
 from scenarios.results.run_files import shown, write_whole
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.messages import LinkRequest
 
@@ -28,7 +28,7 @@ class LinkLog:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         As run, with its one case.
     feeder : Feeder
         Its feeder.
@@ -38,7 +38,7 @@ class LinkLog:
         The same, but only written once there is a link command.
     """
 
-    def __init__(self, scenario: Scenario, feeder: Feeder, replay: Path | None, by_the_way: Path | None) -> None:
+    def __init__(self, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, by_the_way: Path | None) -> None:
         self._scenario, self._feeder = scenario, feeder
         self._replay, self._by_the_way = replay, by_the_way
         self._orders: dict[int, Change] = {}
@@ -70,12 +70,12 @@ class LinkLog:
                 write_whole(file, text)
 
 
-def replay_of(scenario: Scenario, feeder: Feeder, changes: Sequence[Change], t: float) -> Scenario:
+def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> ScenarioModel:
     """Return the scenario whose links change by schedule as they did by command; it leaves out agents that it lacks.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         As run, with its one case.
     feeder : Feeder
         Its feeder.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_status, write_whole
 from scenarios.run import versions
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 
 BY_HAND = "by hand"
@@ -45,14 +45,14 @@ class Folders:
 
 
 @contextmanager
-def folders(out: Path | None, scenario: Scenario) -> Iterator[Folders]:
+def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     """Make the folders of a run.
 
     Parameters
     ----------
     out : Path or None
         What `--out` says.
-    scenario : Scenario
+    scenario : ScenarioModel
         As run, with its one case.
 
     Raises

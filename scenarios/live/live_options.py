@@ -10,7 +10,7 @@ from agents.agent_config import AgentConfig
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
 from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.suggestion import suggestion
@@ -36,7 +36,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     """Whether the run breaks when the plant cannot keep pace."""
 
 
-def chosen_case(scenario: Scenario, case: str) -> str:
+def chosen_case(scenario: ScenarioModel, case: str) -> str:
     """Return the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
 
     Raises
@@ -50,13 +50,13 @@ def chosen_case(scenario: Scenario, case: str) -> str:
 
 
 def configure(
-    scenario: Scenario, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
+    scenario: ScenarioModel, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Return the configurations of the plant and of all agents, spare ones last.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         A checked scenario.
     feeder : Feeder
         Its feeder.
@@ -94,7 +94,7 @@ def configure(
         plant,
         **live,
         settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
-        moves=(),  # in a live run, people let agents leave and join
+        schedule=(),  # in a live run, people let agents leave and join
         end=end,
         connect=beyond,
         wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
@@ -104,12 +104,12 @@ def configure(
     return plant, everyone
 
 
-def node_faults_by_hand(scenario: Scenario) -> str:
+def node_faults_by_hand(scenario: ScenarioModel) -> str:
     """Return a note on the process faults that people have to inject into agents of their own; "" if there are none.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         With its one case.
     """
     (case,) = scenario.cases

@@ -13,10 +13,9 @@ from agents.topology import adjacency
 from plant.equipment import F_NOM, Feeder, InverterRow
 from plant.plant_config import GflParameters, GfmParameters
 from scenarios.results.history import Flags, Floats
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
-from scenarios.schema.agentless import without_agent
+from scenarios.schema import ScenarioModel
 from scenarios.schema.graph import graph_of
+from scenarios.schema.participants import inverters_of, without_agent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +117,7 @@ class InverterGroup:
 
 
 def inverter_group_of(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     case: str,
     *,
@@ -129,7 +128,7 @@ def inverter_group_of(
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         Checked.
     feeder : Feeder
         Its feeder.

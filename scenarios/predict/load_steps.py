@@ -15,9 +15,9 @@ from plant.equipment import Feeder
 from plant.feeder import GRID, Plant, raise_for_trip
 from plant.plant_config import PlantConfig
 from scenarios.predict.times import LoadStep
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +40,12 @@ class LoadError(RuntimeError):
     """The plant has no solution on droop alone; the message says where."""
 
 
-def load_steps(scenario: Scenario, feeder: Feeder) -> tuple[IslandStep, ...]:
+def load_steps(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandStep, ...]:
     """Return the islands without the grid after each event, and their steps of load.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         Checked.
     feeder : Feeder
         Its feeder.
@@ -63,7 +63,7 @@ def load_steps(scenario: Scenario, feeder: Feeder) -> tuple[IslandStep, ...]:
         raise LoadError(f"on droop alone: {error}") from error
 
 
-def _through(scenario: Scenario, config: PlantConfig, rating: dict[str, float]) -> tuple[IslandStep, ...]:
+def _through(scenario: ScenarioModel, config: PlantConfig, rating: dict[str, float]) -> tuple[IslandStep, ...]:
     plant, T = build_plant(config), scenario.time.T_c_s
     on = set(plant.inverters) - set(config.settings.spares)
     ends = [event.t_s for event in scenario.events[1:]] + [scenario.time.end_s]

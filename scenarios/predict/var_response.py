@@ -24,7 +24,7 @@ from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.load_steps import LoadError
 from scenarios.predict.vars import STEP, factors, plant_in_first_window
 from scenarios.results.history import Floats
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 
 LENGTH = 2.0
@@ -46,7 +46,7 @@ class VarResponse:
     """pu per pu, shape (K, N, N)."""
 
 
-def var_response(scenario: Scenario, feeder: Feeder) -> VarResponse:
+def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
     """Return the answers of the plant on droop alone, as it is at the end of the first event's window.
 
     Raises

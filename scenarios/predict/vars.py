@@ -29,7 +29,7 @@ from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import AT_REST
 from scenarios.predict.load_steps import LoadError
 from scenarios.results.history import Floats
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 
 STEP = 0.002
@@ -51,7 +51,7 @@ class Sensitivity:
     """dv / dV_set (pu per pu)."""
 
 
-def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
+def sensitivity(scenario: ScenarioModel, feeder: Feeder) -> Sensitivity:
     """Return the sensitivities of the plant on droop alone at the end of the first event's window.
 
     Raises
@@ -81,7 +81,7 @@ def sensitivity(scenario: Scenario, feeder: Feeder) -> Sensitivity:
     return Sensitivity(names=names, S=np.array(columns)[:, :, 0].T, H=np.array(columns)[:, :, 1].T)
 
 
-def plant_in_first_window(scenario: Scenario, config: PlantConfig) -> Plant:
+def plant_in_first_window(scenario: ScenarioModel, config: PlantConfig) -> Plant:
     """Return the plant on droop alone, gone on to the last tick before the second event, or to the end of the run.
 
     Raises

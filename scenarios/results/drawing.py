@@ -9,9 +9,8 @@ from typing import NamedTuple
 from plant.equipment import Feeder
 from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval, island_intervals, islands_of
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
-from scenarios.schema.agentless import without_agent
+from scenarios.schema import ScenarioModel
+from scenarios.schema.participants import inverters_of, without_agent
 from scenarios.schema.power_limits import limits_of
 from scenarios.schema.scenario_model import Event
 from scenarios.short_names import in_order, short
@@ -61,7 +60,7 @@ class Drawing:
 
 
 def drawing_of(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     nameplates: Nameplates,
     histories: Mapping[str, History],
@@ -88,7 +87,7 @@ def drawing_of(
     )
 
 
-def happening(event: Event, scenario: Scenario) -> str:
+def happening(event: Event, scenario: ScenarioModel) -> str:
     """Return what happens at an event, in a few words.
 
     Examples

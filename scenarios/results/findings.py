@@ -13,8 +13,8 @@ from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Steady, Window
 from scenarios.results.own.metric import Measured
 from scenarios.results.settling import Settling, settling
-from scenarios.schema import Scenario
-from scenarios.schema.agentless import without_agent
+from scenarios.schema import ScenarioModel
+from scenarios.schema.participants import without_agent
 from scenarios.schema.power_limits import limits_of
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
@@ -104,7 +104,7 @@ class Findings:
 
 
 def find(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     nameplates: Nameplates,
     histories: Mapping[str, History],
@@ -114,7 +114,7 @@ def find(
 
     Parameters
     ----------
-    scenario, feeder : Scenario, Feeder
+    scenario, feeder : ScenarioModel, Feeder
         What was run.
     nameplates : Nameplates
         Nameplates in the order of the histories' columns.
@@ -129,7 +129,7 @@ def find(
 
 def find_in(
     windows: Mapping[str, Sequence[Window]],
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     nameplates: Nameplates,
     histories: Mapping[str, History],

@@ -12,8 +12,8 @@ import numpy as np
 from plant.equipment import Feeder
 from plant.network import Network
 from scenarios.results.history import Floats, History, Nameplates
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema import ScenarioModel
+from scenarios.schema.participants import inverters_of
 
 IslandMembers = dict[str, tuple[str, ...]]
 """Inverters of each island; an island is known by its first inverter."""
@@ -33,7 +33,7 @@ RowMeasure = Callable[[History, Nameplates], Floats]
 """A measure of each row."""
 
 
-def islands_of(scenario: Scenario, feeder: Feeder) -> dict[str, IslandMembers]:
+def islands_of(scenario: ScenarioModel, feeder: Feeder) -> dict[str, IslandMembers]:
     """Return the islands with inverters in them after each event, by its label.
 
     Switches alone decide: an inverter that has left is still counted where it stands.
@@ -69,7 +69,7 @@ def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) ->
     return replace(history, inverters=names, **columns), replace(nameplates, names=names, **mine)
 
 
-def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[History, Nameplates]:
+def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> tuple[History, Nameplates]:
     """Return a history without the spare inverters that nobody ever started, and nameplates in its order.
 
     In a run by hand all spare inverters have columns; in others those have that the scenario lets join.
@@ -80,7 +80,7 @@ def taken_part(scenario: Scenario, feeder: Feeder, history: History) -> tuple[Hi
     return part_of(history, Nameplates.of([rows[name] for name in history.inverters]), names)
 
 
-def island_intervals(scenario: Scenario, feeder: Feeder) -> tuple[IslandInterval, ...]:
+def island_intervals(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandInterval, ...]:
     """Return when there are several islands, and which."""
     starts = [event.t_s for event in scenario.events]
     found = islands_of(scenario, feeder).values()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.messages import PlantEvent
 
 
-def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
+def as_they_came(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[tuple[str, float]]:
     """Return label and time (s) of each event of a scenario: the scenario's, or that at which the last inverter moved.
 
     What a window measures begins with what happened, so that neither "within 1 s of returning" counts the start of a
@@ -16,7 +16,7 @@ def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tup
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         What was to happen.
     recorded : Iterable[PlantEvent]
         What the plant told.
@@ -31,7 +31,7 @@ def as_they_came(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[tup
     return came
 
 
-def late_moves(scenario: Scenario, recorded: Iterable[PlantEvent]) -> list[str]:
+def late_moves(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> list[str]:
     """Return sentences on events that came later than the scenario says, as processes, or people, took their time."""
     came = as_they_came(scenario, recorded)
     return [

@@ -11,12 +11,12 @@ from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics import Window, messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorded
-from scenarios.schema import Scenario
-from scenarios.schema.agentless import with_agent
+from scenarios.schema import ScenarioModel
+from scenarios.schema.participants import with_agent
 
 
 def measure_run(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     nameplates: Nameplates,
     histories: Mapping[str, History],
@@ -27,7 +27,7 @@ def measure_run(
 
     Parameters
     ----------
-    scenario, feeder : Scenario, Feeder
+    scenario, feeder : ScenarioModel, Feeder
         What was run; its events are those that happened.
     nameplates : Nameplates
         Nameplates in the order of the histories' columns.

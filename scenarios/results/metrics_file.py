@@ -15,7 +15,7 @@ import msgspec
 from plant.equipment import Feeder
 from scenarios.results.findings import SHARED, Findings
 from scenarios.results.steadiness import BOUNDS
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from wire.messages import Pacing
 
 Clock = Literal["simulated", "wall"]
@@ -26,7 +26,7 @@ Clock = Literal["simulated", "wall"]
 class RunMetrics:
     """What was run, and how."""
 
-    scenario: Scenario
+    scenario: ScenarioModel
     """Checked; with the seed and the cases asked for."""
     feeder: Feeder
     """Its feeder."""

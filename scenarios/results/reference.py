@@ -14,7 +14,7 @@ from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
 from scenarios.results.own import pages as own_pages
-from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, Scenario, Time
+from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, ScenarioModel, Time
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
@@ -24,7 +24,7 @@ TOPICS = ("keys", "messages", "scenario", *own_pages.PAGES)
 """Pages there are."""
 
 _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
-    ("Top of the file", Scenario),
+    ("Top of the file", ScenarioModel),
     ("[time]", Time),
     ("[plant]", PlantTable),
     ("[plant.inverter.NAME]", InverterTable),

@@ -2,6 +2,6 @@
 
 from scenarios.schema.loading import catalogue, find_scenario, load_scenario
 from scenarios.schema.scenario_errors import ScenarioError
-from scenarios.schema.scenario_model import Case, Event, Scenario
+from scenarios.schema.scenario_model import Case, Event, ScenarioModel
 
-__all__ = ["Case", "Event", "Scenario", "ScenarioError", "catalogue", "find_scenario", "load_scenario"]
+__all__ = ["Case", "Event", "ScenarioError", "ScenarioModel", "catalogue", "find_scenario", "load_scenario"]

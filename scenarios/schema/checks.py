@@ -7,7 +7,7 @@ import re
 from plant.equipment import Feeder
 from plant.trip_settings import DEFAULTS, defaults
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.plugin import plugin_of
 from wire.suggestion import suggestion
 
@@ -23,7 +23,7 @@ _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "s
 """What a run folder holds beside the folders of the cases."""
 
 
-def check_names(scenario: Scenario, problems: Problems) -> None:
+def check_names(scenario: ScenarioModel, problems: Problems) -> None:
     """Note names that cannot become folders, labels that are there twice, and limits out of order."""
     for path, name in [
         ("name", scenario.name),
@@ -57,7 +57,7 @@ def check_names(scenario: Scenario, problems: Problems) -> None:
     _ordered("plant.gfl", "V_set_min_pu", gfl.V_set_min, "V_set_max_pu", gfl.V_set_max, problems)
 
 
-def check_start(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note a first set-point that an inverter cannot give: the start would be no equilibrium and move by itself."""
     plant = scenario.plant
     gfm, gfl, start = plant.gfm, plant.gfl, plant.P_set0_pu
@@ -102,7 +102,7 @@ def check_start(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
         )
 
 
-def check_cases(scenario: Scenario, inverters: tuple[str, ...], problems: Problems) -> None:
+def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: Problems) -> None:
     """Note listed links that do not join two known inverters, and links listed for another graph than "links"."""
     for name, case in scenario.cases.items():
         if name in _RUN_FOLDER:
@@ -121,7 +121,7 @@ def check_cases(scenario: Scenario, inverters: tuple[str, ...], problems: Proble
             _check_links(path, case.links, inverters, problems)
 
 
-def check_events(scenario: Scenario, problems: Problems) -> None:
+def check_events(scenario: ScenarioModel, problems: Problems) -> None:
     """Note events that do nothing, and cases that name an event that there is not."""
     for i, event in enumerate(scenario.events):
         keys = ("open", "close", "leave", "join", "P_max_kW")
@@ -142,7 +142,7 @@ def check_events(scenario: Scenario, problems: Problems) -> None:
                 problems.add(f"case.{name}.P_max_kW", f'no event "{label}"; {suggestion(label, labels, "events")}')
 
 
-def check_switches(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note switches that there are not, and those that are in the position already into which an event brings them."""
     position = {switch.name: switch.closed for switch in feeder.switches}
     canonical = {name: switch.name for switch in feeder.switches for name in switch.names}
@@ -168,7 +168,7 @@ def check_switches(scenario: Scenario, feeder: Feeder, problems: Problems) -> No
                 position[switch] = closed
 
 
-def check_protection(scenario: Scenario, f_nom: float, problems: Problems) -> None:
+def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) -> None:
     """Note settings of unknown functions, on the wrong side of nominal, and second stages within their first."""
     given = scenario.protection.trips
     if problems.touch("protection", TRIPS):

@@ -7,24 +7,23 @@ from typing import Literal
 from agents.agent_config import MAX_AGE, AgentConfig, Control
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig, PlantSettings, SwitchEvent
-from scenarios.schema.agent_schedule import inverters_of, moves_of
-from scenarios.schema.agentless import with_agent
 from scenarios.schema.graph import graph_of
 from scenarios.schema.law_choice import law_of
 from scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
+from scenarios.schema.participants import inverters_of, schedule_of, with_agent
 from scenarios.schema.power_limits import limits_of
 from scenarios.schema.scenario_changes import changes_of
-from scenarios.schema.scenario_model import Event, Scenario
+from scenarios.schema.scenario_model import Event, ScenarioModel
 
 
 def configs(
-    scenario: Scenario, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
+    scenario: ScenarioModel, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Configurations of the plant and of every agent for one case, those that join later last.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         A checked scenario.
     feeder : Feeder
         Its feeder; it gives the agents their nameplates.
@@ -78,7 +77,7 @@ def configs(
             spares=tuple(row.name for row in inverters if row.spare),
         ),
         agents=tuple(row.name for row in present if not row.spare),
-        moves=(*moves_of(scenario), *(() if real_nodes else deaths_of(netem))),
+        schedule=(*schedule_of(scenario), *(() if real_nodes else deaths_of(netem))),
         T_c=time.T_c_s,
         end=time.end_s,
         record_step=time.record_s,
@@ -110,7 +109,7 @@ def configs(
     return plant, agents
 
 
-def _switch_events(scenario: Scenario) -> tuple[SwitchEvent, ...]:
+def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
     return tuple(
         SwitchEvent(t=event.t_s, switch=switch, action=action, synchronised=event.synchronised and action == "close")
         for event in scenario.events

@@ -11,10 +11,10 @@ from msgspec.structs import replace
 from agents.agent_config import GraphRule
 from agents.graphs import GRAPHS, make_graph, neighbours_by
 from plant.equipment import Feeder, InverterRow
-from scenarios.schema.agentless import with_agent
+from scenarios.schema.participants import with_agent
 from scenarios.schema.plugins import check_plugin, placed
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Case, Scenario
+from scenarios.schema.scenario_model import Case, ScenarioModel
 from wire.plugin import Plugin, plugin_of
 
 OURS = get_args(GraphRule)
@@ -33,13 +33,13 @@ def graph_of(case: Case) -> tuple[str, Plugin | None]:
     return (plugin.use, None) if plugin.use in OURS else (plugin.name, plugin)
 
 
-def with_graph_folders(scenario: Scenario, folder: Path) -> Scenario:
+def with_graph_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario with the folder of each rule that stands beside its file."""
     cases = {name: replace(case, graph=placed(case.graph, GRAPHS, folder)) for name, case in scenario.cases.items()}
     return replace(scenario, cases=cases)
 
 
-def check_graphs(scenario: Scenario, feeder: Feeder | None, problems: Problems) -> None:
+def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     """Note rules that there are not, and that fail on a roster which the scenario will have."""
     for name, case in scenario.cases.items():
         path = f"case.{name}.graph"
@@ -56,7 +56,7 @@ def check_graphs(scenario: Scenario, feeder: Feeder | None, problems: Problems) 
             problems.add(path, str(error))
 
 
-def _rosters(scenario: Scenario, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
+def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
     """Nameplates of those that take part at the start, and after each event at which agents leave or join."""
     rows = with_agent(scenario, feeder, case)
     present = {row.name for row in rows if not row.spare}

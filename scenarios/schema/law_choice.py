@@ -15,7 +15,7 @@ from agents.carriers.law_registry import CARRIERS, KEYS, LAWS
 from agents.carriers.time_limit import make_limited
 from agents.laws.law import Law, limits_in
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import LawKey, Scenario
+from scenarios.schema.scenario_model import LawKey, ScenarioModel
 from wire.module_folder import folder_of
 from wire.parameters import objections
 from wire.path_text import is_no_path
@@ -30,7 +30,7 @@ TIME_LIMIT = Range(0.001, 60.0)
 """What a time limit may be (s)."""
 
 
-def law_of(scenario: Scenario, case: str) -> LawChoice:
+def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
     """Return the law of a case: its own, or the scenario's.
 
     Examples
@@ -50,13 +50,13 @@ def law_of(scenario: Scenario, case: str) -> LawChoice:
     )
 
 
-def with_law_folders(scenario: Scenario, folder: Path) -> Scenario:
+def with_law_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario with the folder of each law that stands beside its file: processes may start elsewhere."""
     cases = {name: replace(case, law=_placed(case.law, folder)) for name, case in scenario.cases.items()}
     return replace(scenario, law=_placed(scenario.law, folder), cases=cases)
 
 
-def check_laws(scenario: Scenario, problems: Problems) -> None:
+def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
     """Every law is there, takes its parameters, and stands alone."""
     _check("law", scenario.law, problems)
     for name, case in scenario.cases.items():

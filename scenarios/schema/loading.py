@@ -13,8 +13,6 @@ import msgspec
 from plant.equipment import F_NOM, Feeder
 from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.catalogue_files import CATALOGUE, names_in
-from scenarios.schema.agent_schedule import check_moves, inverters_of
-from scenarios.schema.agentless import check_agentless
 from scenarios.schema.checks import (
     check_cases,
     check_events,
@@ -28,10 +26,11 @@ from scenarios.schema.graph import check_graphs, with_graph_folders
 from scenarios.schema.law_choice import check_laws, with_law_folders
 from scenarios.schema.netem_tables import check_netem, with_delays
 from scenarios.schema.own_modules import check_benchmark, check_own, with_benchmark_folder, with_own_folders
+from scenarios.schema.participants import check_agentless, check_schedule, inverters_of
 from scenarios.schema.power_limits import check_limits
 from scenarios.schema.scenario_changes import as_in, check_changes
 from scenarios.schema.scenario_errors import Problems, ScenarioError
-from scenarios.schema.scenario_model import AS_RUN, Scenario
+from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from scenarios.schema.supply import check_supply
 from scenarios.schema.time_checks import check_step, check_times
 
@@ -55,7 +54,7 @@ def find_scenario(name: str) -> Path:
     return find_file(name, CATALOGUE, "scenario")
 
 
-def load_scenario(name: str | Path) -> tuple[Scenario, Feeder]:
+def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
     """Read and check a scenario and its feeder before anything is started.
 
     Parameters
@@ -100,14 +99,14 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
         raise ScenarioError([f"{path.name}: brackets or names are nested too deeply to be read"]) from None
 
 
-def read_tables(data: Mapping[str, Any], problems: Problems) -> Scenario:
+def read_tables(data: Mapping[str, Any], problems: Problems) -> ScenarioModel:
     """Return the scenario of parsed TOML; it is of use only while no problem is noted."""
-    return problems.read(Scenario, {key: value for key, value in data.items() if key != AS_RUN})
+    return problems.read(ScenarioModel, {key: value for key, value in data.items() if key != AS_RUN})
 
 
 def check_tables(
     data: Mapping[str, Any], path: Path, problems: Problems, read_feeder: ReadFeeder = read_feeder
-) -> tuple[Scenario, Feeder | None]:
+) -> tuple[ScenarioModel, Feeder | None]:
     """Read the tables of a scenario and note every problem in them.
 
     Parameters
@@ -144,7 +143,7 @@ def check_tables(
         check_changes(scenario, feeder, problems)
         check_agentless(scenario, feeder, problems)
         check_switches(scenario, feeder, problems)
-        check_moves(scenario, feeder, problems)
+        check_schedule(scenario, feeder, problems)
         check_limits(scenario, feeder, problems)
         check_start(scenario, feeder, problems)
         check_supply(scenario, feeder, problems)
@@ -172,7 +171,7 @@ def _malformed(file: str, text: str, reason: str) -> str:
     return f"{file}:{line}: not valid TOML: {reason.partition(' (at')[0]}: {quoted}"
 
 
-def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
+def _with_feeder_path(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Resolve a feeder's path that is relative to the file: processes may start elsewhere."""
     feeder = scenario.plant.feeder
     if feeder not in feeders() and is_folder(folder / feeder):
@@ -181,7 +180,7 @@ def _with_feeder_path(scenario: Scenario, folder: Path) -> Scenario:
     return scenario
 
 
-def _feeder_of(scenario: Scenario, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:
+def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:
     """The feeder's tables, or None after noting what is wrong with them."""
     if problems.touch("plant.feeder"):
         return None

@@ -13,16 +13,16 @@ from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.trace_file import with_traces
 from plant.equipment import Feeder
-from plant.plant_config import Move
+from plant.plant_config import ScheduledAction
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugins import placed_plugin
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.table_schema import Problem
 
 
-def netem_of(scenario: Scenario, case: str) -> Netem:
+def netem_of(scenario: ScenarioModel, case: str) -> Netem:
     """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
     common, own = scenario.netem, scenario.cases[case].netem
     return Netem(
@@ -33,7 +33,7 @@ def netem_of(scenario: Scenario, case: str) -> Netem:
     )
 
 
-def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
+def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
     """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
     if any(partition.by == "island" for partition in netem.partitions):
         netem = netem.over(_islands_over_time(scenario, feeder))
@@ -41,12 +41,12 @@ def setup_of(netem: Netem, scenario: Scenario, feeder: Feeder, *, real_nodes: bo
     return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
 
 
-def deaths_of(netem: Netem) -> tuple[Move, ...]:
+def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
     """Return the agents that die on schedule."""
-    return tuple(Move(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
+    return tuple(ScheduledAction(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
 
 
-def _islands_over_time(scenario: Scenario, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
+def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
     """Return from when on (s) each inverter stands in which island."""
     from plant.network import Network  # scipy: only for who parts by island
 
@@ -68,7 +68,7 @@ def is_calm(netem: Netem) -> bool:
     return not (netem.links or netem.partitions or netem.nodes)
 
 
-def with_delays(scenario: Scenario, folder: Path, problems: Problems) -> Scenario:
+def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> ScenarioModel:
     """Return the scenario with the delays of its trace files, whose paths start in its folder."""
 
     def read(netem: Netem, path: str) -> Netem:
@@ -92,7 +92,7 @@ def _with_folders(netem: Netem, folder: Path) -> Netem:
     return replace(netem, links=tuple(replace(fault, own=it) for fault, it in zip(netem.links, own, strict=True)))
 
 
-def check_netem(scenario: Scenario, feeder: Feeder | None, problems: Problems) -> None:
+def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
 
     Without a feeder, which could not be read, nobody's name is known, and the rest is checked.

@@ -11,12 +11,12 @@ from scenarios.results.benchmark_registry import BENCHMARKS, CLAIMS
 from scenarios.results.own.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.schema.plugins import check_plugin, placed
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import PluginKey, Scenario
+from scenarios.schema.scenario_model import PluginKey, ScenarioModel
 from wire.plugin import Plugin, plugin_of, table_of
 from wire.registry import Registry
 
 
-def metrics_of(scenario: Scenario) -> list[tuple[str, Plugin]]:
+def metrics_of(scenario: ScenarioModel) -> list[tuple[str, Plugin]]:
     """Return a scenario's own metrics: the name of each in tables, and the metric."""
     found = []
     for key in scenario.metrics:
@@ -27,12 +27,12 @@ def metrics_of(scenario: Scenario) -> list[tuple[str, Plugin]]:
     return found
 
 
-def claims_of(scenario: Scenario) -> list[Plugin]:
+def claims_of(scenario: ScenarioModel) -> list[Plugin]:
     """Return a scenario's own claims."""
     return [plugin_of(key) for key in scenario.claims]
 
 
-def with_own_folders(scenario: Scenario, folder: Path) -> Scenario:
+def with_own_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario with the folder of each metric and claim that stands beside its file."""
     return replace(
         scenario,
@@ -41,7 +41,7 @@ def with_own_folders(scenario: Scenario, folder: Path) -> Scenario:
     )
 
 
-def check_own(scenario: Scenario, problems: Problems) -> None:
+def check_own(scenario: ScenarioModel, problems: Problems) -> None:
     """Note metrics and claims that there are not, and metrics of one name."""
     names: list[str] = []
     for i, key in enumerate(scenario.metrics):
@@ -80,12 +80,12 @@ def _placed_metric(key: PluginKey, folder: Path) -> PluginKey:
     return placed(key, METRICS, folder)
 
 
-def with_benchmark_folder(scenario: Scenario, folder: Path) -> Scenario:
+def with_benchmark_folder(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario with the folder of a benchmark that stands beside its file."""
     return replace(scenario, paper=placed(scenario.paper, BENCHMARKS, folder)) if scenario.paper else scenario
 
 
-def check_benchmark(scenario: Scenario, problems: Problems) -> None:
+def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
     """Note a benchmark that is not there.
 
     One that is known by name is not imported before a run is judged: to read a scenario takes no numpy.

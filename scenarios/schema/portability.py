@@ -13,16 +13,16 @@ from scenarios.schema.graph import graph_of
 from scenarios.schema.law_choice import law_of
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.own_modules import metrics_of
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.registry import PluginError, Registry
 
 
-def check_portable(scenario: Scenario, *, measures: bool = False) -> list[str]:
+def check_portable(scenario: ScenarioModel, *, measures: bool = False) -> list[str]:
     """Return a sentence for everything in a scenario's cases that no other process could import.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         Checked.
     measures : bool, optional
         Whether other processes measure, too, as those of a sweep do; those of a run do not.
@@ -37,7 +37,7 @@ def check_portable(scenario: Scenario, *, measures: bool = False) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _used(scenario: Scenario, case: str, measures: bool) -> Iterator[tuple[Registry[Any], str]]:
+def _used(scenario: ScenarioModel, case: str, measures: bool) -> Iterator[tuple[Registry[Any], str]]:
     yield LAWS, law_of(scenario, case).use
     _, graph = graph_of(scenario.cases[case])
     if graph is not None:

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 from plant.equipment import Feeder
 from plant.plant_config import PowerLimit
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.suggestion import suggestion
 
 
-def limits_of(scenario: Scenario, case: str) -> tuple[PowerLimit, ...]:
+def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
     """What inverters have available in one case, in the order of time; a case's own numbers go before an event's.
 
     Examples
@@ -30,7 +30,7 @@ def limits_of(scenario: Scenario, case: str) -> tuple[PowerLimit, ...]:
     )
 
 
-def check_limits(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Who is limited is a GFL of the scenario, by a power that it could have."""
     for i, event in enumerate(scenario.events):
         _check(f"event[{i}].P_max_kW", event.P_max_kW, scenario, feeder, problems)
@@ -39,7 +39,7 @@ def check_limits(scenario: Scenario, feeder: Feeder, problems: Problems) -> None
             _check(f"case.{name}.P_max_kW.{label}", limits, scenario, feeder, problems)
 
 
-def _check(path: str, limits: Mapping[str, float], scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def _check(path: str, limits: Mapping[str, float], scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     rows = {row.name: row for row in inverters_of(scenario, feeder)}
     for name, kW in limits.items():
         if name not in rows:

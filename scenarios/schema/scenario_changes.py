@@ -6,11 +6,11 @@ from plant.equipment import Feeder
 from plant.plant_config import FeederChanges, InverterChange
 from plant.tables.feeder_changes import changed
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import InverterTable, Scenario
+from scenarios.schema.scenario_model import InverterTable, ScenarioModel
 from wire.suggestion import suggestion
 
 
-def changes_of(scenario: Scenario) -> FeederChanges:
+def changes_of(scenario: ScenarioModel) -> FeederChanges:
     """Changes in SI units and per unit.
 
     Examples
@@ -29,12 +29,12 @@ def changes_of(scenario: Scenario) -> FeederChanges:
     )
 
 
-def as_in(scenario: Scenario, feeder: Feeder) -> Feeder:
+def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
     """Apply a scenario's changes to its feeder as read from the tables."""
     return changed(feeder, changes_of(scenario))
 
 
-def check_changes(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note inverters that there are not, and tables that change nothing."""
     rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
     keys = InverterTable.__struct_fields__

@@ -145,7 +145,7 @@ class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """TCP port of the plant on the loopback, the rendezvous of the run; 0 takes a free one."""
 
 
-class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The keys outside any table come first in the file."""
 
     name: str = ""

@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 
 from netem.schema.netem import Netem
-from scenarios.schema.scenario_model import AS_RUN, Scenario
+from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from wire.table_schema import INHERITED, fields_of
 
 
-def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
+def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
     """Every key of a scenario, defaults included, and a table about the run.
 
     Defaults are written out because they may differ in a later version; the text can be run again as it is, and the
@@ -21,7 +21,7 @@ def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         As run, so with the seed and the cases of the command line.
     as_run : Mapping[str, Any]
         Driver, versions and the like.
@@ -36,7 +36,7 @@ def to_toml(scenario: Scenario, as_run: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(struct: msgspec.Struct, path: str, common: Scenario) -> Iterator[str]:
+def _table(struct: msgspec.Struct, path: str, common: ScenarioModel) -> Iterator[str]:
     """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats a common table."""
     below: list[str] = []
     for field in fields_of(type(struct)):

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from plant.connectivity import Connectivity, Node
 from plant.equipment import Feeder
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Event, Scenario
+from scenarios.schema.scenario_model import Event, ScenarioModel
 
 _SHOWN = 6
 """So many buses of a dead part are named."""
@@ -30,7 +30,7 @@ class _State(NamedTuple):
     """Inverters that are on the network."""
 
 
-def check_supply(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note as a problem what a run would begin with and nothing feeds: load, and inverters without a leader."""
     start = next(_states(scenario, feeder))
     if what := _what(start.dead, start.inverters, feeder):
@@ -41,7 +41,7 @@ def check_supply(scenario: Scenario, feeder: Feeder, problems: Problems) -> None
         )
 
 
-def supply_notes(scenario: Scenario, feeder: Feeder) -> tuple[str, ...]:
+def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
     """Sentences on what each event of a checked scenario de-energises or overloads; it may be meant, so is no problem.
 
     Switches and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where it is.
@@ -67,7 +67,7 @@ def supply_notes(scenario: Scenario, feeder: Feeder) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _states(scenario: Scenario, feeder: Feeder) -> Iterator[_State]:
+def _states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_State]:
     """Who feeds what at t = 0 and after each event."""
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 
 PART_OF_T = 0.3
 """Longest integration step, as a part of the inverters' shortest time constant: at 0.4 microgrid123 oscillates."""
 
 
-def check_times(scenario: Scenario, problems: Problems) -> None:
+def check_times(scenario: ScenarioModel, problems: Problems) -> None:
     """Note times off the grid that they belong to, and events that are not in the order of time."""
     time = scenario.time
     paths = ["time.end_s", "time.record_s", *(f"event[{i}].t_s" for i in range(len(scenario.events)))]
@@ -47,7 +47,7 @@ def check_times(scenario: Scenario, problems: Problems) -> None:
             )
 
 
-def check_step(scenario: Scenario, problems: Problems) -> None:
+def check_step(scenario: ScenarioModel, problems: Problems) -> None:
     """Note an integration step that does not resolve every time constant of the inverters: the numbers would ring."""
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
     of = {("plant.gfm", name): getattr(gfm, name) for name in ("T_p", "T_q", "T_v")}

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from scenarios.field_docs import field_docs
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
@@ -115,7 +115,7 @@ def label_of(name: str) -> str:
 
 def _documented_unit(key: str) -> str:
     """Return the unit in the documentation of a key of the scenario file; "" where there is none, or no such key."""
-    tables: Any = Scenario
+    tables: Any = ScenarioModel
     text = ""
     for step in key.split("."):
         docs = {doc.name: doc for doc in field_docs(tables)} if tables is not None else {}

@@ -31,10 +31,9 @@ from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorder
 from scenarios.results.settling import settling
-from scenarios.schema import Scenario
-from scenarios.schema.agent_schedule import inverters_of
-from scenarios.schema.agentless import without_agent
+from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of, without_agent
 from scenarios.schema.scenario_changes import as_in
 from scenarios.sweep.file import Plan
 
@@ -71,12 +70,12 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     and over all emulated links how many messages fared how, e.g. "links_dropped"."""
 
 
-def run_one(number: int, scenario: Scenario, case: str) -> SweepRow:
+def run_one(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
     """Run one case in this thread and measure it."""
     return run_with_history(number, scenario, case)[0]
 
 
-def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History | None]:
+def run_with_history(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
     """Run one case in this thread and measure it; its history is None if it broke."""
     try:
         return _run(number, scenario, case)
@@ -86,7 +85,7 @@ def run_with_history(number: int, scenario: Scenario, case: str) -> tuple[SweepR
         return SweepRow(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}"), None
 
 
-def _run(number: int, scenario: Scenario, case: str) -> tuple[SweepRow, History | None]:
+def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     recorder = Recorder()

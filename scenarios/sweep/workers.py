@@ -17,13 +17,13 @@ from typing import Any, TypeVar, overload
 from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky import get_reusable_executor
 
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.sweep.file import Run
 from scenarios.sweep.sweep_case import SweepRow, run_one
 
 T = TypeVar("T")
 
-Task = Callable[[int, Scenario, str], T]
+Task = Callable[[int, ScenarioModel, str], T]
 """Does one run: its number, its scenario, its case."""
 
 _WARNINGS = "PYTHONWARNINGS"

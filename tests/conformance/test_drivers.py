@@ -16,7 +16,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
-from tests.toy.toy_configs import Moves, toy_configs
+from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.toy.toy_runs import FleetRun, Rows, first_difference
 
@@ -102,8 +102,8 @@ def test_neither_start_order_nor_hash_seed_matter(tmp_path: Path, monkeypatch: p
 
 def test_leaving_and_returning_give_the_same_rows(driver: Driver) -> None:
     """It shows nowhere how long the new process of who returns took to come up, nor that of a spare that joins."""
-    moves: Moves = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"), (0.3, "inv4", "join"))
-    plant, agents = toy_configs(4, moves=moves, spares=("inv4",))
+    schedule: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"), (0.3, "inv4", "join"))
+    plant, agents = toy_configs(4, schedule=schedule, spares=("inv4",))
     expected, ran = in_one_process(plant, agents), driver(plant, agents)
 
     assert ran.outcome.broke == ""
@@ -117,10 +117,10 @@ def test_plug_n_play_gives_the_same_history_with_processes(tmp_path: Path) -> No
     """Case IV of the paper's experiment, moved to the first tenths of a second: the same rows to the last bit."""
     scenario, feeder = load_scenario("plug-n-play")
     plant, agents = configs(scenario, feeder, "IV")
-    sooner = tuple(msgspec.structs.replace(move, t=move.t / 10) for move in plant.moves)
+    sooner = tuple(msgspec.structs.replace(action, t=action.t / 10) for action in plant.schedule)
     events = (SwitchEvent(t=0.1, switch="13-152", action="open"),)
     plant = msgspec.structs.replace(
-        plant, end=0.4, moves=sooner, settings=msgspec.structs.replace(plant.settings, events=events)
+        plant, end=0.4, schedule=sooner, settings=msgspec.structs.replace(plant.settings, events=events)
     )
     expected = in_one_process(plant, agents)
     run = FleetRun(plant, agents, tmp_path)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from agents.agent_config import AgentConfig, Control
-from plant.plant_config import Move, PlantConfig, PlantSettings
+from plant.plant_config import PlantConfig, PlantSettings, ScheduledAction
 from tests.toy.toy_plant import F_NOM, M_P, P_RATED, V_NOM
 
-Moves = tuple[tuple[float, str, Literal["leave", "join"]], ...]
+Schedule = tuple[tuple[float, str, Literal["leave", "join"]], ...]
 """Time (s), inverter, and whether it leaves or joins."""
 
 ALL_FULL = Control(secondary="all", graph="full")
@@ -43,16 +43,16 @@ def toy_configs(
     deadline: float = 10.0,
     P_set0: float = 0.5,
     run: str = "toy",
-    moves: Moves = (),
+    schedule: Schedule = (),
     spares: tuple[str, ...] = (),
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Plant of n inverters, and their agents; moves are (t in s, inverter, action), spares off at first."""
+    """Plant of n inverters, and their agents; the schedule is of (t in s, inverter, action), spares off at first."""
     names = tuple(f"inv{i + 1}" for i in range(n))
     plant = PlantConfig(
         run=run,
         settings=PlantSettings(feeder=f"toy{n}", P_set0=P_set0, spares=spares),
         agents=tuple(name for name in names if name not in spares),
-        moves=tuple(Move(t=t, inverter=name, action=action) for t, name, action in moves),
+        schedule=tuple(ScheduledAction(t=t, inverter=name, action=action) for t, name, action in schedule),
         T_c=0.02,
         end=end,
         record_step=0.02,

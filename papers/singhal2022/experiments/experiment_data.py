@@ -27,8 +27,8 @@ from gridpeers.theory import (
     Feeder,
     InverterGroup,
     LoadStep,
+    ScenarioModel,
     Sensitivity,
-    Spec,
     VarResponse,
     feeder_of,
     first_window,
@@ -44,7 +44,7 @@ from gridpeers.theory import (
 class CaseData:
     """A scenario that was run."""
 
-    scenario: Spec
+    scenario: ScenarioModel
     feeder: Feeder
     histories: Mapping[str, History]
     """By case."""
@@ -130,7 +130,7 @@ class SweepData:
 
     rows: Sequence[RunColumns]
     """All runs, in the order of the sweep."""
-    base: Spec
+    base: ScenarioModel
     """The scenario that was varied."""
     window: str
     """Label of the event that is measured."""
@@ -173,7 +173,7 @@ class SweepData:
         return feeder_of(self.base)
 
     @cached_property
-    def calm(self) -> Spec:
+    def calm(self) -> ScenarioModel:
         """The scenario with links that do nothing, its first event alone, and an end before long."""
         return first_window(self.base, 3.0)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from gridpeers.theory import Spec
+from gridpeers.theory import ScenarioModel
 
 
-def settings(scenarios: dict[str, Spec]) -> list[tuple[str, str, str]]:
+def settings(scenarios: dict[str, ScenarioModel]) -> list[tuple[str, str, str]]:
     """Return what, its value with the unit, and why, for the scenarios of a report.
 
     Parameters
     ----------
-    scenarios : dict[str, Spec]
+    scenarios : dict[str, ScenarioModel]
         By name of the part.
     """
     first = next(iter(scenarios.values()))

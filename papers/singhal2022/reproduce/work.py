@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import gridpeers as gp
 from gridpeers.benchmarks import Findings, judge
 from gridpeers.cli.remaining import Tell
-from gridpeers.theory import Spec
+from gridpeers.theory import ScenarioModel
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.claims.islanding_claims import CASES, EVENTS
 from papers.singhal2022.reproduce import capacitor_banks as banks
@@ -63,7 +63,7 @@ class Work:
         """Seed of the first part; all scenarios of the catalogue have the same."""
         return next(iter(self._loaded.values())).spec.seed
 
-    def spec(self, part: str) -> Spec:
+    def spec(self, part: str) -> ScenarioModel:
         """Return the keys of the scenario of a part."""
         return self._loaded[part].spec
 

@@ -18,7 +18,7 @@ from scenarios.live.show.events import line_of
 from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.metrics import Window, windows
 from scenarios.results.steadiness import STEADY
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of
 from wire.messages import PlantEvent
 
@@ -29,9 +29,9 @@ class Compared:
 
     ended: float
     """When it ended (s)."""
-    measured: Scenario
+    measured: ScenarioModel
     """The scenario as far as the last of its windows that is measured; its end is that one's, as it is meant."""
-    happened: Scenario
+    happened: ScenarioModel
     """The scenario with the events that came, those among them that people made by operating switches."""
     opened: LiveWindows
     """The windows of measurement of these events."""
@@ -66,7 +66,7 @@ class _Due(NamedTuple):
 
 
 def compare(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     events: Sequence[PlantEvent],
     ended: float,
@@ -76,7 +76,7 @@ def compare(
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         As run, with its one case.
     feeder : Feeder
         Its feeder.
@@ -124,7 +124,7 @@ def compare(
     )
 
 
-def _switched(scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterable[PlantEvent]:
+def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterable[PlantEvent]:
     """Yield switches that somebody operated; opening an open switch changes nothing."""
     network = Network(feeder)
     planned = [
@@ -138,7 +138,7 @@ def _switched(scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent]) 
 
 
 def _moved(
-    scenario: Scenario, feeder: Feeder, events: Iterable[PlantEvent], every: Sequence[Window], ended: float
+    scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent], every: Sequence[Window], ended: float
 ) -> Iterable[PlantEvent]:
     """Yield agents that joined, left or died against the scenario, and those that should have and did not."""
     due = [*_due(scenario, every)]
@@ -167,7 +167,7 @@ def _moved(
             yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=one.told)
 
 
-def _due(scenario: Scenario, every: Sequence[Window]) -> Iterable[_Due]:
+def _due(scenario: ScenarioModel, every: Sequence[Window]) -> Iterable[_Due]:
     for event, window in zip(scenario.events, every, strict=True):
         start, end = window.start, window.end
         for name in event.leave:

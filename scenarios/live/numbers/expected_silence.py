@@ -9,7 +9,7 @@ from netem.models.loss import Bernoulli
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
 from plant.equipment import Feeder
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.messages import PLANT, PlantEvent
 
@@ -32,13 +32,13 @@ class ExpectedSilence:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         With its one case.
     feeder : Feeder
         Its feeder.
     """
 
-    def __init__(self, scenario: Scenario, feeder: Feeder) -> None:
+    def __init__(self, scenario: ScenarioModel, feeder: Feeder) -> None:
         (case,) = scenario.cases
         setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True)
         self._netem, self._microgrids = setup.netem, setup.microgrids

@@ -14,7 +14,7 @@ from scenarios.results.drawing import Drawing, Mark, drawing_of
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
 from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from wire.messages import PlantEvent
 
 PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
@@ -22,7 +22,12 @@ PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "le
 
 
 def drawing_by_hand(
-    compared: Compared, scenario: Scenario, feeder: Feeder, case: str, history: History, events: Sequence[PlantEvent]
+    compared: Compared,
+    scenario: ScenarioModel,
+    feeder: Feeder,
+    case: str,
+    history: History,
+    events: Sequence[PlantEvent],
 ) -> Drawing:
     """Return what to draw: all events by name, and a line where people departed otherwise from the scenario.
 
@@ -30,7 +35,7 @@ def drawing_by_hand(
     ----------
     compared : Compared
         The run beside its scenario.
-    scenario, feeder : Scenario, Feeder
+    scenario, feeder : ScenarioModel, Feeder
         What was to be run.
     case : str
         Name of the case.

@@ -8,7 +8,7 @@ from itertools import groupby
 
 from scenarios.results.metrics import Window, windows
 from scenarios.results.steadiness import STEADY
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_model import Event
 from wire.messages import PlantEvent
 
@@ -58,7 +58,7 @@ def events_by_hand(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
 
 
 def opened(
-    scenario: Scenario, came: Sequence[tuple[str, float]], by_hand: Sequence[Event], ended: float
+    scenario: ScenarioModel, came: Sequence[tuple[str, float]], by_hand: Sequence[Event], ended: float
 ) -> LiveWindows:
     """Return the windows of a live run.
 
@@ -68,7 +68,7 @@ def opened(
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : ScenarioModel
         As run.
     came : Sequence[tuple[str, float]]
         Label and time (s) of each of its events, as it came.

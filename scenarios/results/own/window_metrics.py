@@ -15,9 +15,9 @@ from scenarios.results.history import Floats, History, Nameplates, read_only
 from scenarios.results.metrics import Steady, Window, between, measure
 from scenarios.results.own.metric import Measured, make_metrics, measured
 from scenarios.results.settling import Settling, settling
-from scenarios.schema import Scenario
-from scenarios.schema.agentless import without_agent
+from scenarios.schema import ScenarioModel
 from scenarios.schema.own_modules import metrics_of
+from scenarios.schema.participants import without_agent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,7 +181,7 @@ def messages_saved(window: WindowData) -> float:
 
 
 def own_measures(
-    scenario: Scenario,
+    scenario: ScenarioModel,
     feeder: Feeder,
     nameplates: Nameplates,
     histories: Mapping[str, History],
@@ -192,7 +192,7 @@ def own_measures(
 
     Parameters
     ----------
-    scenario, feeder : Scenario, Feeder
+    scenario, feeder : ScenarioModel, Feeder
         What was run.
     nameplates : Nameplates
         Nameplates in the order of the histories' columns.

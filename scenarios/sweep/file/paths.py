@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
 from wire.suggestion import suggestion
 
 _STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"
@@ -127,5 +127,5 @@ def _written(way: list[str | int]) -> str:
 @cache
 def _named_tables() -> frozenset[str]:
     """Return the keys of the scenario below which the user names the tables himself; a new name there is a slip."""
-    fields = msgspec.structs.fields(Scenario)
+    fields = msgspec.structs.fields(ScenarioModel)
     return frozenset(field.encode_name for field in fields if typing.get_origin(field.type) is dict)

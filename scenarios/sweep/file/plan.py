@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Run:
     """Number of the sample, from 0, in the order of the axes."""
     case: str
     """Case that is run."""
-    scenario: Scenario
+    scenario: ScenarioModel
     """The sample's scenario, checked."""
     shown: Mapping[str, Any]
     """The sample's value of each parameter."""
@@ -37,7 +37,7 @@ class Plan:
     """One line on what is studied."""
     text: str
     """The sweep file."""
-    base: Scenario
+    base: ScenarioModel
     """The scenario as it is without the sweep."""
     runs: Sequence[Run]
     """All runs: sample by sample, case by case."""

@@ -13,7 +13,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.tables import read_feeder
-from scenarios.schema import Scenario
+from scenarios.schema import ScenarioModel
 from scenarios.schema.loading import check_tables
 from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Setting
@@ -31,7 +31,7 @@ class BaseScenario(NamedTuple):
     """Its tables."""
     path: Path
     """Its file: relative paths start there."""
-    scenario: Scenario
+    scenario: ScenarioModel
     """Checked."""
     feeder: Feeder
     """Its feeder."""

@@ -11,10 +11,10 @@ import msgspec
 
 from scenarios.catalogue_files import SWEEPS, names_in
 from scenarios.duration import duration
-from scenarios.schema import Scenario, ScenarioError, find_scenario, load_scenario
-from scenarios.schema.agent_schedule import inverters_of
+from scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
 from scenarios.schema.file_lookup import find_file
 from scenarios.schema.loading import read_toml
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Axis, graph_axes, grid_axes, of_values, samples, zip_axes
 from scenarios.sweep.file.paths import PathError, flatten, steps
@@ -127,7 +127,7 @@ def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, pro
     )
 
 
-def _cases(sweep: Sweep, scenario: Scenario, problems: Problems) -> tuple[str, ...]:
+def _cases(sweep: Sweep, scenario: ScenarioModel, problems: Problems) -> tuple[str, ...]:
     for case in sweep.cases:
         if case not in scenario.cases:
             problems.add("cases", f'no case "{case}"; {suggestion(case, scenario.cases, "cases")}')

@@ -14,7 +14,7 @@ from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.history import History
 from scenarios.results.record import Recorder
-from scenarios.schema import Scenario, load_scenario
+from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.configs import configs
 from scenarios.sweep.sweep_case import plant_at_start, run_one
 
@@ -51,7 +51,7 @@ def theory(scenario: str) -> SweepData:
     return SweepData(rows=(), base=load_scenario(scenario)[0], window="event1")
 
 
-def _history(spec: Scenario, feeder: Feeder, case: str) -> History:
+def _history(spec: ScenarioModel, feeder: Feeder, case: str) -> History:
     plant, agents = configs(spec, feeder, case)
     recorder = Recorder()
     outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant))

@@ -42,8 +42,8 @@ def test_a_foreign_leader_and_follower_give_the_same_history(tmp_path: Path) -> 
 
 def test_a_foreign_agent_follows_who_leaves_and_returns(tmp_path: Path) -> None:
     """Rosters change, on a graph that is not full: the same rows to the last bit."""
-    moves: Any = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
-    plant, agents = toy_configs(6, Control(secondary="all", graph="clustered"), moves=moves)
+    schedule: Any = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
+    plant, agents = toy_configs(6, Control(secondary="all", graph="clustered"), schedule=schedule)
     expected: Rows = []
     run_inprocess(plant, agents, lambda telemetry: expected.extend(telemetry.rows), plant=ToyPlant(plant))
     run = Mixed(plant, agents, tmp_path, foreign=("inv1", "inv3"))

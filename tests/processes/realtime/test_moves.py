@@ -9,15 +9,15 @@ from msgspec.structs import replace
 
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
-from tests.toy.toy_configs import Moves, toy_configs
+from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_runs import FleetRun, exists
 
-AWAY: Moves = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
+AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
 
 
-def run_of(folder: Path, moves: Moves, clock: str) -> tuple[FleetRun, Outcome]:
+def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[FleetRun, Outcome]:
     """A short run of the toy in simulated or wall-clock time."""
-    plant, agents = toy_configs(3, end=0.4 if clock == "simulated" else 3.0, moves=moves)
+    plant, agents = toy_configs(3, end=0.4 if clock == "simulated" else 3.0, schedule=schedule)
     run = FleetRun(
         replace(plant, clock=clock),  # type: ignore[arg-type]
         [replace(agent, clock=clock) for agent in agents],  # type: ignore[arg-type]
@@ -33,12 +33,12 @@ def lives(run: FleetRun, name: str) -> tuple[Child, ...]:
 
 
 @pytest.mark.parametrize(
-    ("clock", "moves"),
+    ("clock", "schedule"),
     [("simulated", AWAY), ("wall", ((0.4, "inv2", "leave"), (0.8, "inv2", "join")))],
 )
-def test_the_process_ends_and_a_new_one_is_started(tmp_path: Path, clock: str, moves: Moves) -> None:
+def test_the_process_ends_and_a_new_one_is_started(tmp_path: Path, clock: str, schedule: Schedule) -> None:
     """The leaver's process ends well before the new one starts, both end with status 0, and each has its own log."""
-    run, outcome = run_of(tmp_path, moves, clock)
+    run, outcome = run_of(tmp_path, schedule, clock)
     first, second = lives(run, "inv2")
     moved = [event.text.split()[1].rstrip(",") for event in outcome.events if event.kind == "inverter"]
 

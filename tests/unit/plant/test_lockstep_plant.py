@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import Move
+from plant.plant_config import ScheduledAction
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
@@ -27,14 +27,16 @@ class Lab:
 
     def __init__(
         self,
-        *moves: tuple[float, str, Literal["leave", "join", "die"]],
+        *schedule: tuple[float, str, Literal["leave", "join", "die"]],
         n: int = 4,
         spares: tuple[str, ...] = (),
         **changes: Any,
     ) -> None:
         config, _ = toy_configs(n, spares=spares)
         config = replace(
-            config, **changes, moves=tuple(Move(t=t, inverter=name, action=action) for t, name, action in moves)
+            config,
+            **changes,
+            schedule=tuple(ScheduledAction(t=t, inverter=name, action=action) for t, name, action in schedule),
         )
         self.toy = ToyPlant(config)
         self.node = LockstepPlant(config, self.toy)
@@ -116,9 +118,9 @@ class Lab:
         return [(what, who) for what, who in self.node.missing_messages()]
 
 
-def ticking(*moves: tuple[float, str, Literal["leave", "join", "die"]], **changes: Any) -> Lab:
+def ticking(*schedule: tuple[float, str, Literal["leave", "join", "die"]], **changes: Any) -> Lab:
     """A plant that ticks with everybody of its configuration."""
-    lab = Lab(*moves, **changes)
+    lab = Lab(*schedule, **changes)
     names = lab.node.config.agents
     lab.join(*names)
     lab.ready(0, *names)

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from plant.plant_config import Move
+from plant.plant_config import ScheduledAction
 from plant.realtime.realtime_plant import LEAD, RealtimePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -360,8 +360,11 @@ def test_a_plant_without_solution_breaks_the_run() -> None:
 
 def test_who_leaves_by_the_scenario_is_asked_to_and_who_joins_is_awaited() -> None:
     """At its tick the leaver alone is told to stop, and is off once it says so; telemetry tells once who is to come."""
-    moves = (Move(t=0.1, inverter="inv2", action="leave"), Move(t=0.2, inverter="inv2", action="join"))
-    lab = running(3, moves=moves)
+    schedule = (
+        ScheduledAction(t=0.1, inverter="inv2", action="leave"),
+        ScheduledAction(t=0.2, inverter="inv2", action="join"),
+    )
+    lab = running(3, schedule=schedule)
     lab.step(6)
     stops = [(key, message.refused) for key, message in lab.sent if isinstance(message, Stop)]
     lab.leave("inv2")

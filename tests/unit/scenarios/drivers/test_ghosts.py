@@ -40,7 +40,7 @@ class Holding(ToyPlant):
 
 def test_in_simulated_time_a_newcomer_is_not_given_its_predecessors_set_points() -> None:
     """inv2 leaves at 0.2 s and is back at 0.3 s; what its former life said until 0.2 s is due till 0.5 s."""
-    plant, agents = toy_configs(3, end=1.0, moves=((0.2, "inv2", "leave"), (0.3, "inv2", "join")))
+    plant, agents = toy_configs(3, end=1.0, schedule=((0.2, "inv2", "leave"), (0.3, "inv2", "join")))
     plant, agents = replace(plant, links=LATE), tuple(replace(agent, links=LATE) for agent in agents)
     toy = Holding(plant)
     outcome = run_inprocess(plant, agents, lambda telemetry: None, plant=toy)

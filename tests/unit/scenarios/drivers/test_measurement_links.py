@@ -11,17 +11,17 @@ from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig
-from tests.toy.toy_configs import Moves, toy_configs
+from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
 Rows = list[tuple[float, ...]]
 
 
-def rows_of(fault: dict[str, Any], moves: Moves = ()) -> Rows:
+def rows_of(fault: dict[str, Any], schedule: Schedule = ()) -> Rows:
     """Rows of a run of three agents in which the measurements of inv2 have a fault."""
     netem = Netem(links=(Fault(on="plant -> inv2", **fault),))
     links = EmulationConfig(netem=netem, microgrids={f"inv{i}": "mg1" for i in range(1, 4)}).to_tree()
-    plant, agents = toy_configs(3, end=2.0, moves=moves)
+    plant, agents = toy_configs(3, end=2.0, schedule=schedule)
     agents = tuple(replace(agent, links=links) for agent in agents)
     rows: Rows = []
     outcome = run_inprocess(plant, agents, lambda message: rows.extend(message.rows), plant=ToyPlant(plant))
@@ -63,7 +63,7 @@ def test_it_stands_still_again_once_none_has_come_for_a_while() -> None:
 
 def test_a_newcomer_stands_still_too_until_it_measures() -> None:
     """inv2 leaves at 0.4 s and is back at 0.6 s; its link is cut from then on."""
-    rows = rows_of({"cut": True, "from_s": 0.5}, moves=((0.4, "inv2", "leave"), (0.6, "inv2", "join")))
+    rows = rows_of({"cut": True, "from_s": 0.5}, schedule=((0.4, "inv2", "leave"), (0.6, "inv2", "join")))
     held = P_set(rows, 2, 0.42, 2.0)
 
     assert len(P_set(rows, 2, 0.1, 0.4)) > 5

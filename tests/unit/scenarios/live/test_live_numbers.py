@@ -21,13 +21,13 @@ from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
-from scenarios.schema import Scenario, load_scenario
+from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.configs import configs
 from scenarios.schema.scenario_model import Event
 from wire.messages import PlantEvent
 
 
-def one_case(name: str) -> tuple[Scenario, Feeder]:
+def one_case(name: str) -> tuple[ScenarioModel, Feeder]:
     """A scenario of the catalogue with its case IV alone, as a run by hand has it."""
     scenario, feeder = load_scenario(name)
     return msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]}), feeder

@@ -14,7 +14,7 @@ from plant.telemetry_reporter import measurement_of
 from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.results.history import Floats
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
-from scenarios.schema import Scenario, load_scenario
+from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.configs import configs
 from wire.messages import State
 
@@ -37,7 +37,7 @@ GRAPHS = {
 
 def scenario_of(
     graph: str, *, kappa: float | None = None, still_voltage: bool = False, end_s: float = 7.0
-) -> tuple[Scenario, Feeder]:
+) -> tuple[ScenarioModel, Feeder]:
     """Islanding alone, case "x" with this graph; kappa (1/s) instead of the scenario's 14.3; V_set left where it is."""
     scenario, feeder = load_scenario("islanding")
     case = scenario.cases["IV"]

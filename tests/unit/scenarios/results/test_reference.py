@@ -16,13 +16,13 @@ from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import field_docs
 from scenarios.results.reference import TOPICS, page
-from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, Scenario, Time
+from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from wire import keys, messages
 from wire.table_schema import fields_of
 
 DOCS = Path(__file__).parents[4] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (
-    Scenario,
+    ScenarioModel,
     Time,
     PlantTable,
     GfmParameters,

@@ -14,7 +14,7 @@ from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
-from tests.toy.toy_configs import Moves, toy_configs
+from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import M_P, ToyPlant
 from wire.actions import Publish
@@ -22,14 +22,14 @@ from wire.codec import decode
 from wire.messages import Stop
 
 SEEDS = st.integers(0, 2**32 - 1)
-AWAY: Moves = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
+AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
 
 
 def configured(
-    moves: Moves = AWAY, n: int = 4, graph: GraphRule = "full", end: float = 0.4, spares: tuple[str, ...] = ()
+    schedule: Schedule = AWAY, n: int = 4, graph: GraphRule = "full", end: float = 0.4, spares: tuple[str, ...] = ()
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Plant and agents of a toy with these moves."""
-    return toy_configs(n, Control(secondary="all", graph=graph), end=end, moves=moves, spares=spares)
+    """Plant and agents of a toy with this schedule."""
+    return toy_configs(n, Control(secondary="all", graph=graph), end=end, schedule=schedule, spares=spares)
 
 
 def in_one_process(*args: Any, **kwargs: Any) -> tuple[Outcome, list[tuple[float, ...]]]:
@@ -73,7 +73,7 @@ def test_the_events_tell_what_happened() -> None:
 
 def test_who_is_away_gives_nothing_and_the_others_take_over() -> None:
     """From the tick after it left inv2 has no power; the others carry its load, and f comes back."""
-    _, rows = in_one_process(n=6, end=4.0, moves=((2.0, "inv2", "leave"),))
+    _, rows = in_one_process(n=6, end=4.0, schedule=((2.0, "inv2", "leave"),))
     after = rows[101]
 
     assert after[8] == 0.0
@@ -84,7 +84,7 @@ def test_who_is_away_gives_nothing_and_the_others_take_over() -> None:
 
 def test_a_returning_agent_starts_from_what_its_measurement_shows() -> None:
     """No set-point jumps by more than the law allows in a period, that of the returned inverter included."""
-    _, rows = in_one_process(end=3.0, moves=((1.0, "inv2", "leave"), (2.0, "inv2", "join")))
+    _, rows = in_one_process(end=3.0, schedule=((1.0, "inv2", "leave"), (2.0, "inv2", "join")))
     k = 100
     steps = [abs(b - a) for a, b in zip(rows[k][5::6], rows[k + 1][5::6], strict=True)]
 
@@ -93,7 +93,7 @@ def test_a_returning_agent_starts_from_what_its_measurement_shows() -> None:
 
 def test_a_spare_joins_for_the_first_time() -> None:
     """A spare's agent is not awaited at the start, and shares the load after it has joined."""
-    outcome, rows = in_one_process(end=6.0, moves=((2.0, "inv4", "join"),), spares=("inv4",))
+    outcome, rows = in_one_process(end=6.0, schedule=((2.0, "inv4", "join"),), spares=("inv4",))
 
     assert outcome.broke == ""
     assert outcome.reproducible
@@ -104,8 +104,8 @@ def test_a_spare_joins_for_the_first_time() -> None:
 def test_everybody_may_leave_and_return_at_once() -> None:
     """A run without any agent in between goes on, and all come back."""
     names = ("inv1", "inv2", "inv3")
-    moves = (*((0.1, name, "leave") for name in names), *((0.2, name, "join") for name in reversed(names)))
-    outcome, rows = in_one_process(moves, n=3)
+    schedule = (*((0.1, name, "leave") for name in names), *((0.2, name, "join") for name in reversed(names)))
+    outcome, rows = in_one_process(schedule, n=3)
 
     assert outcome.broke == ""
     assert rows[-1][0] == 0.4
@@ -154,10 +154,10 @@ def test_who_joins_is_awaited_once_by_telemetry() -> None:
 @pytest.mark.parametrize(
     ("move", "said"),
     [
-        ((0.2, "inv9", "leave"), 'moves: no inverter "inv9"; inverters are inv1, inv2'),
+        ((0.2, "inv9", "leave"), 'schedule: no inverter "inv9"; inverters are inv1, inv2'),
         (
             (0.21, "inv2", "leave"),
-            "moves: inv2 must leave at a positive multiple of the control period 0.02 s, got 0.21 s",
+            "schedule: inv2 must leave at a positive multiple of the control period 0.02 s, got 0.21 s",
         ),
     ],
 )

@@ -1,22 +1,38 @@
-"""Inverters without an agent, and those that run the secondary law: their problems, and who has an agent."""
+"""Who takes part in a run: its inverters, which of them have an agent, and when agents leave and join."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from plant.equipment import Feeder, InverterRow
-from scenarios.schema.agent_schedule import inverters_of
+from plant.plant_config import ScheduledAction
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Scenario
+from scenarios.schema.scenario_model import ScenarioModel
+from scenarios.schema.time_checks import multiple
 from wire.suggestion import suggestion
 
 
-def without_agent(scenario: Scenario, case: str) -> frozenset[str]:
+def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
+    """Inverters of a scenario: the feeder's, and those of its spare ones that join, in the table's order."""
+    joining = {name for event in scenario.events for name in event.join}
+    return (*feeder.inverters, *(row for row in feeder.spares if row.name in joining))
+
+
+def schedule_of(scenario: ScenarioModel) -> tuple[ScheduledAction, ...]:
+    """Everybody who leaves and joins, in the order of time."""
+    actions = []
+    for event in scenario.events:
+        actions += [ScheduledAction(t=event.t_s, inverter=name, action="leave") for name in event.leave]
+        actions += [ScheduledAction(t=event.t_s, inverter=name, action="join") for name in event.join]
+    return tuple(actions)
+
+
+def without_agent(scenario: ScenarioModel, case: str) -> frozenset[str]:
     """Names of the inverters that have no agent in a case: those of the whole scenario and the case's own."""
     return frozenset((*scenario.without_agent, *scenario.cases[case].without_agent))
 
 
-def with_agent(scenario: Scenario, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
+def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
     """Inverters that have an agent in a case, those that join later last, in the table's order.
 
     Examples
@@ -29,7 +45,33 @@ def with_agent(scenario: Scenario, feeder: Feeder, case: str) -> tuple[InverterR
     return tuple(row for row in inverters_of(scenario, feeder) if row.name not in without)
 
 
-def check_agentless(scenario: Scenario, feeder: Feeder, problems: Problems) -> None:
+def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Who leaves is there then, who joins is not, and both do so at a tick."""
+    present = {row.name for row in feeder.inverters}
+    known = (*(row.name for row in feeder.inverters), *(row.name for row in feeder.spares))
+    for i, event in enumerate(scenario.events):
+        if event.leave or event.join:
+            rule = "the period at which agents leave and join"
+            multiple(f"event[{i}].t_s", event.t_s, "time.T_c_s", scenario.time.T_c_s, rule, problems)
+        named: set[str] = set()
+        for key, names in (("leave", event.leave), ("join", event.join)):
+            path = f"event[{i}].{key}"
+            for name in names:
+                if name not in known:
+                    problems.add(path, f'no inverter "{name}"; {suggestion(name, known, "inverters")}')
+                elif name in named:
+                    problems.add(path, f'"{name}" is named twice in event "{event.label}"; name it once')
+                elif key == "leave" and name not in present:
+                    problems.add(path, f'"{name}" is not there at {event.t_s:g} s; leave it out, or let it join before')
+                elif key == "join" and name in present:
+                    problems.add(
+                        path, f'"{name}" is there already at {event.t_s:g} s; leave it out, or let it leave before'
+                    )
+                named.add(name)
+        present = (present - set(event.leave)) | set(event.join)
+
+
+def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note names that there are not, and events and faults that ask for an agent that there is not."""
     names = tuple(row.name for row in inverters_of(scenario, feeder))
     _check_names("without_agent", scenario.without_agent, names, problems)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from plant.plant_config import Move
+from plant.plant_config import ScheduledAction
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.results.joins_and_leaves import as_they_came, late_moves
 from scenarios.schema import load_scenario
-from scenarios.schema.agent_schedule import inverters_of
 from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import problems, written
 from wire.messages import PlantEvent
@@ -23,9 +23,9 @@ def test_plug_n_play_is_the_papers_experiment() -> None:
     """Section 4: inverter 2 leaves at 2 s and returns at 3 s; all nine agents are awaited at the start."""
     plant, agents = configs(*load_scenario("plug-n-play"), "IV")
 
-    assert plant.moves == (
-        Move(t=2.0, inverter="inv2", action="leave"),
-        Move(t=3.0, inverter="inv2", action="join"),
+    assert plant.schedule == (
+        ScheduledAction(t=2.0, inverter="inv2", action="leave"),
+        ScheduledAction(t=3.0, inverter="inv2", action="join"),
     )
     assert plant.agents == tuple(agent.name for agent in agents)
     assert len(agents) == 9
@@ -48,11 +48,11 @@ def test_by_hand_people_move_the_agents(tmp_path: Path) -> None:
     text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
     plant, agents = configure(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
 
-    assert plant.moves == ()
+    assert plant.schedule == ()
     assert [agent.name for agent in agents] == [f"inv{i}" for i in range(1, 11)]
 
 
-def test_moves_survive_the_runs_copy(tmp_path: Path) -> None:
+def test_schedules_survive_the_runs_copy(tmp_path: Path) -> None:
     """What a run leaves in its folder is the same scenario again."""
     scenario, _ = load_scenario("plug-n-play")
 
@@ -105,7 +105,7 @@ def test_all_problems_come_at_once(tmp_path: Path) -> None:
 
 
 def test_an_event_is_measured_from_when_it_came() -> None:
-    """A process that came up late moves the start of its window, which is told; what never came keeps its time."""
+    """A process that came up late schedule the start of its window, which is told; what never came keeps its time."""
     scenario, _ = load_scenario("plug-n-play")
     left = PlantEvent(t=2.0, kind="inverter", subject="inv2", text="inv2 disconnected")
     back = PlantEvent(t=3.32, kind="inverter", subject="inv2", text="inv2 connected")
