@@ -17,8 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Protocol
 
 from wire.anybody import ANYTHING, named
-from wire.plugin import Plugin, made
-from wire.plugin_shape import callable_objection
+from wire.plugin import Plugin, callable_objection, made
 from wire.printable import printable
 from wire.registry import PluginError, Registry
 from wire.suggestion import suggestion

@@ -2,7 +2,7 @@
 
     T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
 
-`Range` bounds what a law can do with a number. `Plausible` bounds what makes sense: wide enough for every value that
+`Range` bounds the values that code can use. `Plausible` bounds what makes sense: wide enough for every value that
 somebody might want to try, and too narrow for one that only a lost unit explains.
 """
 
@@ -22,6 +22,8 @@ class Unit:
     """Unit of a number, e.g. `Unit("1/s")`; without one it is a pure number or no number."""
 
     text: str
+    in_key: bool = True
+    """Whether the key of a file ends in the unit, where the unit can be a part of a key."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,15 @@ class Range:
 
     low: float = -math.inf
     high: float = math.inf
+
+    @property
+    def span(self) -> str:
+        """The range in words, "" if there is none."""
+        if math.isfinite(self.low + self.high):
+            return f"{_bound(self.low)} to {_bound(self.high)}"
+        if math.isfinite(self.low):
+            return f"at least {_bound(self.low)}"
+        return f"at most {_bound(self.high)}" if math.isfinite(self.high) else ""
 
     def objection(self, value: Any, unit: str = "") -> str:
         """Return why a value is no number within the range, "" if it is.
@@ -47,9 +58,7 @@ class Range:
             return f"must be a finite number, got {shown}"
         if self.low <= value <= self.high:
             return ""
-        low, high = (str(bound) if isinstance(bound, int) else f"{bound:g}" for bound in (self.low, self.high))
-        bounds = f"from {low} to {high}" if math.isfinite(self.low + self.high) else f"at least {low}"
-        bounds = f"at most {high}" if math.isinf(self.low) else bounds
+        bounds = f"from {self.span}" if " to " in self.span else self.span
         return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
 
 
@@ -67,6 +76,11 @@ class Plausible:
     """Whether zero makes no sense at all."""
     hint: str | Callable[[float], str] = ""
     """End of the sentence about a value that is not plausible, or a function from the value to it."""
+
+    @property
+    def span(self) -> str:
+        """The range in words."""
+        return f"{self.low:g} to {self.high:g}"
 
     def objection(self, value: float, unit: str = "") -> str:
         """Return why a number cannot be right and what would be, "" if it can.
@@ -86,7 +100,7 @@ class Plausible:
         '4160 kV is not plausible for a nominal voltage (0.1 to 150 kV); did you mean 4.16 (4160 V)?'
         """
         text = f" {unit}" if unit else ""
-        span = f"{self.low:g} to {self.high:g}{text}"
+        span = f"{self.span}{text}"
         try:
             value = float(value)  # a whole number may be beyond any float
         except OverflowError:
@@ -118,6 +132,11 @@ class Probability:
     above_zero: bool = False
     """Whether 0 is none, as the number is divided by."""
 
+    @property
+    def span(self) -> str:
+        """The range in words."""
+        return "above 0, to 1" if self.above_zero else "0 to 1"
+
     def objection(self, value: float, unit: str = "") -> str:
         """Return why a number is no such probability, "" if it is.
 
@@ -130,6 +149,10 @@ class Probability:
             return ""
         bounds = "above 0 and up to 1" if self.above_zero else "from 0 to 1"
         return f"{self.what} is a probability {bounds}, got {value:g}{in_percent(value)}"
+
+
+def _bound(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:g}"
 
 
 def in_percent(value: float) -> str:

@@ -1,7 +1,8 @@
-"""What a scenario says of something plugged in: its name or reference, where its module is, and its parameters."""
+"""Plug-ins: the shape that a class or function must have, how a scenario names one, and how it is made. Pure."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any
@@ -9,9 +10,14 @@ from typing import Any
 import msgspec
 
 from wire.anybody import ANYTHING, named
-from wire.parameters import objections, values_of
 from wire.printable import printable
 from wire.registry import PluginError, Registry
+from wire.table_reading import in_words, parameter_values, read_parameters, shown
+from wire.table_schema import Problem, fields_of
+
+KEYS = ("use", "folder")
+"""Keys of a plug-in's table that are no parameters of it."""
+
 
 Scalar = float | int | bool | str
 """Value of a parameter."""
@@ -25,13 +31,13 @@ def scalar_objection(value: Any) -> str:
     >>> scalar_objection(10**30)
     'a whole number has at most 64 bits; got 1000000000000000000000000000000'
     """
-    shown = printable(repr(value), 60)
+    written = printable(repr(value), 60)
     if not isinstance(value, str | int | float):
-        return f"a parameter is a number, a text, or true or false; got {shown}"
+        return f"a parameter is a number, a text, or true or false; got {written}"
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
-        return f"a whole number has at most 64 bits; got {shown}"
+        return f"a whole number has at most 64 bits; got {written}"
     if isinstance(value, float) and not isfinite(value):
-        return f"must be a finite number, got {shown}"
+        return f"must be a finite number, got {written}"
     return ""
 
 
@@ -90,7 +96,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
             raise PluginError(f"{plugin.name} is a function and takes no parameters; leave out {', '.join(given)}")
         return found
     try:
-        values = values_of(found, given)
+        values = parameter_values(found, given)
         if any("__init__" in vars(base) for base in found.__mro__ if base is not object):
             return found(**values)
         it = found()
@@ -102,16 +108,106 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
     return it
 
 
-def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[tuple[str, str]]:
-    """Return all that is wrong with a plugin: for each the parameter, "" for the whole, and a sentence."""
+def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[Problem]:
+    """Return all that is wrong with a plugin, at its parameters, or at "" for the whole."""
     try:
         found = registry.resolve(plugin.use, plugin.folder)
     except PluginError as error:
-        return [("", str(error))]
-    if isinstance(found, type) and (wrong := objections(found, dict(plugin.parameters))):
+        return [Problem("", str(error))]
+    if isinstance(found, type) and (wrong := read_parameters(found, dict(plugin.parameters))[1]):
         return wrong
     try:
         made(registry, plugin)
     except PluginError as error:
-        return [("", str(error))]
+        return [Problem("", str(error))]
     return []
+
+
+def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...], keys: tuple[str, ...] = KEYS) -> str:
+    """Return why something is no class of a kind, "" if it is.
+
+    Parameters
+    ----------
+    it : Any
+        What somebody has written.
+    base : type
+        What it is derived from; `gridpeers` has it under its name.
+    method : str
+        What it must define.
+    arguments : tuple[str, ...]
+        Arguments of the method, without self.
+    keys : tuple[str, ...], optional
+        Names that its parameters cannot have.
+
+    Examples
+    --------
+    >>> class Base:
+    ...     def judge(self, message): ...
+    >>> class Mine(Base):
+    ...     def judge(self): ...
+    >>> class_objection(Base, Base, "judge", ("message",))
+    'it has no method judge(self, message)'
+    >>> class_objection(Mine, Base, "judge", ("message",))
+    'write its method judge(self, message): too many positional arguments'
+    """
+    if not (isinstance(it, type) and issubclass(it, base)):
+        return f"derive a class from gridpeers.{base.__name__}"
+    call = f"{method}({', '.join(('self', *arguments))})"
+    if getattr(it, method) is getattr(base, method):
+        return f"it has no method {call}"
+    try:
+        inspect.signature(getattr(it, method)).bind(None, *arguments)
+    except TypeError as error:
+        return f"write its method {call}: {error}"
+    return _parameter_objection(it, keys)
+
+
+def callable_objection(it: Any, argument: str, keys: tuple[str, ...] = KEYS) -> str:
+    """Return why something is neither a function of one argument nor a class of such functions; "" if it is.
+
+    Examples
+    --------
+    >>> callable_objection(len, "window"), callable_objection(lambda: 1, "window")
+    ('', 'it is called with one argument, the window: too many positional arguments')
+    """
+    if isinstance(it, type):
+        call = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
+        if call is None:
+            return f"the class needs a method __call__(self, {argument})"
+        try:
+            inspect.signature(call).bind(None, None)
+        except TypeError as error:
+            return f"write its method __call__(self, {argument}): {error}"
+        return _parameter_objection(it, keys)
+    if not callable(it):
+        return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
+    try:
+        inspect.signature(it).bind(None)
+    except TypeError as error:
+        return f"it is called with one argument, the {argument}: {error}"
+    except ValueError:  # a function of C tells no signature
+        return ""
+    return ""
+
+
+def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
+    """Return why a class cannot have its parameters, "" if it can; `taken` are names that mean something else."""
+    try:
+        fields = fields_of(cls)
+    except TypeError as error:
+        return str(error)
+    for field in fields:
+        if field.name in taken:
+            return (
+                f"its parameter {field.name} cannot be given, as a scenario has the key {field.name} for something "
+                "else; give it another name"
+            )
+        if field.required:
+            continue
+        try:
+            wrong = field.objection(msgspec.convert(field.default, field.type))
+        except msgspec.ValidationError:
+            wrong = f"must be {in_words(field.type)}, got {shown(field.default)}"
+        if wrong:
+            return f"{cls.__name__}.{field.name}: its default {wrong}"
+    return ""

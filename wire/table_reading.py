@@ -1,10 +1,9 @@
-"""Convert the tables of a file to structs by their annotations, and collect every problem on the way. Pure."""
+"""Convert the tables of a file by the annotations of a class, and collect every problem on the way. Pure."""
 
 from __future__ import annotations
 
 import functools
 import json
-import math
 import operator
 import types
 import typing
@@ -14,8 +13,20 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 import msgspec
 
 from wire.plausible import number_in
+from wire.printable import printable
 from wire.suggestion import suggestion
-from wire.table_schema import INHERITED, INLINE, NO_KEY, Example, Field, OtherKeys, Problem, Shorthand, fields_of, named
+from wire.table_schema import (
+    INHERITED,
+    INLINE,
+    NO_KEY,
+    Example,
+    Field,
+    OtherKeys,
+    Problem,
+    below,
+    contradictions,
+    fields_of,
+)
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -52,30 +63,75 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
     return reader.table(struct, data, ""), reader.problems
 
 
+def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
+    """Convert values for the parameters of a class, such as a law.
+
+    Returns
+    -------
+    tuple[dict[str, Any], list[Problem]]
+        The value of every parameter, by name; it is of use only without problems.
+
+    Examples
+    --------
+    >>> from agents.laws.dapi import Dapi
+    >>> for name, text in read_parameters(Dapi, {"k": 5000, "betta": 1, "a": "1"})[1]:  # doctest: +ELLIPSIS
+    ...     print(f"{name}: {text}")
+    betta: unknown parameter; did you mean "beta"? The parameters are P_set_min, P_set_max, ...
+    k: must be from 0.001 to 1000 s, got 5000
+    a: must be a number, got "1"; write 1
+    """
+    reader = _Reader(cls, "parameter")
+    return reader.values(cls, given, ""), reader.problems
+
+
+def parameter_values(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the value of every parameter of a class, converted to its type.
+
+    Raises
+    ------
+    ValueError
+        If a value is wrong or missing; the text has all problems.
+    """
+    values, problems = read_parameters(cls, given)
+    if problems:
+        raise ValueError("; ".join(f"{name}: {text}" for name, text in problems))
+    return values
+
+
 def shown(raw: object) -> str:
     """Return a value as TOML writes it, or nearly."""
-    return json.dumps(raw, ensure_ascii=False, default=str)
+    try:
+        text = json.dumps(raw, ensure_ascii=False, default=str)
+    except (TypeError, ValueError, RecursionError):  # what Python has and no file
+        text = repr(raw)
+    return printable(text, 1000)
 
 
 class _Reader:
-    """Reads one file whose top table is `root`."""
+    """Reads one file whose top table is `root`; `noun` is the word for a key."""
 
-    def __init__(self, root: type[msgspec.Struct]) -> None:
-        self._root = root
+    def __init__(self, root: type, noun: str = "key") -> None:
+        self._root, self._noun = root, noun
         self._top: dict[str, Any] = {}
         self.problems: list[Problem] = []
 
     def table(self, struct: type[T], data: Any, path: str, base: T | None = None) -> T:
         """Convert one table; what it leaves out comes from `base`, without one from the defaults."""
-        fields = [field for field in fields_of(struct) if not ({INLINE, NO_KEY} & {*map(str, field.marks)})]
+        return struct(**self.values(struct, data, path, base))
+
+    def values(self, struct: type, data: Any, path: str, base: Any = None) -> dict[str, Any]:
+        """Convert one table to the values of a class by name."""
+        noted = len(self.problems)
+        fields = [field for field in fields_of(struct) if not (INLINE in field.marks or NO_KEY in field.marks)]
         inline = [field for field in fields_of(struct) if INLINE in field.marks]
         others = next((field for field in fields if field.mark(OtherKeys)), None)
         keys = [field.key for field in fields if field is not others]
         keys += [key for field in inline for key in _keys(field.type)]
         values: dict[str, Any] = self._top if struct is self._root else {}
+        tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
         is_table = isinstance(data, Mapping)
         if not is_table:
-            self._add(path, f"must be a table with the keys {', '.join(keys)}, got {shown(data)}")
+            self._add(path, f"must be a table with the {self._noun}s {', '.join(keys)}, got {shown(data)}")
             data = {}
         for field in inline:
             values[field.name] = self.table(
@@ -88,7 +144,7 @@ class _Reader:
                 found: list[Problem] = []
                 values[others.name] += others.mark(OtherKeys).read(key, data[key], found)
                 self.problems += [Problem(_join(path, problem.path), problem.text) for problem in found]
-            elif key not in keys and key != struct.__struct_config__.tag_field:
+            elif key not in keys and key != tag:
                 self._add(_join(path, key), self._unknown(key, struct, keys))
         for field in fields:
             if field is others:
@@ -104,7 +160,12 @@ class _Reader:
                 if is_table:
                     self._add(_join(path, field.key), f"is missing; {_expected(field)}")
                 values[field.name] = _placeholder(field.type)
-        return struct(**values)
+        wrong = {problem.path for problem in self.problems[noted:]}
+        found = contradictions(
+            struct, types.SimpleNamespace(**values), lambda field: _join(path, field.key) not in wrong
+        )
+        self.problems += below(path, found)
+        return values
 
     def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
         """Convert the value of one key; return the default for a wrong one."""
@@ -132,13 +193,10 @@ class _Reader:
             self._add(path, _wrong_type(field, raw))
             return _fallback(field)
         wrong = ""
-        if isinstance(value, str) and not value.isprintable():
+        if isinstance(value, str) and not value.isprintable() and self._noun == "key":
             wrong = f"has characters that cannot be printed: {value!a}; write letters, digits and signs"
         elif isinstance(value, int | float) and not isinstance(value, bool):
-            shorthand = field.mark(Shorthand)
-            wrong = (named(shorthand.struct, shorthand.field) if shorthand else field).objection(value)
-            if not wrong and isinstance(value, float) and not math.isfinite(value):
-                wrong = f"must be a finite number, got {value}"
+            wrong = field.objection(value)
         if wrong:
             self._add(path, wrong)
             return _fallback(field)
@@ -164,42 +222,47 @@ class _Reader:
         for stem in [key] + ([bare] if unit in _KNOWN_UNITS else []):
             for right, word in _UNIT_WORDS.items():
                 if f"{stem}_{right}" in known:
-                    return f"unknown key; write {stem}_{right}, {word}"
+                    return f"unknown {self._noun}; write {stem}_{right}, {word}"
             if stem != key and stem in known:
-                return f"unknown key; write {stem}"
+                return f"unknown {self._noun}; write {stem}"
         if f"{key}s" not in known:
             for where, table in _tables(self._root):
                 if table is not struct and key in _keys(table):
                     return f"unknown key here; it belongs {where}"
-        return f"unknown key; {suggestion(key, known, 'keys')}"
+        return f"unknown {self._noun}; {suggestion(key, known, f'{self._noun}s')}"
 
     def _add(self, path: str, text: str) -> None:
         self.problems.append(Problem(path, text))
 
 
-def _tables(root: type[msgspec.Struct]) -> Iterator[tuple[str, type[msgspec.Struct]]]:
+def _tables(root: type) -> Iterator[tuple[str, type]]:
     """Yield every table of a file with the words that say where it is, the outer ones first."""
     yield "at the top of the file, before any table", root
-    below = [("", root)]
-    while below:
-        path, struct = below.pop(0)
+    further = [("", root)]
+    while further:
+        path, struct = further.pop(0)
         for field in fields_of(struct):
             kind, key = field.type, _join(path, field.key)
             if INLINE in field.marks:
-                below.append((path, kind))
+                further.append((path, kind))
             elif _structs(kind) == [kind]:
                 yield f"into [{key}]", kind
-                below.append((key, kind))
+                further.append((key, kind))
             elif (inner := _inner_struct(kind, dict)) is not None:
                 yield f"into [{key}.NAME]", inner
-                below.append((f"{key}.NAME", inner))
+                further.append((f"{key}.NAME", inner))
             elif (inner := _inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
                 yield f"into [[{key}]]", inner
 
 
-def _keys(struct: type[msgspec.Struct]) -> list[str]:
+def _keys(struct: type) -> list[str]:
     """Return the keys of a table."""
     return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(OtherKeys))]
+
+
+def kinds_of(kind: Any) -> tuple[Any, ...]:
+    """Return the types of which a value may be one; None is none, as TOML has no null."""
+    return _parts(_without_none(kind))
 
 
 def _without_none(kind: Any) -> Any:
@@ -263,6 +326,7 @@ def in_words(*kinds: Any) -> str:
     >>> in_words(Literal["a", "b"], list[float])
     'one of "a", "b" or a list of numbers'
     """
+    kinds = tuple(part for kind in kinds for part in kinds_of(kind))
     words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(_structs(kind))))
     return " or ".join(words)
 

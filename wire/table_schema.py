@@ -1,19 +1,25 @@
-"""What the fields of a struct say about a table of a file: annotations, keys with units, and ranges. Pure.
+"""What the fields of a class say about a table of a file: annotations, keys with units, and ranges. Pure.
 
-A table is a `msgspec.Struct` whose fields carry annotations:
+A table is a `msgspec.Struct`, or any class with parameters, such as a law. Its fields carry annotations:
 
     class Time(msgspec.Struct, frozen=True, kw_only=True):
         T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
 
-`wire.table_reading` reads tables by them, and the reference pages and the writer take keys and units from them.
+    class Mine(Law):
+        gain: Annotated[float, Unit("1/s"), Range(0, 100), "Rate of the consensus."] = 5.0
+
+A field without a default must be given. Of a class that is no struct, names that begin with "_" and class variables are
+no fields. `wire.table_reading` reads tables by the fields; the reference pages, the writer of scenarios and the axes of
+plots take keys, units and ranges from them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, NamedTuple, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -64,14 +70,43 @@ class OtherKeys:
     read: Callable[[str, Any, list[Problem]], tuple[Any, ...]]
 
 
-INLINE = "inline"
+@dataclass(frozen=True)
+class Below:
+    """A number that must be less than that of another field."""
+
+    field: str
+    """Name of the other field."""
+    or_equal: bool = False
+    """Whether both may be equal."""
+    only_with: str = ""
+    """Name of a field without which, or with 0 in which, the relation does not hold."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """Words for the field beside its unit: at an axis, or over a column."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Flag:
+    """An annotation that says one thing."""
+
+    name: str
+
+
+INLINE = Flag("inline")
 """Annotation of a field whose struct has its keys in the table around it."""
 
-NO_KEY = "no key"
+NO_KEY = Flag("no key")
 """Annotation of a field that no file gives."""
 
-INHERITED = "inherited"
+INHERITED = Flag("inherited")
 """Annotation of a table that takes what it leaves out from the table of the same name at the top of the file."""
+
+
+_RANGES = (Plausible, Probability, Range)
 
 
 class Field(NamedTuple):
@@ -80,45 +115,68 @@ class Field(NamedTuple):
     name: str
     """Of the attribute."""
     key: str
-    """In the file: the name, with its unit at the end where the unit can be a part of a key."""
+    """In the file: the name, of a struct with its unit at the end where the unit can be a part of a key."""
     type: Any
     """Without annotations."""
     marks: tuple[Any, ...]
     """The annotations."""
-    info: msgspec.structs.FieldInfo
-    """As msgspec has it."""
+    make_default: Callable[[], Any] | None
+    """Makes the value if none is given; None if a table must have the key."""
 
     def mark(self, kind: Any) -> Any:
         """Return the annotation of a class, None if there is none."""
         return next((mark for mark in self.marks if isinstance(mark, kind)), None)
 
     @property
+    def number(self) -> Field:
+        """The field that says unit and range of the number: of a shorthand that of its struct, else this one."""
+        shorthand = self.mark(Shorthand)
+        return named(shorthand.struct, shorthand.field) if shorthand else self
+
+    @property
     def unit(self) -> str:
         """Unit of the number, "" if it has none."""
-        unit = self.mark(Unit)
+        unit = self.number.mark(Unit)
         return unit.text if unit else ""
+
+    @property
+    def span(self) -> str:
+        """Range of the number in words, "" if it has none."""
+        allowed = self.number.mark(_RANGES)
+        return allowed.span if allowed else ""
+
+    @property
+    def help(self) -> str:
+        """Sentence among the annotations, "" if there is none; else the docstring under the field has it."""
+        return next((mark for mark in self.marks if isinstance(mark, str)), "")
 
     @property
     def required(self) -> bool:
         """Whether a table must have the key."""
-        return self.info.required
+        return self.make_default is None
 
     @property
     def default(self) -> Any:
         """Value if none is given."""
-        if self.info.default is not msgspec.NODEFAULT:
-            return self.info.default
-        return self.info.default_factory()
+        assert self.make_default is not None, self.name
+        return self.make_default()
 
     def objection(self, value: Any) -> str:
         """Return why a number cannot be the field's, "" if it can."""
-        allowed = self.mark((Plausible, Probability, Range))
-        return allowed.objection(value, self.unit) if allowed else ""
+        allowed = self.number.mark(_RANGES)
+        if text := allowed.objection(value, self.unit) if allowed else "":
+            return str(text)
+        return f"must be a finite number, got {value}" if isinstance(value, float) and not math.isfinite(value) else ""
 
 
 @cache
-def fields_of(struct: type[msgspec.Struct]) -> tuple[Field, ...]:
-    """Return the fields of a struct in their order.
+def fields_of(cls: type) -> tuple[Field, ...]:
+    """Return the fields of a class in their order, those of its base classes first.
+
+    Raises
+    ------
+    TypeError
+        If an annotation of a class that is no struct cannot be read.
 
     Examples
     --------
@@ -129,20 +187,47 @@ def fields_of(struct: type[msgspec.Struct]) -> tuple[Field, ...]:
     >>> [field.key for field in fields_of(Filter)]
     ['T_s', 'delay_s', 'k']
     """
+    if not issubclass(cls, msgspec.Struct):
+        return tuple(_parameters(cls))
     found = []
-    for info in msgspec.structs.fields(struct):
-        kind, marks = (get_args(info.type)[0], get_args(info.type)[1:]) if _annotated(info.type) else (info.type, ())
-        unit = next((mark.text for mark in marks if isinstance(mark, Unit)), "")
+    for info in msgspec.structs.fields(cls):
+        kind, marks = _apart(info.type)
+        unit = next((mark.text for mark in marks if isinstance(mark, Unit) and mark.in_key), "")
         suffix = f"_{unit}" if unit.isidentifier() else ""
         key = info.encode_name if info.encode_name.endswith(suffix) else info.encode_name + suffix
-        found.append(Field(info.name, key, kind, marks, info))
+        make: Callable[[], Any] | None = None
+        if not info.required:
+            given = info.default is not msgspec.NODEFAULT
+            make = _constant(info.default) if given else info.default_factory
+        found.append(Field(info.name, key, kind, marks, make))
     return tuple(found)
+
+
+def _parameters(cls: type) -> Iterable[Field]:
+    """Yield the fields of a class that is no struct."""
+    try:
+        hints = get_type_hints(cls, include_extras=True)
+    except Exception as error:  # a name in an annotation may lead to anything
+        raise TypeError(f"the annotations of {cls.__name__} cannot be read: {error}") from None
+    for name, hint in hints.items():
+        if not (name.startswith("_") or get_origin(hint) is ClassVar or hint is ClassVar):
+            kind, marks = _apart(hint)
+            yield Field(name, name, kind, marks, _constant(getattr(cls, name)) if hasattr(cls, name) else None)
+
+
+def _apart(hint: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return a type and its annotations."""
+    return (get_args(hint)[0], get_args(hint)[1:]) if get_origin(hint) is Annotated else (hint, ())
+
+
+def _constant(value: Any) -> Callable[[], Any]:
+    return lambda: value
 
 
 def problems_of(struct: msgspec.Struct) -> list[Problem]:
     """Return the numbers of a struct, and of the structs below it, that are out of range.
 
-    Without one, return what its method `relations` finds, if it has one: what its values ask of each other.
+    Without one, return where its values contradict each other: by `Below`, and by its method `relations` if it has one.
 
     Examples
     --------
@@ -154,19 +239,49 @@ def problems_of(struct: msgspec.Struct) -> list[Problem]:
     found: list[Problem] = []
     for field in fields_of(type(struct)):
         value = getattr(struct, field.name)
-        shorthand = field.mark(Shorthand)
         if isinstance(value, msgspec.Struct):
             found += below(field.key, problems_of(value))
-        elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            judge = named(shorthand.struct, shorthand.field) if shorthand else field
-            if text := judge.objection(value):
-                found.append(Problem(field.key, text))
-    return found or list(getattr(struct, "relations", list)())
+        elif isinstance(value, (int, float)) and not isinstance(value, bool) and (text := field.objection(value)):
+            found.append(Problem(field.key, text))
+    return found or [*contradictions(type(struct), struct), *getattr(struct, "relations", list)()]
 
 
-def named(struct: type[msgspec.Struct], name: str) -> Field:
-    """Return one field of a struct."""
-    return next(field for field in fields_of(struct) if field.name == name)
+def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
+    """Return the numbers that are not below those of other fields, as they must be.
+
+    Parameters
+    ----------
+    cls : type
+        Whose fields are looked at.
+    values : Any
+        Has the values as attributes.
+    known : Callable[[Field], bool], optional
+        Whether a field has a right value; else nothing is said of it.
+
+    Examples
+    --------
+    >>> class Limits(msgspec.Struct):
+    ...     P_min: Annotated[float, Unit("pu"), Below("P_max")] = 0.0
+    ...     P_max: Annotated[float, Unit("pu")] = 1.0
+    >>> contradictions(Limits, Limits(P_min=2.0))
+    [Problem(path='P_min_pu', text='2 must be below P_max_pu = 1; swap them or set both')]
+    """
+    found = []
+    for field in fields_of(cls):
+        if (below := field.mark(Below)) is None or (below.only_with and not getattr(values, below.only_with)):
+            continue
+        other = named(cls, below.field)
+        low, high = getattr(values, field.name), getattr(values, other.name)
+        if known(field) and known(other) and (low > high if below.or_equal else low >= high):
+            rule = "not be above" if below.or_equal else "be below"
+            text = f"{low:g} must {rule} {other.key} = {high:g}; swap them or set both"
+            found.append(Problem(field.key, text))
+    return found
+
+
+def named(cls: type, name: str) -> Field:
+    """Return one field of a class."""
+    return next(field for field in fields_of(cls) if field.name == name)
 
 
 def below(path: str, problems: Iterable[Problem]) -> list[Problem]:
@@ -177,8 +292,4 @@ def below(path: str, problems: Iterable[Problem]) -> list[Problem]:
     >>> below("link[2]", [Problem("loss.p", "wrong"), Problem("", "empty")])
     [Problem(path='link[2].loss.p', text='wrong'), Problem(path='link[2]', text='empty')]
     """
-    return [Problem(f"{path}.{problem.path}" if problem.path else path, problem.text) for problem in problems]
-
-
-def _annotated(kind: Any) -> bool:
-    return get_origin(kind) is Annotated
+    return [Problem(".".join(filter(None, (path, problem.path))), problem.text) for problem in problems]

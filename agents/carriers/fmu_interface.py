@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from wire.parameters import objections
 from wire.printable import printable
 from wire.suggestion import suggestion
+from wire.table_reading import read_parameters
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 """Inputs of the own inverter."""
@@ -70,7 +70,7 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
         for name, value in parameters.items()
         if name in settable and (isinstance(value, bool) or not isinstance(value, int | float))
     ]
-    found += objections(Law, limits_in(parameters))
+    found += read_parameters(Law, limits_in(parameters))[1]
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from agents.laws.law import Law
-from wire.plugin_shape import class_objection
+from wire.plugin import class_objection
 from wire.registry import Registry
 
 CARRIERS = ("use", "command", "fmu")

@@ -14,8 +14,9 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from wire.parameters import values_of
 from wire.plausible import Range, Unit
+from wire.table_reading import parameter_values
+from wire.table_schema import Below
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""
@@ -101,7 +102,7 @@ class SetPoints(NamedTuple):
 
 
 class Law:
-    """Base of all laws. Parameters are annotated attributes (`wire.parameters`).
+    """Base of all laws. Parameters are annotated attributes (`wire.table_schema`).
 
     Parameters
     ----------
@@ -131,13 +132,17 @@ class Law:
     source: ClassVar[str] = ""
     """Publication that the law is from."""
 
-    P_set_min: Annotated[float, Unit("pu"), Range(-100, 100), "Lower limit of P_set."] = 0.0
+    P_set_min: Annotated[
+        float, Unit("pu"), Range(-100, 100), Below("P_set_max", or_equal=True), "Lower limit of P_set."
+    ] = 0.0
     P_set_max: Annotated[float, Unit("pu"), Range(-100, 100), "Upper limit of P_set."] = 1.0
-    V_set_min: Annotated[float, Unit("pu"), Range(0, 10), "Lower limit of V_set."] = 0.9
+    V_set_min: Annotated[
+        float, Unit("pu"), Range(0, 10), Below("V_set_max", or_equal=True), "Lower limit of V_set."
+    ] = 0.9
     V_set_max: Annotated[float, Unit("pu"), Range(0, 10), "Upper limit of V_set."] = 1.1
 
     def __init__(self, **parameters: Any) -> None:
-        for name, value in values_of(type(self), parameters).items():
+        for name, value in parameter_values(type(self), parameters).items():
             setattr(self, name, value)
 
     def start(self, own: Own) -> None:

@@ -20,11 +20,10 @@ import msgspec
 
 from netem.draws import Stream
 from wire.anybody import ANYTHING, named
-from wire.parameters import values_of
-from wire.plugin import Plugin, made
-from wire.plugin_shape import class_objection
+from wire.plugin import Plugin, class_objection, made
 from wire.printable import printable
 from wire.registry import Registry
+from wire.table_reading import parameter_values
 
 LONGEST = 3600.0
 """Longest delay (s) that a fault may add."""
@@ -70,7 +69,7 @@ class MessageDraws:
 
 
 class LinkFault:
-    """Base of all faults of somebody's own. Parameters are annotated attributes (`wire.parameters`).
+    """Base of all faults of somebody's own. Parameters are annotated attributes (`wire.table_schema`).
 
     There is one object per link and entry. What `judge` returns should depend on the message and the draws alone: a
     receiver that joins late has not seen the messages before.
@@ -82,7 +81,7 @@ class LinkFault:
     """
 
     def __init__(self, **parameters: Any) -> None:
-        for name, value in values_of(type(self), parameters).items():
+        for name, value in parameter_values(type(self), parameters).items():
             setattr(self, name, value)
 
     def judge(self, message: LinkMessage, draws: MessageDraws) -> float | None:

@@ -140,7 +140,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             text = "does nothing; give it one of profile, " + ", ".join(KINDS)
             found.append(Problem("cut" if self.cut is False else "", text))
         for plugin in self.own:
-            found += below(plugin.name, [Problem(*wrong) for wrong in plugin_problems(FAULTS, plugin)])
+            found += below(plugin.name, plugin_problems(FAULTS, plugin))
         return found
 
 

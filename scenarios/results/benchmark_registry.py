@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from wire.anybody import ANYTHING, named
-from wire.plugin import plugin_of
-from wire.plugin_shape import callable_objection
+from wire.plugin import callable_objection, plugin_of
 from wire.printable import printable
 from wire.registry import Registry
 

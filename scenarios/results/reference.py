@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 import msgspec
 
@@ -12,13 +13,13 @@ from netem.schema.fault import Fault
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
-from scenarios.field_docs import FieldDoc, alias_docs, class_doc, field_docs
+from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
 from scenarios.results.own import pages as own_pages
 from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, ScenarioModel, Time
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
-from wire.table_schema import INLINE, fields_of
+from wire.table_schema import fields_of
 
 TOPICS = ("keys", "messages", "scenario", *own_pages.PAGES)
 """Pages there are."""
@@ -62,7 +63,7 @@ def _keys() -> Iterator[str]:
     yield ""
     header = ("key", "kind", "message", "from", "to", "when")
     rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.describe())
-    yield from _table(header, rows)
+    yield from markdown_table(header, rows)
 
 
 def _messages() -> Iterator[str]:
@@ -80,33 +81,23 @@ def _messages() -> Iterator[str]:
     yield ""
     yield "## Types, and their bounds"
     yield ""
-    yield from _table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
+    yield from markdown_table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
     yield ""
     yield "## Kinds of refused messages"
     yield ""
-    yield from _table(("kind", "meaning"), KINDS.items())
+    yield from markdown_table(("kind", "meaning"), KINDS.items())
 
 
 def _scenario() -> Iterator[str]:
     yield "# The scenario file"
     yield ""
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
-    yield "inverter's own rating or nominal voltage). What has no default must be given. Gains have the units told"
-    yield "here."
+    yield "inverter's own rating or nominal voltage). What has no default must be given. A value out of its range is an"
+    yield "error, and so is an unknown key."
     for title, cls in _SCENARIO_TABLES:
-        by_name = {field.info.encode_name: field.key for field in fields_of(cls)}
-        by_name |= {"own": '"mine:Name"'} if cls is Fault else {}  # what it is called in the file is up to its author
-        yield ""
-        yield f"## {title}"
-        yield ""
-        yield class_doc(cls)
-        yield ""
-        rows = [
-            (f"`{by_name[doc.name]}`", _default(doc), doc.text)
-            for doc in field_docs(cls)
-            if not _is_table(cls, doc.name)
-        ]
-        yield from _table(("key", "default", "meaning"), rows)
+        yield from ("", f"## {title}", "", class_doc(cls), "")
+        elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
+        yield from field_table(cls, left_out=elsewhere)
 
 
 def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterable[str] = ()) -> Iterator[str]:
@@ -116,33 +107,10 @@ def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterab
     if text:
         yield from (text, "")
     if rows:
-        yield from _table(("field", "type", "meaning"), rows)
+        yield from markdown_table(("field", "type", "meaning"), rows)
 
 
-def _is_table(cls: type, key: str) -> bool:
-    """Return whether a field is a table of its own, which has a section of its own."""
-    if cls in (Fault, NodeFault):  # their models are written on one line; docs/netem.md has them
-        return False
-    field = next(field for field in fields_of(cls) if field.info.encode_name == key)
-    if INLINE in field.marks:
-        return True
-    inner = [field.type, *typing.get_args(field.type)]
-    return cls is not Case and any(isinstance(part, type) and issubclass(part, msgspec.Struct) for part in inner)
-
-
-def _default(doc: FieldDoc) -> str:
-    if not doc.default:
-        return "required"
-    if doc.default.startswith(("Gains(", "Handling(")):
-        return f"`[{doc.name}]`"
-    if doc.default == "None":
-        return "none"
-    shown = doc.default.replace("'", '"').replace("()", "[]")
-    return f"`{ {'True': 'true', 'False': 'false'}.get(shown, shown) }`"
-
-
-def _table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    yield f"| {' | '.join(header)} |"
-    yield f"|{'---|' * len(header)}"
-    for row in rows:
-        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"
+def _has_section(kind: Any) -> bool:
+    """Return whether a field is a table, or a list of tables, with a section of its own."""
+    tables = {cls for _, cls in _SCENARIO_TABLES}
+    return kind in tables or any(_has_section(part) for part in typing.get_args(kind))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,11 @@ from agents.laws.law import Law, limits_in
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import LawKey, ScenarioModel
 from wire.module_folder import folder_of
-from wire.parameters import objections
 from wire.path_text import is_no_path
 from wire.plausible import Range
 from wire.plugin import scalar_objection, table_of
 from wire.registry import PluginError
+from wire.table_reading import read_parameters
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
@@ -124,10 +124,6 @@ def _wrong_values(table: Mapping[str, Any]) -> dict[str, str]:
         wrong["command"] = "has a character in it that is no text"
     if text := _limit_problem(table.get("time_limit_s", 1.0)):
         wrong["time_limit_s"] = text
-    for low, high in (("P_set_min", "P_set_max"), ("V_set_min", "V_set_max")):
-        least, most = (table.get(key, getattr(Law, key)) for key in (low, high))
-        if isinstance(least, int | float) and isinstance(most, int | float) and least > most:
-            wrong[low if low in table else high] = f"{low} = {least:g} pu is above {high} = {most:g} pu"
     for key, value in table.items():
         if key not in KEYS and (text := scalar_objection(value)):
             wrong[key] = text
@@ -138,7 +134,7 @@ def _limit_problem(given: Any) -> str:
     return TIME_LIMIT.objection(given, "s")
 
 
-def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     use = table["use"]
     if use == PAPER:
         text = f'the parameters of "{PAPER}" are those of [gains] and [handling]; write them there'
@@ -147,7 +143,7 @@ def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> lis
         law = LAWS.resolve(use, table.get("folder", ""))
     except PluginError as error:
         return [("use", str(error))]
-    wrong = objections(law, parameters)
+    wrong = read_parameters(law, parameters)[1]
     if wrong:
         return wrong
     limit = table.get("time_limit_s", LawChoice().time_limit)
@@ -159,7 +155,7 @@ def _check_class(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> lis
     return [("use", f"the close of {use} failed: {failed}")] if failed else []
 
 
-def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     program, folder = table["command"][0], Path(table.get("folder", ""))
     if any("\0" in word for word in table["command"]):
         return [("command", "has the character 0 in it, which no command can have")]
@@ -169,13 +165,13 @@ def _check_program(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> l
     if found := shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
         if text := executable_problem(Path(found)):
             return [("command", f"{program} {text}")]
-        return objections(Law, limits_in(parameters))
+        return read_parameters(Law, limits_in(parameters))[1]
     if place.is_file():
         return [("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
     return [("command", f"there is no program {program}, neither beside the scenario nor on the PATH")]
 
 
-def _check_fmu(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _check_fmu(table: Mapping[str, Any], parameters: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     from agents.carriers.fmu import load_problem
     from agents.carriers.fmu_interface import fmu_problems
 

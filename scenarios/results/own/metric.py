@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from wire.anybody import ANYTHING, named
-from wire.plugin import Plugin, made
-from wire.plugin_shape import KEYS, callable_objection
+from wire.plugin import KEYS, Plugin, callable_objection, made
 from wire.printable import printable
 from wire.registry import PluginError, Registry
 

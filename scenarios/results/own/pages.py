@@ -6,19 +6,16 @@ import inspect
 from collections.abc import Iterator
 from typing import Any
 
-import msgspec
-
 from agents import graphs
 from agents.carriers.law_registry import LAWS
 from agents.graphs import GRAPHS
 from netem.models import own_fault as faults
 from netem.models.own_fault import FAULTS
-from scenarios.field_docs import field_docs
+from scenarios.field_docs import field_table
 from scenarios.results import claims
 from scenarios.results.benchmark_registry import CLAIMS
 from scenarios.results.own import metric
 from scenarios.results.own.metric import METRICS
-from wire.parameters import parameters_of
 from wire.registry import PluginError, Registry
 
 _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
@@ -62,7 +59,7 @@ def page(topic: str) -> Iterator[str]:
 
 
 def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
-    """Return the sentence and parameters of one."""
+    """Yield the sentence and the parameters of one."""
     try:
         it = registry.resolve(name)
     except PluginError as error:  # an entry point of somebody's that is broken
@@ -71,10 +68,5 @@ def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
     yield (inspect.getdoc(it) or "").partition("\n\n")[0].replace("\n", " ") or "Its author tells nothing of it."
     if not isinstance(it, type):
         return
-    if issubclass(it, msgspec.Struct):
-        lines = [f"{doc.name} = {doc.default or 'must be given'}: {doc.text}" for doc in field_docs(it) if doc.text]
-    else:
-        lines = [str(parameter) for parameter in parameters_of(it).values()]
-    if lines:
-        yield ""
-        yield from (f"- {line}" for line in lines)
+    if lines := list(field_table(it)):
+        yield from ("", *lines)

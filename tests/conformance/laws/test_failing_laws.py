@@ -102,7 +102,7 @@ def _text(path: Path) -> str:
     ({"command": ["./nothing"]}, r"case.IV.law.command: there is no program ./nothing, neither beside"),
     ({"command": ["ls", "a\0"]}, r"case.IV.law.command: has the character 0 in it"),
     ({"command": ["ls"], "folder": "/nowhere"}, r"case.IV.law.folder: there is no folder /nowhere"),
-    ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: P_set_min = 1 pu is above P_set_max = 0.5"),
+    ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: 1 must not be above P_set_max = 0.5"),
     ({"command": ["ls"], "P_set_max": "much"}, r'case.IV.law.P_set_max: must be a number, got "much"'),
     ({"command": "./nothing"}, r"case.IV.law.command: must be a list of texts, the program first"),
     ({"fmu": "x.fmu"}, r"case.IV.law.fmu: there is no file x.fmu; write its path, seen from the scenario"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agents.agent_config import Gains, Handling
 from agents.degraded_communication import gains_in_force
 from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
-from wire.parameters import parameters_of
+from wire.table_schema import fields_of
 
 Matrix = NDArray[np.float64]
 
@@ -307,7 +307,7 @@ def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: floa
 
 def test_the_papers_law_has_the_parameters_and_defaults_of_its_table() -> None:
     """`[gains]` and the class that takes them are declared apart, and say the same."""
-    defaults = {name: parameter.default for name, parameter in parameters_of(Consensus).items()}
+    defaults = {field.name: field.default for field in fields_of(Consensus)}
 
     assert defaults.pop("kappa_c") == 0.0
     assert defaults == msgspec.structs.asdict(Gains())
