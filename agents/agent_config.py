@@ -8,6 +8,7 @@ import msgspec
 
 from wire.plausible import Plausible, Unit
 from wire.plugin import Plugin
+from wire.table_schema import Below, Label
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
@@ -16,26 +17,32 @@ MAX_AGE = 0.25
 class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Gains and limits of the secondary law (12)-(15), per unit of own rating, w in pu."""
 
-    k_p: Annotated[float, Plausible("gain k_p", 1e-7, 1e3, above_zero=True)] = 0.0007
-    """P_set gain (s; pu frequency per (pu power / s)). kappa = m_p / k_p is the rate, 1/s. > 0."""
-    k_q: Annotated[float, Plausible("gain k_q", 1e-5, 1e5, above_zero=True)] = 0.25
-    """V_set gain (s; pu reactive droop per (pu voltage / s)). > 0."""
-    alpha: Annotated[float, Plausible("gain alpha", 0.0, 1e4)] = 1.0
-    """Weight of the voltage error in (15), GFM only. >= 0."""
-    beta_GFM: Annotated[float, Plausible("gain beta_GFM", 0.0, 1e4)] = 1.0
-    """Weight of the var-sharing sum in (15). >= 0."""
-    beta_GFL: Annotated[float, Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
-    """Weight of the var-sharing sum of a GFL, (14). The paper has 1. >= 0."""
-    alpha_min: Annotated[float, Plausible("gain alpha_min", 0.0, 1e4)] = 0.0
-    """Least weight of a small voltage error, for V_full. 0 <= alpha_min < alpha."""
+    k_p: Annotated[
+        float, Unit("s", in_key=False), Label("gain of P_set, k_p"), Plausible("gain k_p", 1e-7, 1e3, above_zero=True)
+    ] = 0.0007
+    """P_set gain (s; pu frequency per (pu power / s)). kappa = m_p / k_p is the rate, 1/s."""
+    k_q: Annotated[
+        float, Unit("s", in_key=False), Label("gain of V_set, k_q"), Plausible("gain k_q", 1e-5, 1e5, above_zero=True)
+    ] = 0.25
+    """V_set gain (s; pu reactive droop per (pu voltage / s))."""
+    alpha: Annotated[float, Label("weight of the voltage error, alpha"), Plausible("gain alpha", 0.0, 1e4)] = 1.0
+    """Weight of the voltage error in (15), GFM only."""
+    beta_GFM: Annotated[float, Label("weight of var sharing, GFM, beta"), Plausible("gain beta_GFM", 0.0, 1e4)] = 1.0
+    """Weight of the var-sharing sum in (15)."""
+    beta_GFL: Annotated[float, Label("weight of var sharing, GFL, beta"), Plausible("gain beta_GFL", 0.0, 1e4)] = 1.0
+    """Weight of the var-sharing sum of a GFL, (14). The paper has 1."""
+    alpha_min: Annotated[float, Below("alpha", only_with="V_full"), Plausible("gain alpha_min", 0.0, 1e4)] = 0.0
+    """Least weight of a small voltage error, for V_full; below alpha."""
     V_full: Annotated[float, Unit("pu"), Plausible("a voltage error", 0.0, 0.2)] = 0.0
     """Voltage error (pu) from which on alpha counts in full; a smaller one counts in proportion, but not below
     alpha_min. 0: always in full, the paper's way."""
-    P_set_min: Annotated[float, Unit("pu"), Plausible("a limit of P_set", -1.2, 1.2)] = 0.0
+    P_set_min: Annotated[float, Unit("pu"), Below("P_set_max"), Plausible("a limit of P_set", -1.2, 1.2)] = 0.0
     """Lower limit of P_set (pu), anti-windup."""
     P_set_max: Annotated[float, Unit("pu"), Plausible("a limit of P_set", -1.2, 2.0)] = 1.0
     """Upper limit of P_set (pu), anti-windup."""
-    V_set_min: Annotated[float, Unit("pu"), Plausible("a limit of V_set", 0.5, 1.5, above_zero=True)] = 0.9
+    V_set_min: Annotated[
+        float, Unit("pu"), Below("V_set_max"), Plausible("a limit of V_set", 0.5, 1.5, above_zero=True)
+    ] = 0.9
     """Lower limit of V_set (pu), anti-windup."""
     V_set_max: Annotated[float, Unit("pu"), Plausible("a limit of V_set", 0.5, 1.5, above_zero=True)] = 1.1
     """Upper limit of V_set (pu), anti-windup."""
@@ -51,15 +58,15 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Neighbours' states that are not new: the last one counts in full ("hold"), not at all ("skip"), or ever less the
     older it is beside what is usual of its link ("age-weighted")."""
     T_age: Annotated[float, Unit("s"), Plausible("a time in which a state ages", 1e-3, 60.0, above_zero=True)] = 0.2
-    """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted". > 0."""
+    """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted"."""
     max_age: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 60.0)] = 0.0
     """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in wall-clock time."""
     weights: Literal["paper", "degree-normalised"] = "paper"
     """Weights c_ij of the neighbours: 1, or 1 over their number."""
     kappa_c: Annotated[float, Unit("1/s"), Plausible("gain kappa_c", 1e-3, 1e4, above_zero=True)] = 12.0
-    """Gain (1/s) of the consensus on m_p P_set, for "degree-normalised"; the leaders' gain stays m_p / k_p. > 0."""
+    """Gain (1/s) of the consensus on m_p P_set, for "degree-normalised"; the leaders' gain stays m_p / k_p."""
     beta_c: Annotated[float, Plausible("factor beta_c", 0.0, 1e4)] = 8.0
-    """Factor on beta_GFM and beta_GFL, for "degree-normalised"; the paper's is the number of neighbours. >= 0."""
+    """Factor on beta_GFM and beta_GFL, for "degree-normalised"; the paper's is the number of neighbours."""
     anti_windup: Literal["clamp", "none", "conditional"] = "clamp"
     """Set-points of a saturated inverter: limited ("clamp"), free ("none", the paper's Remark 2), or limited and also
     not integrated further ("conditional")."""
@@ -67,7 +74,7 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         float, Unit("s"), Plausible("a time until an inverter counts as saturated", 1e-3, 60.0, above_zero=True)
     ] = 0.5
     """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
-    "conditional". > 0."""
+    "conditional"."""
     islands: Literal["switches", "frequency", "ignored"] = "switches"
     """How an agent knows which neighbours stand in another island, to leave them out: it is told ("switches"), it sees
     them fall out of step ("frequency"), or it does not ("ignored"). Whether the grid is there it is always told."""

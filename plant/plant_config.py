@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from wire.plausible import Plausible, Unit
-from wire.table_schema import Example
+from wire.table_schema import Below, Example
 
 TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
 Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]
@@ -38,36 +38,36 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Filter of measured V (s)."""
     P_max: LimitOfP = 1.0
     """Overload limit (pu)."""
-    P_min: LimitOfP = 0.0
+    P_min: Annotated[LimitOfP, Below("P_max")] = 0.0
     """Under-load limit (pu)."""
-    k_pp: Gain = 3.0
+    k_pp: Annotated[Gain, Unit("rad/s per pu")] = 3.0
     """Proportional gain of the P limiters (rad/s per pu)."""
-    k_ip: Gain = 60.0
+    k_ip: Annotated[Gain, Unit("rad/s^2 per pu")] = 60.0
     """Integral gain of the P limiters (rad/s^2 per pu)."""
-    w_lim: Annotated[float, Plausible("the limiters' bound w_lim", 0.1, 1e4, above_zero=True)] = 200.0
+    w_lim: Annotated[float, Unit("rad/s"), Plausible("the limiters' bound w_lim", 0.1, 1e4, above_zero=True)] = 200.0
     """Bound of the P limiters' output (rad/s)."""
     Q_max: LimitOfQ = 10.0
     """Upper reactive limit (pu)."""
-    Q_min: LimitOfQ = -10.0
+    Q_min: Annotated[LimitOfQ, Below("Q_max")] = -10.0
     """Lower reactive limit (pu)."""
-    k_pq: Gain = 3.0
+    k_pq: Annotated[Gain, Unit("pu V per pu")] = 3.0
     """Proportional gain of the Q limiters (pu V per pu)."""
-    k_iq: Gain = 20.0
+    k_iq: Annotated[Gain, Unit("pu V per pu s")] = 20.0
     """Integral gain of the Q limiters (pu V per pu s)."""
     V_lim: Annotated[float, Unit("pu"), Plausible("the limiters' bound V_lim", 0.01, 10.0, above_zero=True)] = 10.0
     """Bound of the Q limiters' output (pu V)."""
     k_pv: Gain = 0.0
     """Proportional gain of the voltage controller."""
-    k_iv: Gain = 5.86
+    k_iv: Annotated[Gain, Unit("1/s")] = 5.86
     """Integral gain of the voltage controller (1/s)."""
-    E_min: InternalVoltage = 0.0
+    E_min: Annotated[InternalVoltage, Below("E_max")] = 0.0
     """Lower bound of the internal voltage (pu)."""
     E_max: InternalVoltage = 1.25
     """Upper bound of the internal voltage (pu)."""
     P_set_lim: BoundOfPset = 3.0
     """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
     unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
-    V_set_min: BoundOfVset = 0.8
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
     """Lower bound of V_set (pu)."""
     V_set_max: BoundOfVset = 1.2
     """Upper bound of V_set (pu)."""
@@ -82,13 +82,13 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Filter resistance (pu)."""
     X_f: Reactance = 0.15
     """Filter reactance (pu)."""
-    k_pPLL: Gain = 50.0
+    k_pPLL: Annotated[Gain, Unit("rad/s per pu")] = 50.0
     """PLL proportional gain (rad/s per pu)."""
-    k_iPLL: Gain = 900.0
+    k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu")] = 900.0
     """PLL integral gain (rad/s^2 per pu)."""
-    k_pc: Gain = 0.05
+    k_pc: Annotated[Gain, Unit("pu", in_key=False)] = 0.05
     """Current controller, proportional (pu)."""
-    k_ic: Gain = 5.0
+    k_ic: Annotated[Gain, Unit("1/s")] = 5.0
     """Current controller, integral (1/s)."""
     F_current: Annotated[float, Plausible("the cross-coupling gain F_current", 0.0, 1.0)] = 0.6
     """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
@@ -117,7 +117,7 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Dead band above V_set (pu)."""
     P_max: LimitOfP = 1.0
     """Upper bound of the P reference (pu)."""
-    P_min: LimitOfP = -1.0
+    P_min: Annotated[LimitOfP, Below("P_max")] = -1.0
     """Lower bound of the P reference (pu)."""
     S_max: Capacity = 1.2
     """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
@@ -126,7 +126,7 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     P_set_lim: BoundOfPset = 1.0
     """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
     set-point that was wound up delay the inverter's response."""
-    V_set_min: BoundOfVset = 0.8
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
     """Lower bound of V_set (pu)."""
     V_set_max: BoundOfVset = 1.2
     """Upper bound of V_set (pu)."""

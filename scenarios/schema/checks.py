@@ -24,7 +24,7 @@ _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "s
 
 
 def check_names(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note names that cannot become folders, labels that are there twice, and limits out of order."""
+    """Note names that cannot become folders, labels that are there twice, and that there is no case."""
     for path, name in [
         ("name", scenario.name),
         *((f"case.{case}", case) for case in scenario.cases),
@@ -42,19 +42,6 @@ def check_names(scenario: ScenarioModel, problems: Problems) -> None:
             problems.add(f"event[{i}].label", "this name is taken by a key of metrics.json; choose another")
     if not scenario.cases and not problems.touch("case"):
         problems.add("case", "there is no case; write at least one table [case.NAME]")
-    own = {f"case.{name}.gains": case.gains for name, case in scenario.cases.items() if case.gains != scenario.gains}
-    for path, limits in ({"gains": scenario.gains} | own).items():
-        _ordered(path, "P_set_min_pu", limits.P_set_min, "P_set_max_pu", limits.P_set_max, problems)
-        _ordered(path, "V_set_min_pu", limits.V_set_min, "V_set_max_pu", limits.V_set_max, problems)
-        if limits.V_full > 0.0:
-            _ordered(path, "alpha_min", limits.alpha_min, "alpha", limits.alpha, problems)
-    gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
-    _ordered("plant.gfm", "P_min_pu", gfm.P_min, "P_max_pu", gfm.P_max, problems)
-    _ordered("plant.gfm", "Q_min_pu", gfm.Q_min, "Q_max_pu", gfm.Q_max, problems)
-    _ordered("plant.gfm", "E_min_pu", gfm.E_min, "E_max_pu", gfm.E_max, problems)
-    _ordered("plant.gfl", "P_min_pu", gfl.P_min, "P_max_pu", gfl.P_max, problems)
-    _ordered("plant.gfm", "V_set_min_pu", gfm.V_set_min, "V_set_max_pu", gfm.V_set_max, problems)
-    _ordered("plant.gfl", "V_set_min_pu", gfl.V_set_min, "V_set_max_pu", gfl.V_set_max, problems)
 
 
 def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
@@ -199,11 +186,6 @@ def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) 
                 f"{kind}2 = {second:g} {unit} must be farther from nominal than {kind}1 = {first:g} {unit}; "
                 f"set both, or leave {kind}2 as it is",
             )
-
-
-def _ordered(path: str, low_key: str, low: float, high_key: str, high: float, problems: Problems) -> None:
-    if not problems.touch(f"{path}.{low_key}", f"{path}.{high_key}") and low >= high:
-        problems.add(f"{path}.{low_key}", f"{low:g} must be below {high_key} = {high:g}; swap them or set both")
 
 
 def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple[str, ...], problems: Problems) -> None:

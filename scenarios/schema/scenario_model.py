@@ -14,7 +14,7 @@ from agents.agent_config import Gains, Handling, Secondary
 from netem.schema.netem import Netem
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from wire.plausible import Plausible, Unit
-from wire.table_schema import INHERITED, INLINE, Example
+from wire.table_schema import INHERITED, INLINE, Example, Label
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""
@@ -29,11 +29,17 @@ LawKey = str | dict[str, Any]
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[time]`: how long, and in which steps."""
 
-    end_s: Annotated[float, Unit("s"), Plausible("the duration of a run", 0.001, 3600.0, above_zero=True)]
+    end_s: Annotated[
+        float, Unit("s"), Label("end of the run"), Plausible("the duration of a run", 0.001, 3600.0, above_zero=True)
+    ]
     """Duration of the run (s), a multiple of T_c_s."""
-    T_c_s: Annotated[float, Unit("s"), Plausible("a control period", 0.0005, 2.0, above_zero=True)] = 0.02
+    T_c_s: Annotated[
+        float, Unit("s"), Label("control period, T_c"), Plausible("a control period", 0.0005, 2.0, above_zero=True)
+    ] = 0.02
     """Control period (s): each agent decides once in it."""
-    h_s: Annotated[float, Unit("s"), Plausible("an integration step", 1e-5, 0.02, above_zero=True)] = 0.002
+    h_s: Annotated[
+        float, Unit("s"), Label("integration step, h"), Plausible("an integration step", 1e-5, 0.02, above_zero=True)
+    ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
     record_s: Annotated[float, Unit("s"), Plausible("the distance of recorded rows", 1e-5, 2.0, above_zero=True)] = 0.01
     """Distance of the rows in history.csv (s): a multiple of h_s that divides T_c_s."""
@@ -58,11 +64,13 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     feeder: str = "microgrid123"
     """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
-    load_set: str = "main"
+    load_set: Annotated[str, Label("load set")] = "main"
     """Which load table of the feeder: "main" or "event2"."""
-    P_set0_pu: Annotated[float, Unit("pu"), Plausible("a power set-point", 0.0, 1.2)] = 0.647
+    P_set0_pu: Annotated[float, Unit("pu"), Label("first P_set"), Plausible("a power set-point", 0.0, 1.2)] = 0.647
     """First P_set of every inverter (pu of its rating)."""
-    V_set0_pu: Annotated[float, Unit("pu"), Plausible("a voltage set-point", 0.8, 1.2, above_zero=True)] = 1.0
+    V_set0_pu: Annotated[
+        float, Unit("pu"), Label("first V_set"), Plausible("a voltage set-point", 0.8, 1.2, above_zero=True)
+    ] = 1.0
     """First V_set of every inverter (pu of its nominal voltage)."""
     f_nom_Hz: Annotated[float | None, Unit("Hz"), Plausible("a nominal frequency", 16.0, 400.0)] = None
     """Nominal frequency (Hz); without it the feeder's. At another one than the feeder's its equipment stays, and its

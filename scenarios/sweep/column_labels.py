@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from scenarios.field_docs import field_docs
 from scenarios.schema.scenario_model import ScenarioModel
+from wire.table_schema import INLINE, Field, Label, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
@@ -28,30 +28,8 @@ WORDS = {
 }
 """What is written at the axes instead of an index's name."""
 
-KEYS = {
-    "graph.links": "links of the graph",
-    "graph.lambda_2": "algebraic connectivity, lambda_2",
-    "gains.k_p": "gain of P_set, k_p (s)",
-    "gains.k_q": "gain of V_set, k_q (s)",
-    "gains.alpha": "weight of the voltage error, alpha",
-    "gains.beta_GFM": "weight of var sharing, GFM, beta",
-    "gains.beta_GFL": "weight of var sharing, GFL, beta",
-    "time.T_c_s": "control period, T_c (s)",
-    "time.h_s": "integration step, h (s)",
-    "time.end_s": "end of the run (s)",
-    "plant.P_set0_pu": "first P_set (pu)",
-    "plant.V_set0_pu": "first V_set (pu)",
-    "plant.load_set": "load set",
-    "link.on": "which links",
-    "link.delay": "delay of the links (s)",
-    "link.loss": "probability of loss",
-    "link.duplicate": "probability of duplicates",
-    "link.corrupt": "probability of flipped bits",
-    "link.rate": "rate of the links (byte/s)",
-    "link.from_s": "faults begin at (s)",
-    "link.to_s": "faults end at (s)",
-}
-"""What is written at the axes instead of a key of the scenario file, less its case and its number in a list."""
+GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
+"""What is written at the axes for the parameters of drawn graphs, which no scenario file has."""
 
 LEAST = {
     "f_error_Hz": 0.01,
@@ -73,13 +51,16 @@ Settled indexes have the last digit that the paper prints, times a usual control
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a column, which its last word ends in; V_error and p are per unit.
+    """Return the unit of a column: of a key of the scenario its own, of an index the end of its name.
 
     Examples
     --------
-    >>> unit_of("event1.t_restore_s"), unit_of("time.T_c_s"), unit_of("gains.k_p"), unit_of("event1.p.inv1")
-    ('s', 's', '', 'pu')
+    >>> unit_of("event1.t_restore_s"), unit_of("case.IV.gains.k_p"), unit_of("event1.p.inv1"), unit_of("event1.MPSI")
+    ('s', 's', 'pu', '')
     """
+    field = _field_at(_apart(name)[0])
+    if field is not None and field.unit:
+        return field.unit
     parts = name.split(".")
     if parts[-1] == "V_error" or parts[-2:-1] == ["p"]:
         return "pu"
@@ -90,41 +71,44 @@ def unit_of(name: str) -> str:
 def label_of(name: str) -> str:
     """Return words for an axis, with the unit.
 
-    A key without words of its own is named by its last part and its table, with the unit that its documentation tells.
+    A key whose field has no `Label` is named by its last part and its table.
 
     Examples
     --------
     >>> label_of("time.T_c_s"), label_of("case.IV.gains.k_p"), label_of("link[1].delay")
     ('control period, T_c (s)', 'gain of P_set, k_p (s), case IV', 'delay of the links (s)')
     >>> label_of("handling.T_age_s"), label_of("plant.gfm.k_pp"), label_of("handling.kappa_c")
-    ('T_age of [handling] (s)', 'k_pp of [plant.gfm]', 'kappa_c of [handling] (1/s)')
+    ('T_age of [handling] (s)', 'k_pp of [plant.gfm] (rad/s per pu)', 'kappa_c of [handling] (1/s)')
     """
     if name.rpartition(".")[2] in WORDS:
         return WORDS[name.rpartition(".")[2]]
-    case = re.match(r"case\.([^.]+)\.", name)
-    suffix = f", case {case.group(1)}" if case else ""
-    key = re.sub(r"\[\d+\]", "", name[case.end() :] if case else name)
-    if key in KEYS:
-        return f"{KEYS[key]}{suffix}"
+    key, case = _apart(name)
+    field, unit = _field_at(key), unit_of(key)
+    label = field.mark(Label) if field else None
     table, _, last = key.rpartition(".")
-    unit = unit_of(key)
-    words = f"{last.removesuffix('_' + unit)}" + (f" of [{table}]" if table else "")
-    unit = unit or _documented_unit(key)
-    return f"{words} ({unit}){suffix}" if unit else f"{words}{suffix}"
+    words = last.removesuffix("_" + unit) + (f" of [{table}]" if table else "")
+    words = label.text if label else GRAPH_WORDS.get(key, words)
+    return words + (f" ({unit})" if unit else "") + (f", case {case}" if case else "")
 
 
-def _documented_unit(key: str) -> str:
-    """Return the unit in the documentation of a key of the scenario file; "" where there is none, or no such key."""
-    tables: Any = ScenarioModel
-    text = ""
+def _apart(name: str) -> tuple[str, str]:
+    """Return the key of a column without its case and its numbers in lists, and the case."""
+    case = re.match(r"case\.([^.]+)\.", name)
+    return re.sub(r"\[\d+\]", "", name[case.end() :] if case else name), case[1] if case else ""
+
+
+def _field_at(key: str) -> Field | None:
+    """Return the field of the scenario file at a key, None if there is none."""
+    struct: Any = ScenarioModel
+    found = None
     for step in key.split("."):
-        docs = {doc.name: doc for doc in field_docs(tables)} if tables is not None else {}
-        if step not in docs:
-            return ""
-        text = docs[step].text
-        tables = _struct_in(typing.get_type_hints(tables).get(step))
-    found = re.search(r"\((s|1/s|Hz|pu|W|V|var)\b[^)]*\)", text)
-    return found.group(1) if found else ""
+        fields = fields_of(struct) if struct is not None else ()
+        inline = (inner for field in fields if INLINE in field.marks for inner in fields_of(field.type))
+        found = next((field for field in (*fields, *inline) if step in (field.key, field.name)), None)
+        if found is None:
+            return None
+        struct = _struct_in(found.type)
+    return found
 
 
 def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
