@@ -18,7 +18,8 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, Word
+from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
+from scenarios.drivers.telemetry_stream import Recordable
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0
@@ -96,27 +97,19 @@ def run_processes(
     if sorted(order) != sorted([PLANT, *first]):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
-    client = TelemetryClient(RECORDER, plant_config.run, endpoint, plant_config.clock)
-
-    def on_exit(child: Child) -> None:
-        client.say(f"{_EXIT}{child.pid}")
-
-    def on_word(word: str) -> None:
-        client.say(_WORD + word)
-
+    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_status)
     try:
-        with Supervisor(plant_config, configs, log_dir, on_exit, on_word, plant_command) as supervisor:
-            driver = _ProcessDriver(client, supervisor, plant_config, on_telemetry, on_links, on_status)
+        with Supervisor(plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command) as supervisor:
             supervisor.start(*order)
             if on_start is not None:
                 on_start(supervisor.children)
-            driver.run()
-            client.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
+            driver.run(supervisor)
+            driver.client.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
             supervisor.children.wait(AFTERMATH if driver.broke else LEAVING)
-            driver.note_failures()
+            driver.note_failures(supervisor)
         return driver.outcome()
     finally:
-        client.close()
+        driver.client.close()
 
 
 class _ProcessDriver:
@@ -124,82 +117,88 @@ class _ProcessDriver:
 
     def __init__(
         self,
-        client: TelemetryClient,
-        supervisor: Supervisor,
         config: PlantConfig,
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
         on_status: Callable[[str], None] | None,
     ) -> None:
+        self.client = TelemetryClient(RECORDER, config.run, config.listen[0], config.clock, self._take)
         self.broke = ""
         """Why the run broke; "" after a good end."""
-        self._client, self._supervisor, self._T_c = client, supervisor, config.T_c
-        self._wall = config.clock == "wall"
+        self._T_c, self._wall = config.T_c, config.clock == "wall"
         self._plant_deadline = 1.5 * config.deadline + 1.0
         """Longer than the plant's own (s): the plant reports better what is wrong, unless it is the cause itself."""
         if self._wall:
             self._plant_deadline += config.wait_for_agents + 2.0 * config.T_c / config.speed
         self._on_telemetry, self._on_links, self._on_status = on_telemetry, on_links, on_status
-        self._began = self._started = self._ended_at = monotonic()
-        self._plant_ready = False
-        self._last: Telemetry | None = None
-        self._ended = False
+        self._began = self._ended_at = monotonic()
+        self._started: float | None = None
+        self._plant_ready = self._ended = False
         self._events: list[PlantEvent] = []
+        self._awaited: list[str] = []
         self._notes: dict[str, str] = {}
 
-    def run(self) -> None:
+    def on_exit(self, child: Child) -> None:
+        """Note that a process has ended; from any thread."""
+        self.client.say(f"{_EXIT}{child.pid}")
+
+    def on_word(self, word: str) -> None:
+        """Note a word of the starting plant; from any thread."""
+        self.client.say(_WORD + word)
+
+    def run(self, supervisor: Supervisor) -> None:
         """Take in everything until the last telemetry, or until the run cannot go on."""
-        since, supervisor = self._began, self._supervisor
+        client, since = self.client, self._began
         while not self._ended:
             deadline = self._plant_deadline if self._plant_ready else BUILD_DEADLINE
             limit = min(deadline, supervisor.wait)
             asked = monotonic()
-            items = self._client.take(limit)
+            words = client.take(limit)
             now = monotonic()
-            if items or now - asked > limit + STOOD_STILL:  # a process that stood still itself has not waited
+            if words or now - asked > limit + STOOD_STILL:  # a process that stood still itself has not waited
                 since = now
-            elif now - since >= deadline:
+            elif now - max(since, client.message_at) >= deadline:
                 report = supervisor.children[PLANT].report(self._when)
                 self._end(f"nothing was heard of the plant for {deadline:g} s, so the run was ended: {report}")
-            for item in items:
-                if isinstance(item, Telemetry):
-                    self._take(item)
-                elif isinstance(item, LinkReport):
-                    self._on_links(item)
-                elif isinstance(item, Word):
-                    self._take_word(item.text)
+            for word in words:
+                self._take_word(word, supervisor)
+            if client.progress is not None:
+                supervisor.note_time(*client.progress)
             if not self._ended:
+                supervisor.start_when_gone(self._awaited)
+                self._awaited.clear()
                 supervisor.work()
         supervisor.end_faults()
 
-    def _take_word(self, word: str) -> None:
+    def _take(self, message: Recordable) -> None:
+        if isinstance(message, LinkReport):
+            self._on_links(message)
+        elif isinstance(message, Telemetry):
+            if self._started is None:
+                self._started = monotonic()
+            self._events += message.events
+            self._awaited += message.awaited
+            self._on_telemetry(message)
+            if message.final:
+                self._end(message.outcome)
+
+    def _take_word(self, word: str, supervisor: Supervisor) -> None:
         if word.startswith(_EXIT):
             pid = word.removeprefix(_EXIT)
-            self._note_exit(next(child for child in self._supervisor.children if str(child.pid) == pid))
+            self._note_exit(next(child for child in supervisor.children if str(child.pid) == pid), supervisor)
             return
         word = word.removeprefix(_WORD)
         self._plant_ready = self._plant_ready or word == READY
         if self._on_status is not None:
             self._on_status(word)
 
-    def _take(self, telemetry: Telemetry) -> None:
-        if self._last is None:
-            self._started = monotonic()
-        self._last = telemetry
-        if telemetry.rows and not telemetry.final:
-            self._supervisor.note_time(telemetry.t, monotonic())
-        self._events += telemetry.events
-        self._supervisor.start_when_gone(telemetry.awaited)
-        self._on_telemetry(telemetry)
-        if telemetry.final:
-            self._end(telemetry.outcome)
-
-    def _note_exit(self, child: Child) -> None:
+    def _note_exit(self, child: Child, supervisor: Supervisor) -> None:
         if self._ended:
             return
-        if child.name == PLANT or (self._supervisor.failed(child) and self._last is None and not self._wall):
+        begun = self.client.latest is not None
+        if child.name == PLANT or (supervisor.failed(child) and not begun and not self._wall):
             self._end(child.report(self._when))
-        elif self._supervisor.failed(child):
+        elif supervisor.failed(child):
             self._notes[child.name] = child.report(self._when)
         # else it was asked to leave, perhaps by a Stop that is faster than its telemetry, or the scenario killed it
 
@@ -209,24 +208,24 @@ class _ProcessDriver:
 
     @property
     def _when(self) -> str:
-        return "before t = 0" if self._last is None else f"after t = {self._last.t:g} s"
+        return "before t = 0" if self.client.latest is None else f"after t = {self.client.t:g} s"
 
-    def note_failures(self) -> None:
+    def note_failures(self, supervisor: Supervisor) -> None:
         """Note every agent that failed, or has not ended though the run has."""
-        for child in self._supervisor.children:
+        for child in supervisor.children:
             known = child.name in self._notes or child.name == PLANT or (self.broke and child.status is None)
-            if self._supervisor.failed(child) and not known:
+            if supervisor.failed(child) and not known:
                 self._notes[child.name] = child.report(self._when)
 
     def outcome(self) -> Outcome:
         """Return how the run ended, once all processes have."""
-        last, started = self._last, monotonic() if self._last is None else self._started
+        last, started = self.client.latest, self._started or monotonic()
         return Outcome(
             broke=self.broke,
             reproducible=last is not None and last.reproducible and not self.broke,
             events=tuple(self._events),
-            notes=(*self._notes.values(), *self._client.rejects.take_lines()),
-            ticks=0 if last is None else round(last.t / self._T_c),
+            notes=(*self._notes.values(), *self.client.rejects.take_lines()),
+            ticks=round(self.client.t / self._T_c),
             start_s=started - self._began,
             run_s=self._ended_at - started,
             pacing=None if last is None else last.pacing,

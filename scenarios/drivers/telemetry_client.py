@@ -1,14 +1,15 @@
-"""Receive what the plant publishes for recorders, in order, over a session that is renewed when it breaks."""
+"""Follow a run: receive what the plant publishes for recorders, in order, over a session that is renewed."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import monotonic
-from typing import NamedTuple
 
 from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
 from wire.driver.session import Clock, Session
+from wire.messages import Pacing, Telemetry
 
 RECORDER = "history"
 """Name of a driver's recorder in its run."""
@@ -17,16 +18,10 @@ LOOK = 0.5
 """Longest wait (s) between two checks for missing messages."""
 
 
-class Word(NamedTuple):
-    """A word from another thread of this process."""
-
-    text: str
-
-
 class TelemetryClient:
-    """Receives what the plant publishes for recorders.
+    """Pass on each message that the plant publishes for recorders, and keep the state of the run.
 
-    In wall-clock time it asks again for what did not come, e.g. as this process stood still for longer than Zenoh's
+    In wall-clock time it asks again for missing messages, e.g. after this process stood still for longer than Zenoh's
     lease, and opens a new session when the old one brings nothing any more.
 
     Parameters
@@ -39,25 +34,47 @@ class TelemetryClient:
         Where the plant listens.
     clock : {"simulated", "wall"}
         Which kind of time the run has.
+    on_message : Callable[[Recordable], None]
+        Called with each message, in the order in which the plant published them.
     """
 
-    def __init__(self, name: str, run: str, endpoint: str, clock: Clock) -> None:
-        self._name, self._endpoint, self._clock = name, endpoint, clock
+    def __init__(
+        self, name: str, run: str, endpoint: str, clock: Clock, on_message: Callable[[Recordable], None]
+    ) -> None:
+        self._name, self._endpoint, self._clock, self._on_message = name, endpoint, clock, on_message
+        self.latest: Telemetry | None = None
+        """The latest telemetry; None before the first."""
+        self.pacing: Pacing | None = None
+        """How well the plant has kept pace so far, in wall-clock time."""
+        self.message_at = monotonic()
+        """When the last message came, of whichever kind (s, monotonic)."""
+        self.progress: tuple[float, float] | None = None
+        """Run time of the last rows, and when they came (s, monotonic); None before the first."""
         self._stream = TelemetryStream() if clock == "wall" else None
         self._core = TelemetryEndpoint(name, run, self._stream)
         self._closed = False
         self.rejects = self._core.rejects
-        """What was dropped."""
+        """The messages that were dropped."""
         self.inbox = Inbox()
         """Where other threads put words."""
         self._session = self._open()
+
+    @property
+    def t(self) -> float:
+        """Run time that the run has reached (s)."""
+        return 0.0 if self.latest is None else self.latest.t
+
+    @property
+    def ended(self) -> bool:
+        """Whether the last telemetry is here."""
+        return self.latest is not None and self.latest.final
 
     def say(self, word: str) -> None:
         """Have `take` return a word; from any thread."""
         self.inbox.put(("word", word, b""))
 
-    def take(self, timeout: float | None) -> list[Recordable | Word]:
-        """Wait for what comes.
+    def take(self, timeout: float | None) -> list[str]:
+        """Wait for messages, pass them on, and return the words of other threads.
 
         Parameters
         ----------
@@ -66,21 +83,30 @@ class TelemetryClient:
         """
         if self._stream is not None:
             timeout = LOOK if timeout is None else min(timeout, LOOK)
-        found: list[Recordable | Word] = []
+        words: list[str] = []
         for kind, key, payload, _ in self._session.take(1, timeout):
             if kind == "word":
-                found.append(Word(key))
+                words.append(key)
             elif kind == "appeared":
                 self._core.appeared(key)
             elif kind == "message":
                 self._core.received(key, payload, monotonic())
-                found += self._core.take()
+                for message in self._core.take():
+                    self._pass_on(message)
         if self._stream is not None and not self._closed:
             self._look_after(self._stream)
-        return found
+        return words
+
+    def _pass_on(self, message: Recordable) -> None:
+        self.message_at = monotonic()
+        if isinstance(message, Telemetry):
+            self.latest, self.pacing = message, message.pacing or self.pacing
+            if message.rows and not message.final:
+                self.progress = message.t, self.message_at
+        self._on_message(message)
 
     def close(self) -> None:
-        """Leave; with the session goes the token, so the plant knows that the last telemetry is here."""
+        """Close the session, and with it the token: the plant knows then that the last telemetry is here."""
         self._closed = True
         self._session.close()
 

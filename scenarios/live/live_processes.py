@@ -135,7 +135,7 @@ def all_here(
         if child.name == PLANT:
             plant_ended.set()
         elif supervisor.failed(child) and not plant_ended.is_set():
-            say(child.report(f"after t = {recorder.t:.2f} s"))
+            say(child.report(f"after t = {recorder.client.t:.2f} s"))
 
     def on_word(word: str) -> None:
         if text := meaning(word, config):
@@ -146,15 +146,15 @@ def all_here(
             supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
             try:
                 while not plant_ended.wait(min(supervisor.wait, CHECK)):
-                    if recorder.heard_at is not None:
-                        supervisor.note_time(recorder.t, recorder.heard_at)
+                    if recorder.client.progress is not None:
+                        supervisor.note_time(*recorder.client.progress)
                     supervisor.work()
                 supervisor.children.wait(LEAVING)
             finally:
                 supervisor.end_faults()
                 _say_end(recorder, config)
         plant = supervisor.children[PLANT]
-        return "" if plant.status == 0 else plant.report(f"after t = {recorder.t:.2f} s")
+        return "" if plant.status == 0 else plant.report(f"after t = {recorder.client.t:.2f} s")
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
@@ -215,16 +215,18 @@ def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str]) -> Proce
         broke = broke or recorder.failure
     except (StoppedError, KeyboardInterrupt) as stop:
         interrupted = _signal_of(stop)
-    return ProcessOutcome(broke=broke, interrupted=interrupted, recorded=recorder.recorded, pacing=recorder.pacing)
+    return ProcessOutcome(
+        broke=broke, interrupted=interrupted, recorded=recorder.recorded, pacing=recorder.client.pacing
+    )
 
 
 def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
     """Say how far the run came and how well it kept pace."""
-    pacing = recorder.pacing
+    pacing = recorder.client.pacing
     if pacing is None or pacing.steps == 0:
         say("the run ended before it began")
     else:
-        say(f"ended at t = {recorder.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
+        say(f"ended at t = {recorder.client.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
 
 
 def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:

@@ -8,11 +8,12 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from time import monotonic
 
-from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, Word
+from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
+from scenarios.drivers.telemetry_stream import Recordable
 from scenarios.live.link_log import LinkLog
 from scenarios.live.show.events import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
-from wire.messages import LinkReport, LinkRequest, Pacing, Telemetry
+from wire.messages import LinkReport, LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
 
 _STOP = "stop"
@@ -55,35 +56,28 @@ class LiveRecorder:
         self._recorder = None if folder is None else Recorder(folder, gaps=True)
         self.recorded: Recorded | None = None
         """The record, once it is closed, if it is whole."""
-        self.pacing: Pacing | None = None
-        """How well the plant has kept pace so far."""
-        self.t = 0.0
-        """How far the run has come (s)."""
-        self.heard_at: float | None = None
-        """When the last rows came (s, monotonic); None before the run began."""
-        self.ended = False
-        """Whether the last telemetry is in."""
         self.failure = ""
         """Why something could not be recorded: the first reason; "" if everything was."""
         self._limit = RateLimit()
         self._run, self._endpoint = run, endpoint
-        self._client: TelemetryClient
+        self.client: TelemetryClient
+        """Follows the run."""
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
     def __enter__(self) -> LiveRecorder:
-        self._client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall")
+        self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Take in what has come, close the session, and give the files their names."""
-        self._client.say(_STOP)
+        self.client.say(_STOP)
         self._thread.join()
-        self._client.close()
-        self._say_all(*self._limit.left_out(), *self._client.rejects.take_lines())
+        self.client.close()
+        self._say_all(*self._limit.left_out(), *self.client.rejects.take_lines())
         if self._link_log is not None:
             try:
-                self._say_all(*self._link_log.close(self.t))
+                self._say_all(*self._link_log.close(self.client.t))
             except OSError as error:
                 self._fail(f"the link commands cannot be written: {error.strerror}")
         if self._recorder is not None:
@@ -103,7 +97,7 @@ class LiveRecorder:
         try:
             if recorder.count < 2:
                 self._say("nothing was recorded, so there are no numbers")
-            elif not self.ended:
+            elif not self.client.ended:
                 self._fail(f"the record ends at {recorder.ended:.2f} s: then no word came of the plant")
             else:
                 self.recorded = recorder.finish(recorder.ended, recorder.record_step)
@@ -122,35 +116,32 @@ class LiveRecorder:
             recorder.close()
 
     def _follow(self) -> None:
-        while not self.ended:
-            for item in self._client.take(None):
-                if isinstance(item, Word):
-                    return
-                try:
-                    if isinstance(item, Telemetry):
-                        self._take(item)
-                    elif isinstance(item, LinkReport):
-                        self._record(item)
-                    else:
-                        self._take_request(item)
-                except Exception as error:  # an error in one message must not end the recording of the others
-                    self._client.rejects.failed("telemetry", error)
-        self._client.close()  # with it goes the token: the plant knows that the last telemetry is here
+        while not self.client.ended:
+            if self.client.take(None):
+                return
+        self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
-    def _take(self, telemetry: Telemetry) -> None:
-        """Say and record one message. An error in writing ends the record, not the run."""
-        if telemetry.rows:
-            self.heard_at = monotonic()
-        self.t, self.pacing = telemetry.t, telemetry.pacing or self.pacing
-        self.ended = telemetry.final
+    def _take(self, message: Recordable) -> None:
+        """Say and record one message; an error in it must not end the recording of the others."""
+        try:
+            if isinstance(message, LinkRequest):
+                self._take_request(message)
+                return
+            if isinstance(message, Telemetry):
+                self._say_events(message)
+            self._record(message)
+        except Exception as error:
+            self.client.rejects.failed("telemetry", error)
+
+    def _say_events(self, telemetry: Telemetry) -> None:
         for event in telemetry.events:
             if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
                 self._say(line)
-        if self.ended:  # before the terminal says that the run has ended
+        if telemetry.final:  # before the terminal says that the run has ended
             self._say_all(*self._limit.left_out())
-        self._record(telemetry)
 
     def _record(self, message: Telemetry | LinkReport) -> None:
+        """Record one message; an error in writing ends the record, not the run."""
         recorder = self._recorder
         if recorder is None:
             return
@@ -170,5 +161,5 @@ class LiveRecorder:
         try:
             self._link_log(request)
         except OSError as error:
-            self._fail(f"the link commands end at {self.t:.2f} s: {error.strerror}", _ON)
+            self._fail(f"the link commands end at {self.client.t:.2f} s: {error.strerror}", _ON)
             self._link_log = None
