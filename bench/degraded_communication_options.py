@@ -55,7 +55,7 @@ FAULTS = {"0.1 s late": {"delay": 0.1}, "0.5 s late": {"delay": 0.5}, "90 % lost
 @gp.metric("t_Q_s")
 def t_Q(window: gp.WindowData) -> float:
     """Return the time (s) from the event until MQSI < 0.1 for good; not a number for never."""
-    outside = np.flatnonzero(~(MQSI(window.record, window.nameplates) < SHARED))
+    outside = np.flatnonzero(~(MQSI(window, window.nameplates) < SHARED))
     last = int(outside[-1]) + 1 if outside.size else 0
     return float(window.t[last] - window.start) if last < len(window.t) else np.nan
 

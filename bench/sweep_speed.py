@@ -25,6 +25,7 @@ from machine import machine
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
+from scenarios.results.event_windows import windows
 from scenarios.results.history import History, Nameplates
 from scenarios.results.record import Recorder
 from scenarios.schema.configs import configs
@@ -94,7 +95,7 @@ def loop(runs: Sequence[Run], folder: Path) -> float:
             assert not outcome.broke, outcome.broke
             recorded = recorder.finish(scenario.time.end_s, plant.record_step)
         history = History.of(recorded.inverters, recorded.rows)
-        for window in metrics.windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s):
+        for window in windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s):
             metrics.measure(history, Nameplates.of(feeder.inverters), window, feeder.f_nom)
     return perf_counter() - began
 

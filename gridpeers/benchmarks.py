@@ -17,8 +17,7 @@ from scenarios.results.benchmark_registry import (
 )
 from scenarios.results.claims import Claim, Judge, Verdict, judge
 from scenarios.results.findings import Findings, label
-from scenarios.results.metrics import F_BAND, MPSI_BAND, Steady
-from scenarios.results.settling import Settling
+from scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 
 __all__ = [
     "BENCHMARKS",

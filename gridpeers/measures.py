@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.metrics import MPSI, MQSI, V_error, Window, mean_frequency, mean_voltage
-from scenarios.results.settling import Settling, settling
+from scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage, settling
 from scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:

@@ -11,7 +11,6 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
-from pathlib import Path
 from typing import Any, Literal, TextIO
 
 import msgspec
@@ -25,18 +24,15 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.claims import judge, judged
-from scenarios.results.drawing import Drawing, drawing_of
-from scenarios.results.history import History, Nameplates
-from scenarios.results.joins_and_leaves import as_they_came, late_moves
-from scenarios.results.measured_run import measure_run
-from scenarios.results.metrics import windows
-from scenarios.results.metrics_file import Clock, RunMetrics, metrics_json
+from scenarios.results.drawing import drawing_of
+from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
+from scenarios.results.findings import find
+from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.own_modules import claims_of
-from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
@@ -135,31 +131,29 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
-    nameplates = Nameplates.of(inverters_of(scenario, request.feeder))
-    histories = {case: History.of(record.inverters, record.rows) for case, record in recorded.items()}
-    came = {case: as_they_came(scenario, record.events) for case, record in recorded.items()}
-    events = came[list(came)[-1]]  # in wall-clock time each case has its own
-    opened = {case: windows(came[case], scenario.time.end_s) for case in recorded}
-    found, saved = measure_run(scenario, request.feeder, nameplates, histories, opened, recorded)
-    sha256 = {case: record.sha256 for case, record in recorded.items()}
-    links_sha256 = {case: record.links.sha256 for case, record in recorded.items() if record.links.sha256}
+    cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
+    found = find(scenario, request.feeder, cases)
     compared = _compared(request, recorded)
-    unlike = {
-        case: {"disturbed": one.disturbed, "departures": one.lines()}
-        for case, one in compared.items()
-        if one.departures
-    }
     disturbed = any(one.disturbed for one in compared.values())
-    notes += [
-        f"case {case}: {', '.join(one.disturbed)}: not what the scenario means by it, which does not tell of: "
-        f"{'; '.join(one.lines()[:3])} (all in metrics.json)"
-        for case, one in compared.items()
-        if one.disturbed
-    ]
-    notes += [f"case {case}: {note}" for case, record in recorded.items() for note in _of_laws(record, saved[case])]
-    write_whole(folder / "metrics.json", metrics_json(request, found, sha256, pacing, links_sha256, {}, unlike, saved))
+    facts = {}
+    for case, record in recorded.items():
+        unlike: dict[str, Any] = {}
+        if one := compared.get(case):
+            unlike = {"disturbed": one.disturbed, "departures": one.lines()} if one.departures else {}
+            if one.disturbed:
+                notes.append(
+                    f"case {case}: {', '.join(one.disturbed)}: not what the scenario means by it, which does not tell "
+                    f"of: {'; '.join(one.lines()[:3])} (all in metrics.json)"
+                )
+        notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
+        facts[case] = case_facts(record, pacing.get(case), **unlike)
+    write_whole(folder / "metrics.json", metrics_json(request, found, facts))
     if request.lasting:
-        _draw(drawing_of(scenario, request.feeder, nameplates, histories, events), folder / "plots")
+        from scenarios.results.plots import draw_all  # matplotlib takes longer to import than a case to run
+
+        last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
+        histories = {case: record.history for case, record in cases.items()}
+        draw_all(drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events)), folder / "plots")
     benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
     report = RunReport(
         scenario=scenario.name,
@@ -241,12 +235,6 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     replace, clock, speed = msgspec.structs.replace, request.clock, request.speed
     plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
     return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)
-
-
-def _draw(drawing: Drawing, folder: Path) -> None:
-    from scenarios.results.plots import draw_all  # matplotlib takes longer to import than a case to run
-
-    draw_all(drawing, folder)
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:

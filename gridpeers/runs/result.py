@@ -6,7 +6,6 @@ import hashlib
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -23,15 +22,12 @@ from scenarios.live.numbers.live_figures import drawing_by_hand
 from scenarios.results.benchmark_registry import benchmark_of
 from scenarios.results.claims import Verdict, judge, judged
 from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from scenarios.results.findings import Findings, find
-from scenarios.results.history import History, Nameplates, read_history
-from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.results.metrics import windows
-from scenarios.results.own.window_metrics import own_measures
+from scenarios.results.history import History, read_history
 from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.schema import scenario_model as model
 from scenarios.schema.own_modules import claims_of
-from scenarios.schema.participants import inverters_of
 from wire.messages import PlantEvent
 from wire.printable import printable
 from wire.suggestion import suggestion
@@ -155,17 +151,16 @@ class Results(Mapping[str, "Result"]):
         """
         if self.driver == "by hand":
             raise ValueError("this was a run by hand: its windows are those that people made, see metrics")
-        nameplates = Nameplates.of(inverters_of(self._spec, self._feeder))
-        histories = {case: result.record for case, result in self.items()}
-        came = {case: as_they_came(self._spec, _plant_events(result)) for case, result in self.items()}
-        found = find(self._spec, self._feeder, nameplates, histories, came)
-        opened = {case: windows(came[case], self._spec.time.end_s) for case in came}
-        saved = {
-            case: {label: of.get("messages_saved") or 0.0 for label, of in frames.windows_of(result._whole).items()}  # noqa: SLF001
-            for case, result in self.items()
-        }
-        own = own_measures(self._spec, self._feeder, nameplates, histories, opened, saved)
-        return replace(found, own=own)
+        cases = {}
+        for case, result in self.items():
+            came = windows(as_they_came(self._spec, _plant_events(result)), self._spec.time.end_s)
+            saved = {
+                label: of["messages_saved"]
+                for label, of in frames.windows_of(self.numbers["cases"][case]).items()
+                if of.get("messages_saved")
+            }
+            cases[case] = CaseRecord(history=result.record, windows=came, messages_saved=saved)
+        return find(self._spec, self._feeder, cases)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -183,9 +178,8 @@ class Results(Mapping[str, "Result"]):
         if self.driver == "by hand":
             compared = compare(spec, self._feeder, events, float(last.record.t[-1]))
             return drawing_by_hand(compared, spec, self._feeder, case, last.record, events)
-        nameplates = Nameplates.of(inverters_of(spec, self._feeder))
         histories = {case: result.record for case, result in cases.items()}
-        return drawing_of(spec, self._feeder, nameplates, histories, as_they_came(spec, events))
+        return drawing_of(spec, self._feeder, histories, as_they_came(spec, events))
 
     def __repr__(self) -> str:
         return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"

@@ -62,11 +62,10 @@ class Drawing:
 def drawing_of(
     scenario: ScenarioModel,
     feeder: Feeder,
-    nameplates: Nameplates,
     histories: Mapping[str, History],
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
-    """What to draw of a run: the figures of all experiments, and those that belong to what happens in this one."""
+    """Return the data for the figures of a run: those of all experiments, and those of the events in this one."""
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
     most = max(islands_of(scenario, feeder).values(), key=len, default={})
@@ -75,7 +74,7 @@ def drawing_of(
     return Drawing(
         histories=histories,
         titles={case: rule.title for case, rule in scenario.cases.items()},
-        nameplates=nameplates,
+        nameplates=Nameplates.of_columns(next(iter(histories.values())).inverters, feeder),
         events=[Mark(label, t, what.get(label, "")) for label, t in events],
         f_nom=feeder.f_nom,
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},

@@ -1,4 +1,4 @@
-"""What an experiment came to, measured: the one thing that claims, tables and reports are made from."""
+"""The measures of a run: claims, tables, reports and metrics.json are made from them alone."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from plant.equipment import F_NOM, Feeder
-from scenarios.results import metrics
 from scenarios.results.benchmark_registry import Published
-from scenarios.results.history import History, Nameplates
+from scenarios.results.event_windows import CaseRecord
+from scenarios.results.history import Nameplates
 from scenarios.results.island_membership import islands_of, part_of
-from scenarios.results.metrics import Steady, Window
+from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.results.own.metric import Measured
-from scenarios.results.settling import Settling, settling
+from scenarios.results.own.window_metrics import own_measures
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import without_agent
 from scenarios.schema.power_limits import limits_of
@@ -38,7 +38,7 @@ def label(measure: str, f_nom: float = F_NOM) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """What one experiment came to."""
+    """The measures of one run."""
 
     results: SteadyValues
     """Steady values by case and event."""
@@ -56,6 +56,8 @@ class Findings:
     """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
+    messages_saved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Share of states that the laws did not send, by case and event; only where they left any out."""
     own: Mapping[str, Mapping[str, Measured]] = field(default_factory=dict)
     """The scenario's own metrics, by case and event."""
 
@@ -103,75 +105,52 @@ class Findings:
         )
 
 
-def find(
-    scenario: ScenarioModel,
-    feeder: Feeder,
-    nameplates: Nameplates,
-    histories: Mapping[str, History],
-    events: Mapping[str, Sequence[tuple[str, float]]],
-) -> Findings:
-    """Measure all cases of a run.
+def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord]) -> Findings:
+    """Measure all cases of a run, live or not, with the metrics of every run and with the scenario's own.
+
+    A history may go on after the scenario's end; windows up to there see nothing of that.
 
     Parameters
     ----------
     scenario, feeder : ScenarioModel, Feeder
-        What was run.
-    nameplates : Nameplates
-        Nameplates in the order of the histories' columns.
-    histories : Mapping[str, History]
-        Recorded cases.
-    events : Mapping[str, Sequence[tuple[str, float]]]
-        Label and time (s) of each event, by case, as they came.
-    """
-    windows = {case: metrics.windows(events[case], scenario.time.end_s) for case in histories}
-    return find_in(windows, scenario, feeder, nameplates, histories)
-
-
-def find_in(
-    windows: Mapping[str, Sequence[Window]],
-    scenario: ScenarioModel,
-    feeder: Feeder,
-    nameplates: Nameplates,
-    histories: Mapping[str, History],
-) -> Findings:
-    """Measure all cases of a run in given windows, by case; each has the label of an event of the scenario.
-
-    A history may go on after the scenario's end; windows up to there see nothing of that.
+        As run; each window has the label of an event of the scenario.
+    cases : Mapping[str, CaseRecord]
+        Recorded cases with their windows.
     """
     results: dict[str, dict[str, Steady]] = {}
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
+    available: dict[str, dict[str, float]] = {}
     where = islands_of(scenario, feeder)
-    everybody = nameplates
-    for case, whole in histories.items():
+    for case, record in cases.items():
+        everybody = Nameplates.of_columns(record.history.inverters, feeder)
         nameplates = everybody.without(without_agent(scenario, case))
         results[case], settled[case], islands[case] = {}, {}, {}
-        within = whole.until(scenario.time.end_s)
-        for window in windows[case]:
-            history = within if window.end <= scenario.time.end_s else whole
-            results[case][window.label] = metrics.measure(history, nameplates, window, feeder.f_nom)
+        within = record.history.until(scenario.time.end_s)
+        for window in record.windows:
+            history = within if window.end <= scenario.time.end_s else record.history
+            results[case][window.label] = measure(history, nameplates, window, feeder.f_nom)
             settled[case][window.label] = settling(history, nameplates, window, feeder.f_nom)
             if len(where[window.label]) > 1:
                 islands[case][window.label] = {
-                    name: metrics.measure(*part_of(history, nameplates, members), window, feeder.f_nom)
+                    name: measure(*part_of(history, nameplates, members), window, feeder.f_nom)
                     for name, members in where[window.label].items()
                 }
-    nameplates = everybody
-    rating = dict(zip(nameplates.names, nameplates.s.tolist(), strict=True))
+        rating = dict(zip(everybody.names, everybody.s.tolist(), strict=True))
+        available[case] = {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
     return Findings(
         results=results,
         f_nom=feeder.f_nom,
         P_set0=scenario.plant.P_set0_pu,
-        GFL=tuple(name for name, GFM in zip(nameplates.names, nameplates.GFM, strict=True) if not GFM),
+        GFL=tuple(name for name, GFM in zip(everybody.names, everybody.GFM, strict=True) if not GFM),
         settled=settled,
         islands=islands,
-        available={
-            case: {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}
-            for case in histories
-        },
+        available=available,
         without_agent={
-            case: tuple(name for name in nameplates.names if name in without)
-            for case in histories
+            case: tuple(name for name in everybody.names if name in without)
+            for case in cases
             if (without := without_agent(scenario, case))
         },
+        messages_saved={case: record.messages_saved for case, record in cases.items()},
+        own=own_measures(scenario, feeder, cases),
     )

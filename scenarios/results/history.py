@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment import InverterRow
+from plant.equipment import Feeder, InverterRow
 from scenarios.results.record import QUANTITIES, RowFile, Rows, header
 
 if TYPE_CHECKING:
@@ -59,8 +59,14 @@ class Nameplates:
             m_q=np.array([row.m_q for row in inverters]),
         )
 
+    @classmethod
+    def of_columns(cls, names: Sequence[str], feeder: Feeder) -> Nameplates:
+        """Take the nameplates of the columns of a history, spare inverters among them."""
+        rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
+        return cls.of([rows[name] for name in names])
 
-T = TypeVar("T", "Nameplates", "History")
+
+T = TypeVar("T", bound="Nameplates | History")
 
 UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_set": "V"}
 """Units of a history's time and quantities."""
@@ -68,7 +74,7 @@ UNITS = {"t": "s", "f": "Hz", "P": "W", "Q": "var", "V": "V", "P_set": "W", "V_s
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """One case: T rows of N inverters, terminal quantities as the plant told them."""
+    """One case: T rows of N inverters, terminal quantities as the plant reported them."""
 
     inverters: tuple[str, ...]
     """Names, order of the columns."""

@@ -69,15 +69,14 @@ def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) ->
     return replace(history, inverters=names, **columns), replace(nameplates, names=names, **mine)
 
 
-def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> tuple[History, Nameplates]:
-    """Return a history without the spare inverters that nobody ever started, and nameplates in its order.
+def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> History:
+    """Return a history without the spare inverters that nobody ever started.
 
-    In a run by hand all spare inverters have columns; in others those have that the scenario lets join.
+    In a live run all spare inverters have columns; in others those have that the scenario lets join.
     """
-    rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
     own, present = {row.name for row in inverters_of(scenario, feeder)}, history.present
     names = tuple(name for i, name in enumerate(history.inverters) if name in own or bool(present[:, i].any()))
-    return part_of(history, Nameplates.of([rows[name] for name in history.inverters]), names)
+    return part_of(history, Nameplates.of_columns(history.inverters, feeder), names)[0]
 
 
 def island_intervals(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandInterval, ...]:

@@ -1,4 +1,4 @@
-"""The paper's measures of a run: abs(f - f_nom), MPSI (16), MQSI (17), V_error, and the time to restore.
+"""The paper's measures of a run: abs(f - f_nom), MPSI (16), MQSI (17), V_error, times to restore, and swings.
 
 Steady values are means over the last 0.2 s of an event's window, which lasts to the next event or to the end; where
 they are not steady, or no numbers, a reason stands beside them.
@@ -8,12 +8,13 @@ off the network takes no part: each row is measured over those that are present 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, Floats, History, Nameplates
 from scenarios.results.steadiness import Ends, ends_of, reason
 
@@ -25,6 +26,10 @@ NO_LOAD = 0.001
 
 LOAD_BAND = 0.02
 """Part of the steady total real power within which the load counts as taken over."""
+
+SWING = 2.0
+"""Length of the end of a window over which a swing is measured (s), or half of the window if that is shorter. The
+slowest swing that was met, of late links around a leader, has a period of 1.9 s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,26 +56,21 @@ class Steady:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Window:
-    """Time that belongs to one event."""
+class Settling:
+    """How one event of one case settled: frequency and sharing apart, and whether anything still swings.
 
-    label: str
-    start: float
-    """Time of the event (s)."""
-    end: float
-    """Time of the next one, or the end of the run (s)."""
-
-
-def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
-    """Return the windows of events given as (label, time in s).
-
-    Examples
-    --------
-    >>> [(window.label, window.end) for window in windows([("event1", 1.0), ("event2", 4.0)], 7.0)]
-    [('event1', 4.0), ('event2', 7.0)]
+    `Steady.t_restore_s` is both bands together; theory predicts the two apart, and bad links may slow one of them and
+    not the other.
     """
-    ends = [*(t for _, t in events), end][1:]
-    return tuple(Window(label=label, start=t, end=stop) for (label, t), stop in zip(events, ends, strict=True))
+
+    t_f_s: float | None
+    """Time (s) from the event until abs(f - f_nom) < 0.01 Hz at every GFM for good; None if never."""
+    t_share_s: float | None
+    """Time (s) from the event until MPSI < 0.01 for good; None if never."""
+    f_swing_Hz: float
+    """Highest minus lowest frequency (Hz) of a GFM at the end of the window, the largest of all GFM."""
+    V_swing_pu: float
+    """Highest minus lowest terminal voltage (pu) of an inverter at the end of the window, the largest of all."""
 
 
 def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
@@ -176,14 +176,14 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
     nameplates : Nameplates
         Nameplates in the order of its columns.
     window : Window
-        The event's window. Rows at the very moments of events are left out: they belong to both sides.
+        The event's window.
     f_nom : float
         Nominal frequency (Hz).
     """
     assert nameplates.names == history.inverters
     f_error = mean_over(np.abs(history.f[:, nameplates.GFM] - f_nom), history.present[:, nameplates.GFM])
     sharing = MPSI(history, nameplates)
-    inside = between(history.t, window)
+    inside = window.rows(history.t)
     ends = ends_of(history.t, inside, window.start, window.end)
     steady = ends.steady
     restored = f_in_band(history, nameplates, f_nom) & (sharing < MPSI_BAND)
@@ -243,13 +243,6 @@ def _mean(x: Floats) -> float:
     return float(x.mean()) if x.size else float("nan")
 
 
-def between(t: Floats, window: Window) -> NDArray[np.bool_]:
-    """Rows after the event and before the next one; the run's last row has no next event and belongs to the window."""
-    tolerance = 1e-9
-    last = window.end >= t[-1] - tolerance
-    return (t > window.start + tolerance) & (t < window.end + (tolerance if last else -tolerance))
-
-
 def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
     """Return the time (s) from `start` to the first row from which on all rows hold; None when the last one does not.
 
@@ -263,33 +256,21 @@ def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
     return None if first >= t.size else round(float(t[first]) - start, 9)
 
 
-def messages_saved(
-    quiet: Iterable[tuple[float, int]], windows: Sequence[Window], agents: int, T_c: float
-) -> dict[str, float]:
-    """Return the share of states that were not told, by window; nothing if every state of the run was.
+def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
+    """Measure how one event of one case settled; the parameters are those of `measure`."""
+    inside = window.rows(history.t)
+    end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
+    forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]
+    shared: Flags = np.less(MPSI(history, nameplates)[inside], MPSI_BAND)
+    return Settling(
+        t_f_s=for_good(history.t[inside], f_in_band(history, nameplates, f_nom)[inside], window.start),
+        t_share_s=for_good(history.t[inside], shared, window.start),
+        f_swing_Hz=_swing(np.where(forming, f, np.nan)[end]),
+        V_swing_pu=_swing(np.where(history.present, history.V / nameplates.V_nom, np.nan)[end]),
+    )
 
-    Parameters
-    ----------
-    quiet : Iterable[tuple[float, int]]
-        Run time (s) and number of states that were not told at that tick.
-    windows : Sequence[Window]
-        Windows of measurement.
-    agents : int
-        Agents of the run, each of which decides once a period.
-    T_c : float
-        Control period (s).
 
-    Examples
-    --------
-    >>> messages_saved([(1.0, 3), (1.02, 1)], [Window(label="event1", start=1.0, end=1.04)], agents=4, T_c=0.02)
-    {'event1': 0.5}
-    """
-    quiet = list(quiet)
-    if not quiet:
-        return {}
-    near = 0.5 * T_c
-    saved = {}
-    for window in windows:
-        count = sum(n for t, n in quiet if window.start - near <= t < window.end - near)
-        saved[window.label] = count / (agents * max(1, round((window.end - window.start) / T_c)))
-    return saved
+def _swing(x: Floats) -> float:
+    """Return the largest range of a column; an inverter that is off the network somewhere in it has none."""
+    ranges = x.max(axis=0) - x.min(axis=0)
+    return float(np.nanmax(ranges)) if np.isfinite(ranges).any() else np.nan

@@ -1,4 +1,4 @@
-"""metrics.json: the measures of a run, whoever ran it, as a file."""
+"""metrics.json: the measures of a run, live or not, as a file."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from scenarios.results.findings import SHARED, Findings
+from scenarios.results.record import Recorded
 from scenarios.results.steadiness import BOUNDS
 from scenarios.schema import ScenarioModel
 from wire.messages import Pacing
@@ -39,63 +40,55 @@ class RunMetrics:
     """Wall-clock: run time per wall time (s/s)."""
 
 
+def case_facts(recorded: Recorded, pacing: Pacing | None = None, **more: Any) -> dict[str, Any]:
+    """Return what metrics.json has of a case beside its measures: hashes, `more`, and the pacing (s of wall time)."""
+    links = {"links_sha256": recorded.links.sha256} if recorded.links.sha256 else {}
+    paced = {} if pacing is None else {"pacing": msgspec.to_builtins(pacing)}
+    return {"history_sha256": recorded.sha256} | links | more | paced
+
+
 def metrics_json(
     ran: RunMetrics,
     found: Findings,
-    sha256: Mapping[str, str],
-    pacing: Mapping[str, Pacing],
-    links_sha256: Mapping[str, str] = MappingProxyType({}),
+    facts: Mapping[str, Mapping[str, Any]],
     by_hand: Mapping[str, Any] = MappingProxyType({}),
-    unlike: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
-    saved: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
 ) -> str:
-    """Text of metrics.json; what is not a number (nothing to share, or nobody to share it with) or not steady is null.
-
-    Pacing is in s of wall time.
+    """Return the text of metrics.json; a measure that is no number or not steady is null.
 
     Parameters
     ----------
     ran : RunMetrics
-        What was run.
+        The run.
     found : Findings
-        What was measured.
-    sha256, pacing, links_sha256 : Mapping
-        By case: hash of its history, how it kept real time, hash of all fates of messages; where there are any.
+        Its measures.
+    facts : Mapping[str, Mapping[str, Any]]
+        By case: other entries; see `case_facts`.
     by_hand : Mapping[str, Any], optional
         What a reader must know of a run that people had their hands in.
-    unlike : Mapping[str, Mapping[str, Any]], optional
-        By case: where a run in wall-clock time was not what its scenario says.
-    saved : Mapping[str, Mapping[str, float]], optional
-        By case and event: share of states that neighbours were not told of, where there are any.
     """
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in found.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
-        for label, share in saved.get(case, {}).items():
+        for label, share in found.messages_saved.get(case, {}).items():
             cases[case][label]["messages_saved"] = share
         for label, islands in found.islands.get(case, {}).items():
-            cases[case][label] |= dict.fromkeys(SHARED)
-            cases[case][label].get("reasons", {}).pop("MPSI", None)
-            cases[case][label].get("reasons", {}).pop("MQSI", None)
-            cases[case][label]["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
+            whole = cases[case][label]
+            whole |= dict.fromkeys(SHARED)
+            for name in ("MPSI", "MQSI"):
+                whole.get("reasons", {}).pop(name, None)
+            whole["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
         for label, measured in found.own.get(case, {}).items():
-            if label in cases[case]:
-                cases[case][label] |= measured.values
-                if measured.reasons:
-                    cases[case][label].setdefault("reasons", {}).update(measured.reasons)
+            cases[case][label] |= measured.values
+            if measured.reasons:
+                cases[case][label].setdefault("reasons", {}).update(measured.reasons)
         if case in found.without_agent:
             cases[case]["without_agent"] = list(found.without_agent[case])
-        cases[case]["history_sha256"] = sha256[case]
-        if case in links_sha256:
-            cases[case]["links_sha256"] = links_sha256[case]
-        cases[case] |= unlike.get(case, {})
-        if case in pacing:
-            cases[case]["pacing"] = msgspec.to_builtins(pacing[case])
+        cases[case] |= facts[case]
     scenario = ran.scenario
     clock = {"clock": ran.clock, "speed": ran.speed} if ran.clock == "wall" else {}
     hand = {"by_hand": dict(by_hand)} if by_hand else {}
-    whole = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **hand, "cases": cases}
-    return json.dumps(whole, indent=2, allow_nan=False) + "\n"
+    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **hand, "cases": cases}
+    return json.dumps(text, indent=2, allow_nan=False) + "\n"
 
 
 def _numbers(steady: dict[str, Any]) -> dict[str, Any]:

@@ -24,16 +24,14 @@ from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
+from scenarios.results.event_windows import CaseRecord
 from scenarios.results.history import History, Nameplates
-from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.results.link_record import LinkRecord
-from scenarios.results.metrics import messages_saved
 from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorder
-from scenarios.results.settling import settling
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of, without_agent
+from scenarios.schema.participants import without_agent
 from scenarios.schema.scenario_changes import as_in
 from scenarios.sweep.file import Plan
 
@@ -94,18 +92,18 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         return SweepRow(number=number, status="broke", why=outcome.broke), None
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
-    history = History.of(recorded.inverters, recorded.rows)
-    nameplates = Nameplates.of(inverters_of(scenario, feeder)).without(without_agent(scenario, case))
+    record = CaseRecord.of(scenario, feeder, case, recorded)
+    nameplates = Nameplates.of_columns(recorded.inverters, feeder).without(without_agent(scenario, case))
     measures: dict[str, float | None] = {}
-    windows = metrics.windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
-    with np.errstate(all="ignore"):  # what is no number is told as such
-        for window in windows:
-            steady, settled = (of(history, nameplates, window, feeder.f_nom) for of in (metrics.measure, settling))
+    with np.errstate(all="ignore"):  # a value that is no number is None
+        for window in record.windows:
+            steady, settled = (
+                of(record.history, nameplates, window, feeder.f_nom) for of in (metrics.measure, metrics.settling)
+            )
             numbers = asdict(steady) | asdict(settled)
             reasons = numbers.pop("reasons")
             measures |= flat(window.label, numbers | {"steady": float(not reasons)})
-    saved = messages_saved(recorded.quiet, windows, len(agents), scenario.time.T_c_s)
-    own = own_measures(scenario, feeder, nameplates, {case: history}, {case: windows}, {case: saved}).get(case, {})
+    own = own_measures(scenario, feeder, {case: record}).get(case, {})
     for label, found in own.items():
         measures |= flat(label, dict(found.values))
     failed = [f"{label}: {name} {text}" for label, found in own.items() for name, text in found.reasons.items()]
@@ -119,7 +117,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
         measures=measures | _accounts(links),
     )
-    return done, history
+    return done, record.history
 
 
 def _accounts(links: LinkRecord) -> dict[str, float | None]:

@@ -6,9 +6,9 @@ from msgspec.structs import replace
 
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
+from scenarios.results.event_windows import as_they_came, windows
 from scenarios.results.history import History, Nameplates
-from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.results.metrics import measure, windows
+from scenarios.results.metrics import measure
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from scenarios.schema.scenario_writing import to_toml

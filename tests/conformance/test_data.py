@@ -8,6 +8,7 @@ import pytest
 from agents.agent_config import Control
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.event_windows import CaseRecord, windows
 from scenarios.results.findings import find
 from scenarios.results.history import History, Nameplates
 from scenarios.results.metrics_file import RunMetrics, metrics_json
@@ -19,6 +20,7 @@ from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import FleetRun, first_difference
 from wire.messages import Telemetry
 
+EVENTS = (("event1", 1.0), ("event2", 4.0))
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")
 
 
@@ -73,8 +75,8 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
     path = written(tmp_path, text)
     scenario, feeder = load_scenario(path)
-    history, nameplates = history_of(path, "IV"), Nameplates.of(feeder.inverters)
-    found = find(scenario, feeder, nameplates, {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]})
+    history = history_of(path, "IV")
+    found = find(scenario, feeder, {"IV": CaseRecord(history=history, windows=windows(EVENTS, scenario.time.end_s))})
     steady = found.results["IV"]["event1"]
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 
@@ -82,7 +84,7 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     assert steady.p["inv2"] == pytest.approx(0.647, abs=2e-3)
     assert min(p for name, p in steady.p.items() if name != "inv2") > 0.85
     assert steady.MPSI < 0.005
-    assert '"without_agent": [\n        "inv2"\n      ]' in metrics_json(ran, found, {"IV": ""}, {})
+    assert '"without_agent": [\n        "inv2"\n      ]' in metrics_json(ran, found, {"IV": {}})
 
 
 def test_both_drivers_leave_out_who_has_no_agent(tmp_path: Path) -> None:

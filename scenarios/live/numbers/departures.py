@@ -15,8 +15,7 @@ from plant.network import Network
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.windows import NEAR, LiveWindows, events_by_hand, opened
 from scenarios.live.show.events import line_of
-from scenarios.results.joins_and_leaves import as_they_came
-from scenarios.results.metrics import Window, windows
+from scenarios.results.event_windows import Window, as_they_came, windows
 from scenarios.results.steadiness import STEADY
 from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of

@@ -11,9 +11,9 @@ import msgspec
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import Compared
 from scenarios.results.drawing import Drawing, Mark, drawing_of
+from scenarios.results.event_windows import as_they_came
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
-from scenarios.results.joins_and_leaves import as_they_came
 from scenarios.schema import ScenarioModel
 from wire.messages import PlantEvent
 
@@ -46,8 +46,7 @@ def drawing_by_hand(
     """
     reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    taken, nameplates = taken_part(scenario, feeder, history)
-    drawing = drawing_of(compared.happened, feeder, nameplates, {case: taken}, came)
+    drawing = drawing_of(compared.happened, feeder, {case: taken_part(scenario, feeder, history)}, came)
     marks = [*drawing.events, *_by_hand(compared.departures)]
     return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
 

@@ -13,12 +13,10 @@ from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
 from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.history import History
+from scenarios.results.event_windows import CaseRecord, Window, late_moves
+from scenarios.results.findings import find
 from scenarios.results.island_membership import taken_part
-from scenarios.results.joins_and_leaves import late_moves
-from scenarios.results.measured_run import measure_run
-from scenarios.results.metrics import Window
-from scenarios.results.metrics_file import RunMetrics, metrics_json
+from scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
@@ -53,11 +51,9 @@ class LiveReport:
         """
         ran, case, recorded = self._ran, self._case, self._recorded
         compared = compare(ran.scenario, ran.feeder, recorded.events, recorded.ended, recorded.missing)
-        history, nameplates = taken_part(ran.scenario, ran.feeder, History.of(recorded.inverters, recorded.rows))
-        windows = {case: compared.opened.measured}
-        found, saved = measure_run(
-            compared.happened, ran.feeder, nameplates, {case: history}, windows, {case: recorded}
-        )
+        record = CaseRecord.of(compared.happened, ran.feeder, case, recorded, compared.opened.measured)
+        record = replace(record, history=taken_part(ran.scenario, ran.feeder, record.history))
+        found = find(compared.happened, ran.feeder, {case: record})
         report = RunReport(
             scenario=ran.scenario.name,
             titles={case: ran.scenario.cases[case].title},
@@ -67,8 +63,6 @@ class LiveReport:
             notes=[f"case {case}: {note}" for note in self._notes(compared)],
             folder=shown(ran.folder) + "/",
         )
-        pacing = {} if self._pacing is None else {case: self._pacing}
-        links = {case: recorded.links.sha256} if recorded.links.sha256 else {}
         by_hand = {
             "ended_s": compared.ended,
             "windows": _windows(compared),
@@ -82,14 +76,15 @@ class LiveReport:
             by_hand["unrecorded"] = [window.label for window in compared.unrecorded]
         write_whole(
             ran.folder / "metrics.json",
-            metrics_json(ran, found, {case: recorded.sha256}, pacing, links, by_hand, saved=saved),
+            metrics_json(ran, found, {case: case_facts(recorded, self._pacing)}, by_hand),
         )
         write_whole(ran.folder / "report.txt", plain(report))
 
         from scenarios.results.plots import draw_all  # matplotlib takes longer to import than all else
 
         draw_all(
-            drawing_by_hand(compared, ran.scenario, ran.feeder, case, history, recorded.events), ran.folder / "plots"
+            drawing_by_hand(compared, ran.scenario, ran.feeder, case, record.history, recorded.events),
+            ran.folder / "plots",
         )
         return report
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from scenarios.results.metrics import Window, windows
+from scenarios.results.event_windows import Window, windows
 from scenarios.results.steadiness import STEADY
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_model import Event

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property
-from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from plant.equipment import Feeder
-from scenarios.results.history import Floats, History, Nameplates, read_only
-from scenarios.results.metrics import Steady, Window, between, measure
+from scenarios.results.event_windows import CaseRecord, Window
+from scenarios.results.history import History, Nameplates, read_only
+from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.results.own.metric import Measured, make_metrics, measured
-from scenarios.results.settling import Settling, settling
 from scenarios.schema import ScenarioModel
 from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.participants import without_agent
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WindowData:
-    """Rows between an event and the next, and the inverters that they are of."""
+class WindowData(History):
+    """Rows between an event and the next, as read-only arrays (rows, inverters), and the inverters that they are of."""
 
     case: str
     """Name of the case."""
@@ -40,7 +39,14 @@ class WindowData:
     T_c: float
     """Control period (s)."""
     messages_saved: float = 0.0
-    """Share of states that the laws did not tell in the window."""
+    """Share of states that the laws did not send in the window."""
+
+    @classmethod
+    def cut(cls, whole: History, window: Window, **about: Any) -> WindowData:
+        """Return the rows of a window; `about` has the other fields."""
+        inside = window.rows(whole.t)
+        columns = {field.name: getattr(whole, field.name)[inside] for field in fields(History)[1:]}
+        return read_only(cls(inverters=whole.inverters, whole=whole, window=window, **columns, **about))
 
     @property
     def label(self) -> str:
@@ -57,57 +63,10 @@ class WindowData:
         """Time of the next event, or the end of the run (s)."""
         return self.window.end
 
-    @property
-    def inverters(self) -> tuple[str, ...]:
-        """Names of the inverters, the order of all columns."""
-        return self.whole.inverters
-
-    @cached_property
-    def record(self) -> History:
-        """Rows of the window alone, as arrays (rows, inverters)."""
-        inside = between(self.whole.t, self.window)
-        columns = {field.name: getattr(self.whole, field.name)[inside] for field in fields(History)[1:]}
-        return read_only(replace(self.whole, **columns))
-
-    @property
-    def t(self) -> Floats:
-        """Time of the rows (s)."""
-        return self.record.t
-
-    @property
-    def f(self) -> Floats:
-        """Frequency (Hz), rows by inverters."""
-        return self.record.f
-
-    @property
-    def P(self) -> Floats:
-        """Real power (W)."""
-        return self.record.P
-
-    @property
-    def Q(self) -> Floats:
-        """Reactive power (var)."""
-        return self.record.Q
-
-    @property
-    def V(self) -> Floats:
-        """Terminal voltage (V)."""
-        return self.record.V
-
-    @property
-    def P_set(self) -> Floats:
-        """Set-point of real power (W)."""
-        return self.record.P_set
-
-    @property
-    def V_set(self) -> Floats:
-        """Set-point of voltage (V)."""
-        return self.record.V_set
-
     @cached_property
     def history(self) -> pd.DataFrame:
         """Rows of the window as a table: columns (inverter, quantity), index t (s); each metric has its own."""
-        return self.record.frame()
+        return self.frame()
 
     @cached_property
     def steady(self) -> Steady:
@@ -120,107 +79,79 @@ class WindowData:
         return settling(self.whole, self.nameplates, self.window, self.f_nom)
 
 
-def f_error_Hz(window: WindowData) -> float:
-    """abs(f - f_nom), mean over the grid-forming inverters, at the end of the window (Hz)."""
-    return window.steady.f_error_Hz
+def _built_in(value: Callable[[WindowData], Any], text: str) -> Callable[[WindowData], Any]:
+    """Return a metric of gridpeers with the sentence that `gridpeers doc metrics` prints."""
+
+    def metric(window: WindowData) -> Any:
+        return value(window)
+
+    metric.__doc__ = text
+    return metric
 
 
-def MPSI(window: WindowData) -> float:
-    """Mean power sharing index, (16), at the end of the window."""
-    return window.steady.MPSI
-
-
-def V_error(window: WindowData) -> float:
-    """Mean of abs(V - 1) at the end of the window (pu)."""
-    return window.steady.V_error
-
-
-def MQSI(window: WindowData) -> float:
-    """Mean var sharing index, (17), at the end of the window."""
-    return window.steady.MQSI
-
-
-def t_restore_s(window: WindowData) -> float | None:
-    """Time until frequency and power sharing are restored for good (s)."""
-    return window.steady.t_restore_s
-
-
-def t_load_s(window: WindowData) -> float | None:
-    """Time until the inverters carry their steady load within 2 % for good (s)."""
-    return window.steady.t_load_s
-
-
-def p(window: WindowData) -> dict[str, float]:
-    """Real power of each inverter at the end of the window (pu of its rating)."""
-    return window.steady.p
-
-
-def t_f_s(window: WindowData) -> float | None:
-    """Time until the frequency is restored for good (s)."""
-    return window.settled.t_f_s
-
-
-def t_share_s(window: WindowData) -> float | None:
-    """Time until power is shared equally for good (s)."""
-    return window.settled.t_share_s
-
-
-def f_swing_Hz(window: WindowData) -> float:
-    """Highest minus lowest frequency of a grid-forming inverter at the end of the window (Hz)."""
-    return window.settled.f_swing_Hz
-
-
-def V_swing_pu(window: WindowData) -> float:
-    """Highest minus lowest voltage of an inverter at the end of the window (pu)."""
-    return window.settled.V_swing_pu
-
-
-def messages_saved(window: WindowData) -> float:
-    """Share of states that the laws did not tell their neighbours."""
-    return window.messages_saved
+f_error_Hz = _built_in(
+    lambda window: window.steady.f_error_Hz,
+    "abs(f - f_nom), mean over the grid-forming inverters, at the end of the window (Hz).",
+)
+MPSI = _built_in(lambda window: window.steady.MPSI, "Mean power sharing index, (16), at the end of the window.")
+V_error = _built_in(lambda window: window.steady.V_error, "Mean of abs(V - 1) at the end of the window (pu).")
+MQSI = _built_in(lambda window: window.steady.MQSI, "Mean var sharing index, (17), at the end of the window.")
+t_restore_s = _built_in(
+    lambda window: window.steady.t_restore_s, "Time until frequency and power sharing are restored for good (s)."
+)
+t_load_s = _built_in(
+    lambda window: window.steady.t_load_s,
+    "Time until the inverters carry their steady load within 2 % for good (s).",
+)
+p = _built_in(
+    lambda window: window.steady.p, "Real power of each inverter at the end of the window (pu of its rating)."
+)
+t_f_s = _built_in(lambda window: window.settled.t_f_s, "Time until the frequency is restored for good (s).")
+t_share_s = _built_in(lambda window: window.settled.t_share_s, "Time until power is shared equally for good (s).")
+f_swing_Hz = _built_in(
+    lambda window: window.settled.f_swing_Hz,
+    "Highest minus lowest frequency of a grid-forming inverter at the end of the window (Hz).",
+)
+V_swing_pu = _built_in(
+    lambda window: window.settled.V_swing_pu,
+    "Highest minus lowest voltage of an inverter at the end of the window (pu).",
+)
+messages_saved = _built_in(
+    lambda window: window.messages_saved, "Share of states that the laws did not send to their neighbours."
+)
 
 
 def own_measures(
-    scenario: ScenarioModel,
-    feeder: Feeder,
-    nameplates: Nameplates,
-    histories: Mapping[str, History],
-    windows: Mapping[str, Sequence[Window]],
-    saved: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
+    scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord]
 ) -> dict[str, dict[str, Measured]]:
     """Return the values of the scenario's own metrics, by case and window; empty if it has none.
 
     Parameters
     ----------
     scenario, feeder : ScenarioModel, Feeder
-        What was run.
-    nameplates : Nameplates
-        Nameplates in the order of the histories' columns.
-    histories, windows : Mapping
-        By case: what was recorded, and where it is measured.
-    saved : Mapping, optional
-        Share of messages that the laws saved, by case and window.
+        As run.
+    cases : Mapping[str, CaseRecord]
+        Recorded cases with their windows.
     """
     metrics = make_metrics(metrics_of(scenario))
     if not metrics:
         return {}
     found: dict[str, dict[str, Measured]] = {}
-    for case, history in histories.items():
-        mine, whole = read_only(nameplates.without(without_agent(scenario, case))), read_only(history)
-        with np.errstate(all="ignore"):  # what is no number is told as such
+    for case, record in cases.items():
+        whole = read_only(record.history)
+        nameplates = Nameplates.of_columns(whole.inverters, feeder).without(without_agent(scenario, case))
+        about = {
+            "case": case,
+            "nameplates": read_only(nameplates),
+            "f_nom": feeder.f_nom,
+            "T_c": scenario.time.T_c_s,
+        }
+        with np.errstate(all="ignore"):  # a value that is no number has its reason
             found[case] = {
                 window.label: measured(
                     metrics,
-                    WindowData(
-                        case=case,
-                        window=window,
-                        whole=whole,
-                        nameplates=mine,
-                        f_nom=feeder.f_nom,
-                        T_c=scenario.time.T_c_s,
-                        messages_saved=saved.get(case, {}).get(window.label, 0.0),
-                    ),
+                    WindowData.cut(whole, window, messages_saved=record.messages_saved.get(window.label, 0.0), **about),
                 )
-                for window in windows[case]
+                for window in record.windows
             }
     return found

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenarios.results.event_windows import Window
 from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import Window
-from scenarios.results.settling import settling
+from scenarios.results.metrics import settling
 
 PLATES = Nameplates(
     names=("leader", "follower"),

@@ -6,6 +6,7 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from scenarios.results.claims import judge
+from scenarios.results.event_windows import CaseRecord, windows
 from scenarios.results.findings import Findings, SteadyValues, find
 from scenarios.results.history import History, Nameplates
 from scenarios.schema import load_scenario
@@ -82,5 +83,7 @@ def experiment(name: str) -> Experiment:
         assert not outcome.broke
         assert outcome.reproducible
         histories[case] = History.of(nameplates.names, recorded.rows)
-    found = find(scenario, feeder, nameplates, histories, dict.fromkeys(histories, events))
+    opened = windows(events, scenario.time.end_s)
+    cases = {case: CaseRecord(history=history, windows=opened) for case, history in histories.items()}
+    found = find(scenario, feeder, cases)
     return Experiment(nameplates, histories, found)

@@ -10,8 +10,7 @@ from papers.singhal2022.tables import tables_of
 from papers.singhal2022.tolerances import TABLE
 from scenarios.results.claims import Verdict, judge
 from scenarios.results.findings import Findings
-from scenarios.results.metrics import Steady
-from scenarios.results.settling import Settling
+from scenarios.results.metrics import Settling, Steady
 
 ISLANDING = CLAIMS["islanding"]
 Table = dict[str, dict[str, Steady]]

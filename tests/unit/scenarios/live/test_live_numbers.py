@@ -16,8 +16,9 @@ from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_report import LiveReport
+from scenarios.results.event_windows import CaseRecord, windows
 from scenarios.results.findings import find
-from scenarios.results.history import History, Nameplates
+from scenarios.results.history import History
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
@@ -242,10 +243,10 @@ def test_a_run_by_hand_that_was_left_alone_has_the_numbers_of_its_case(tmp_path:
     run_inprocess(plant, agents, recorder)
     history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
     found = find(
-        scenario, feeder, Nameplates.of(feeder.inverters), {"IV": history}, {"IV": [("event1", 1.0), ("event2", 4.0)]}
+        scenario, feeder, {"IV": CaseRecord(history=history, windows=windows([("event1", 1.0), ("event2", 4.0)], 7.0))}
     )
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
-    expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
+    expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)
 
     for event in ("event1", "event2"):
@@ -325,10 +326,10 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
         scenario, events=events, time=msgspec.structs.replace(scenario.time, end_s=8.5), paper=""
     )
     history = History.of(switched.inverters, switched.rows)
-    came = {"IV": [(event.label, event.t_s) for event in events]}
-    found = find(whole, feeder, Nameplates.of(feeder.inverters), {"IV": history}, came)
+    came = [(event.label, event.t_s) for event in events]
+    found = find(whole, feeder, {"IV": CaseRecord(history=history, windows=windows(came, whole.time.end_s))})
     ran = RunMetrics(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
-    expected = json.loads(metrics_json(ran, found, {"IV": ""}, {}))["cases"]["IV"]
+    expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)
     case = metrics["cases"]["IV"]
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.results import metrics
+from scenarios.results.event_windows import Window
 from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import Window
 
 F_NOM = 60.0
 PLATES = Nameplates(

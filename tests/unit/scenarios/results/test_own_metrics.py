@@ -12,9 +12,10 @@ import pytest
 
 from scenarios.results.benchmark_registry import CLAIMS
 from scenarios.results.claims import Claim, judged
+from scenarios.results.event_windows import Window
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Nameplates, read_only
-from scenarios.results.metrics import Steady, Window
+from scenarios.results.metrics import Steady
 from scenarios.results.own.metric import ALWAYS, METRICS, make_metrics, measured, name_of
 from scenarios.results.own.window_metrics import WindowData
 from scenarios.sweep.column_labels import unit_of
@@ -41,7 +42,7 @@ def window_data() -> WindowData:
         m_q=np.array([0.05, 0.05]),
     )
     event = Window(label="event1", start=1.0, end=2.0)
-    return WindowData(case="IV", window=event, whole=whole, nameplates=nameplates, f_nom=60.0, T_c=0.02)
+    return WindowData.cut(whole, event, case="IV", nameplates=nameplates, f_nom=60.0, T_c=0.02)
 
 
 class Unlisted(Mapping[str, float]):

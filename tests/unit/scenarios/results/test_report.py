@@ -125,7 +125,7 @@ def test_metrics_of_several_islands_together_are_null() -> None:
     found = Findings(
         results={"IV": {"event1": whole, "event2": whole}}, islands={"IV": {"event2": {"inv1": whole, "inv4": whole}}}
     )
-    case = json.loads(metrics_json(ran, found, {"IV": "f00"}, {}))["cases"]["IV"]
+    case = json.loads(metrics_json(ran, found, {"IV": {"history_sha256": "f00"}}))["cases"]["IV"]
 
     shared = ("MPSI", "MQSI", "t_restore_s")
     assert [case["event1"][name] for name in shared] == [0.093, 0.492, 2.0]

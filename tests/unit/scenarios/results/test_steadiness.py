@@ -10,9 +10,10 @@ import pytest
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
 from scenarios.results.claims import judge
+from scenarios.results.event_windows import Window
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import Steady, Window, measure
+from scenarios.results.metrics import Steady, measure
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.report import RunReport, plain
 from scenarios.schema import load_scenario
@@ -190,7 +191,7 @@ def test_metrics_json_has_null_and_the_reason(tmp_path: Path) -> None:
     spec, feeder = load_scenario("islanding")
     ran = RunMetrics(scenario=spec, feeder=feeder, driver="inprocess", folder=tmp_path)
 
-    cases = json.loads(metrics_json(ran, found, dict.fromkeys(spec.cases, "x"), {}))["cases"]
+    cases = json.loads(metrics_json(ran, found, {case: {} for case in spec.cases}))["cases"]
 
     assert cases["I"]["event1"]["f_error_Hz"] is None
     assert cases["I"]["event1"]["reasons"] == {"f_error_Hz": "not steady: still moves -0.3 Hz/s; last mean 0.14 Hz"}

@@ -8,7 +8,7 @@ import pytest
 from plant.plant_config import ScheduledAction
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.live.live_options import LiveOptions, configure
-from scenarios.results.joins_and_leaves import as_they_came, late_moves
+from scenarios.results.event_windows import as_they_came, late_moves
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
