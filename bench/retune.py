@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from scenarios.schema import load_scenario
 from scenarios.sweep.file import Run
+from scenarios.sweep.sweep_case import run_one
 from scenarios.sweep.workers import cores, on_this_machine
 
 ALPHA = (0.125, 0.25, 0.5, 1.0, 2.0)
@@ -35,7 +36,7 @@ def main() -> None:
         cases[f"a{alpha}-b{beta}"] = replace(scenario.cases["untuned"], gains=gains)
     whole = replace(scenario, cases=cases)
     runs = [(i, Run(scenario=whole, case=case, sample=i, shown={})) for i, case in enumerate(cases)]
-    found = {end.number: end.measures for end in on_this_machine(runs, cores())}
+    found = {end.number: end.measures for end in on_this_machine(runs, cores(), run_one)}
     print("alpha   beta   V_error pu   MQSI    restored")
     for i, (alpha, beta) in enumerate([(float("nan"), float("nan")), *points]):
         what = f"{alpha:<7g} {beta:<6g}" if i else f"{'full graph':14}"

@@ -104,7 +104,7 @@ def sweep(plan: Plan, folder: Path) -> float:
     """Return the time (s) of all runs on all cores, the start of the workers included."""
     began = perf_counter()
     with SweepFolder(folder, plan) as opened:
-        for done in on_this_machine(list(enumerate(plan.runs)), cores()):
+        for done in on_this_machine(list(enumerate(plan.runs)), cores(), run_one):
             assert done.status == "ran", done.why
             opened.add(done)
     return perf_counter() - began

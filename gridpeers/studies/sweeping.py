@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,11 +19,13 @@ from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.portability import check_portable
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.sweep.column_labels import unit_of
-from scenarios.sweep.file.plan import Plan, Run
+from scenarios.sweep.file.plan import Plan
 from scenarios.sweep.file.samples import BaseScenario
 from scenarios.sweep.file.sweep_model import Sweep
 from scenarios.sweep.file.sweep_reading import plan_of
-from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of, run_one, run_with_history
+from scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
+from scenarios.sweep.sweep_table import results_frame
+from scenarios.sweep.workers import cores, on_this_machine
 from wire.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
@@ -85,24 +86,22 @@ def sweep(
     known = as_scenario(scenario)
     _check_words(grid, zip, cases, metrics, jobs, progress)
     checked, chosen = _with_metrics(known, metrics)
-    plan = _plan(checked, grid or {}, zip or {}, _names(cases or ()), seeds)
-    runs = list(enumerate(plan.runs))
+    plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else tuple(cases or ()), seeds)
     done: dict[int, SweepRow] = {}
-    kept: dict[int, pd.DataFrame] = {}
-    for end, history in _results(runs, _jobs(plan, jobs), histories=histories):
-        done[end.number] = end
-        if history is not None:
-            kept[end.number] = history.frame()
-        if progress is not None:
-            progress(len(done), len(runs))
-    columns = columns_of(plan, done)
-    del columns["sample"]
-    frame = pd.DataFrame({name: _column(name, values, plan) for name, values in columns.items()})
+    kept: dict[int, pd.DataFrame | None] = {}
+    results = on_this_machine(list(enumerate(plan.runs)), _jobs(plan, jobs), run_with_history if histories else _run)
+    with closing(results):
+        for row, history in results:
+            done[row.number] = row
+            kept[row.number] = None if history is None else history.frame()
+            if progress is not None:
+                progress(len(done), len(plan.runs))
+    frame = results_frame(plan, done).drop(columns="sample")
     if chosen is not None:
         frame = frame[_chosen(list(frame), tuple(chosen), plan)]
     frame.attrs["units"] = {name: unit for name in frame if (unit := unit_of(str(name)))}
     if histories:
-        frame["history"] = [kept.get(number) for number in sorted(done)]
+        frame["history"] = [kept[number] for number in sorted(done)]
     return frame
 
 
@@ -162,52 +161,20 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
     return plan_of(request, BaseScenario(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
 
 
-def _names(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of which a single one may stand alone."""
-    return (given,) if isinstance(given, str) else tuple(map(str, given))
-
-
 def _jobs(plan: Plan, jobs: int | None) -> int:
-    """Return how many processes share the runs; what a notebook defines is known to its own process alone."""
-    if jobs is None and find_spec("joblib") is None:
+    """Return how many processes share the runs; definitions of a notebook are known to its own process alone."""
+    lacking = find_spec("joblib") is None
+    if (lacking and jobs is None) or any(check_portable(run.scenario, measures=True) for run in plan.runs):
         return 1
-    if any(check_portable(run.scenario, measures=True) for run in plan.runs):
-        return 1
-    if jobs is None:
-        from scenarios.sweep.workers import cores
-
-        jobs = cores()
-    return min(jobs, len(plan.runs))
-
-
-def _results(
-    runs: Sequence[tuple[int, Run]], jobs: int, *, histories: bool
-) -> Iterator[tuple[SweepRow, History | None]]:
-    """Do all runs; each comes as soon as it is done, with its history if that is asked for."""
-    task: Callable[[int, ScenarioModel, str], tuple[SweepRow, History | None]] = (
-        run_with_history if histories else _without_history
-    )
-    if jobs == 1:
-        yield from (task(number, run.scenario, run.case) for number, run in runs)
-        return
-    if find_spec("joblib") is None:
+    count = min(cores() if jobs is None else jobs, len(plan.runs))
+    if lacking and count > 1:
         raise ScenarioError(["jobs: more than one process needs joblib: pip install 'gridpeers[sweep]'"])
-    from scenarios.sweep.workers import on_this_machine
-
-    with closing(on_this_machine(runs, jobs, task)) as results:
-        yield from results
+    return count
 
 
-def _without_history(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, None]:
-    """Do one run whose history nobody wants, which spares its way between two processes."""
+def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
+    """Do one run without its history, whose way between two processes is spared."""
     return run_one(number, scenario, case), None
-
-
-def _column(name: str, values: list[Any], plan: Plan) -> list[Any]:
-    """Return a column in which a metric without a value is nan; everything else is as it was given."""
-    if name in plan.parameters or name in ("case", "seed", *FATE):
-        return values
-    return [math.nan if value is None else value for value in values]
 
 
 def _chosen(columns: list[str], metrics: tuple[str, ...], plan: Plan) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import typing
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -13,41 +13,36 @@ from wire.table_schema import INLINE, Field, Label, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
-WORDS = {
-    "f_error_Hz": "settled abs(f - f_nom) (Hz)",
-    "MPSI": "settled power sharing index, MPSI",
-    "V_error": "settled mean abs(V - 1) (pu)",
-    "MQSI": "settled var sharing index, MQSI",
-    "t_restore_s": "time to restore f and sharing (s)",
-    "t_load_s": "time to take over the load (s)",
-    "t_f_s": "time to restore f (s)",
-    "t_share_s": "time to share power (s)",
-    "f_swing_Hz": "swing of f at the end (Hz)",
-    "V_swing_pu": "swing of V at the end (pu)",
-    "steady": "steady at the end (1: yes, 0: no)",
+
+class IndexAxis(NamedTuple):
+    """The axis of an index."""
+
+    label: str
+    """Words instead of the index's name."""
+    least: float
+    """Least length, in the index's unit: smaller differences are rounding, or too small to see.
+
+    Settled indexes have the last digit that the paper prints, times a usual control period.
+    """
+
+
+INDEXES = {
+    "f_error_Hz": IndexAxis("settled abs(f - f_nom) (Hz)", 0.01),
+    "MPSI": IndexAxis("settled power sharing index, MPSI", 0.01),
+    "V_error": IndexAxis("settled mean abs(V - 1) (pu)", 0.001),
+    "MQSI": IndexAxis("settled var sharing index, MQSI", 0.01),
+    "t_restore_s": IndexAxis("time to restore f and sharing (s)", 0.02),
+    "t_load_s": IndexAxis("time to take over the load (s)", 0.02),
+    "t_f_s": IndexAxis("time to restore f (s)", 0.02),
+    "t_share_s": IndexAxis("time to share power (s)", 0.02),
+    "f_swing_Hz": IndexAxis("swing of f at the end (Hz)", 0.001),
+    "V_swing_pu": IndexAxis("swing of V at the end (pu)", 0.0001),
+    "steady": IndexAxis("steady at the end (1: yes, 0: no)", 1.0),
 }
-"""What is written at the axes instead of an index's name."""
+"""Axes of the project's own indexes."""
 
 GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
 """What is written at the axes for the parameters of drawn graphs, which no scenario file has."""
-
-LEAST = {
-    "f_error_Hz": 0.01,
-    "MPSI": 0.01,
-    "V_error": 0.001,
-    "MQSI": 0.01,
-    "t_restore_s": 0.02,
-    "t_load_s": 0.02,
-    "t_f_s": 0.02,
-    "t_share_s": 0.02,
-    "f_swing_Hz": 0.001,
-    "V_swing_pu": 0.0001,
-    "steady": 1.0,
-}
-"""Least length of an axis of an index, in its unit: what is smaller is rounding, or nothing that anybody would see.
-
-Settled indexes have the last digit that the paper prints, times a usual control period.
-"""
 
 
 def unit_of(name: str) -> str:
@@ -80,8 +75,8 @@ def label_of(name: str) -> str:
     >>> label_of("handling.T_age_s"), label_of("plant.gfm.k_pp"), label_of("handling.kappa_c")
     ('T_age of [handling] (s)', 'k_pp of [plant.gfm] (rad/s per pu)', 'kappa_c of [handling] (1/s)')
     """
-    if name.rpartition(".")[2] in WORDS:
-        return WORDS[name.rpartition(".")[2]]
+    if (index := name.rpartition(".")[2]) in INDEXES:
+        return INDEXES[index].label
     key, case = _apart(name)
     field, unit = _field_at(key), unit_of(key)
     label = field.mark(Label) if field else None

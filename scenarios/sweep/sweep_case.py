@@ -9,8 +9,6 @@ from __future__ import annotations
 import copy
 import math
 import threading
-from collections import OrderedDict
-from collections.abc import Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from typing import Any, Literal
@@ -33,12 +31,19 @@ from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import without_agent
 from scenarios.schema.scenario_changes import as_in
-from scenarios.sweep.file import Plan
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
 
-_kept = threading.local()  # a worker of Dask may be a thread among others
+
+class _Kept(threading.local):
+    """Plants of this thread: a worker of Dask may be a thread among others."""
+
+    def __init__(self) -> None:
+        self.plants: dict[bytes, Plant] = {}
+
+
+_kept = _Kept()
 
 _feeder = lru_cache(maxsize=8)(read_feeder)
 
@@ -52,7 +57,7 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     """Whether it reached its end."""
     why: str = ""
     """Why it broke."""
-    sha256: str = ""
+    history_sha256: str = ""
     """Of the bytes that history.csv would have."""
     links_sha256: str = ""
     """Of all verdicts of the emulated links; "" without."""
@@ -66,6 +71,10 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     """Every index of every event's window, e.g. "event1.MPSI", None where it is not a number, or never came to be;
     "event1.steady", 1 where all of them are steady values, else 0;
     and over all emulated links how many messages fared how, e.g. "links_dropped"."""
+
+
+FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256", "metric_warnings")
+"""Fields of a row that are columns between parameters and indexes."""
 
 
 def run_one(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
@@ -111,7 +120,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         number=number,
         status="ran",
         metric_warnings="; ".join(failed),
-        sha256=recorded.sha256,
+        history_sha256=recorded.sha256,
         links_sha256=links.sha256,
         trips="; ".join(f"t = {event.t:g} s: {event.text}" for event in recorded.events if event.kind == "trip"),
         link_warnings="; ".join((*links.warnings, *sorted(links.failures))),
@@ -155,38 +164,9 @@ def plant_at_start(config: PlantConfig) -> Plant:
     To factor the network and find the operating point is a fifth of a run, and what agents are told is no part of it.
     A copy gives the same bytes as a new plant: a test holds it to that.
     """
-    if not hasattr(_kept, "plants"):
-        _kept.plants = OrderedDict()
-    plants: OrderedDict[bytes, Plant] = _kept.plants
+    plants = _kept.plants
     key = msgspec.json.encode((config.settings, config.T_c, config.record_step))  # tables in it have no hash
-    if key not in plants:
-        plants[key] = build_plant(config)
-        if len(plants) > KEPT_PLANTS:
-            plants.popitem(last=False)
-    plants.move_to_end(key)
+    plants[key] = plants.pop(key) if key in plants else build_plant(config)  # the latest is the last
+    if len(plants) > KEPT_PLANTS:
+        del plants[next(iter(plants))]
     return copy.deepcopy(plants[key])
-
-
-FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha256", "metric_warnings")
-"""Columns between parameters and indexes."""
-
-
-def columns_of(plan: Plan, done: Mapping[int, SweepRow]) -> dict[str, list[Any]]:
-    """Return the columns of the table by name, None where there is no value; see `table_of`."""
-    numbers = sorted(done)
-    rows, ends = [plan.runs[i] for i in numbers], [done[i] for i in numbers]
-    columns: dict[str, list[Any]] = {
-        "sample": [row.sample for row in rows],
-        "case": [row.case for row in rows],
-        "seed": [row.scenario.seed for row in rows],
-    }
-    for name in plan.parameters:
-        if name not in columns:
-            columns[name] = [row.shown[name] for row in rows]
-    for name in FATE[:-1]:
-        columns[name] = [getattr(end, name.removeprefix("history_")) or None for end in ends]
-    if any(run.scenario.metrics for run in rows):
-        columns["metric_warnings"] = [end.metric_warnings or None for end in ends]
-    for name in dict.fromkeys(name for end in ends for name in end.measures):
-        columns[name] = [end.measures.get(name) for end in ends]
-    return columns

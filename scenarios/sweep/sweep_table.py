@@ -1,4 +1,4 @@
-"""The table of a sweep: one Parquet file with every parameter, every index and the fate of every run.
+"""The results of a sweep: a pandas table with a row per run, and the Parquet file with every parameter and index.
 
 Rows are in the order of the plan whatever order they were finished in, and columns depend on the plan and the rows
 alone; so the same sweep gives an equal table, undisturbed or resumed, here or on a cluster.
@@ -7,73 +7,68 @@ alone; so the same sweep gives an equal table, undisturbed or resumed, here or o
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pandas as pd
 
 from scenarios.run import versions
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file import Plan
-from scenarios.sweep.sweep_case import FATE, SweepRow, columns_of
+from scenarios.sweep.sweep_case import FATE, SweepRow
 
 FILE = "results.parquet"
 
 
-def table_of(plan: Plan, done: Mapping[int, SweepRow]) -> pa.Table:
+def results_frame(plan: Plan, done: Mapping[int, SweepRow]) -> pd.DataFrame:
     """Return the rows of the runs that are done.
 
-    Columns: `sample`, `case`, `seed`, the parameters by their path, `status` ("ran" or "broke"), `why`,
-    `trips`, `link_warnings`, `history_sha256`, `links_sha256`, the indexes as "WINDOW.INDEX", and over emulated links
-    `links_sent`, `links_delivered`, `links_dropped`. The metadata holds the sweep file, the base scenario with all
-    defaults, and the versions; each column's has its unit.
+    Columns: `sample`, `case`, `seed`, the parameters by their path, those of `FATE` (`metric_warnings` only where the
+    scenario has metrics of its own), the indexes as "WINDOW.INDEX", nan where there is no value, and over emulated
+    links `links_sent`, `links_delivered`, `links_dropped`.
     """
-    columns = {name: _array(name, values, plan) for name, values in columns_of(plan, done).items()}
-    fields = [pa.field(name, column.type, metadata=_metadata(name)) for name, column in columns.items()]
+    numbers = sorted(done)
+    runs, rows = [plan.runs[number] for number in numbers], [done[number] for number in numbers]
+    columns: dict[str, list[object]] = {
+        "sample": [run.sample for run in runs],
+        "case": [run.case for run in runs],
+        "seed": [run.scenario.seed for run in runs],
+    }
+    columns |= {name: [run.shown[name] for run in runs] for name in plan.parameters if name not in columns}
+    fate = FATE if any(run.scenario.metrics for run in runs) else FATE[:-1]
+    columns |= {name: [getattr(row, name) or None for row in rows] for name in fate}
+    measures = pd.DataFrame([row.measures for row in rows], dtype=float)
+    return pd.concat([pd.DataFrame(columns), measures], axis=1)
+
+
+def as_written(frame: pd.DataFrame, plan: Plan) -> pd.DataFrame:
+    """Return the table with parameters that are neither numbers nor texts as JSON."""
+    mixed = [name for name in plan.parameters if frame[name].dtype == object]
+    return frame.assign(**{name: [json.dumps(value, default=str) for value in frame[name]] for name in mixed})
+
+
+def write_table(frame: pd.DataFrame, plan: Plan, folder: Path) -> Path:
+    """Write a table at once or not at all.
+
+    Each column's metadata has its unit; the file's has the sweep file, the base scenario with all defaults, and the
+    versions.
+    """
+    import pyarrow as pa  # of the extra `sweep`; a sweep in Python does without
+    import pyarrow.parquet as pq
+
+    types = {name: pa.from_numpy_dtype(of) if of.kind in "bif" else pa.string() for name, of in frame.dtypes.items()}
+    units = {name: {"unit": unit_of(name)} if unit_of(name) else None for name in frame}
+    schema = pa.schema([pa.field(name, types[name], metadata=units[name]) for name in frame])
     about = {
         "gridpeers.sweep": plan.text,
         "gridpeers.scenario": to_toml(plan.base, {}),
         "gridpeers.fingerprint": plan.fingerprint,
         "gridpeers.versions": json.dumps(versions()),
     }
-    return pa.table(list(columns.values()), schema=pa.schema(fields, metadata=about))
-
-
-def write_table(table: pa.Table, folder: Path) -> Path:
-    """Write the table at once or not at all."""
     path = folder / FILE
     partial = path.with_name(FILE + ".partial")
+    table = pa.Table.from_pandas(frame, schema=schema, preserve_index=False).replace_schema_metadata(about)
     pq.write_table(table, partial)
     partial.replace(path)
     return path
-
-
-def _array(name: str, values: Sequence[Any], plan: Plan) -> pa.Array:
-    """Return a column with the type that it has in every sweep."""
-    if name in ("sample", "seed"):
-        return pa.array(values, pa.int64())
-    if name == "case" or name in FATE:
-        return pa.array(values, pa.string())
-    return _column(values) if name in plan.parameters else pa.array(values, pa.float64())
-
-
-def _column(values: Sequence[Any]) -> pa.Array:
-    """Return the values of a parameter: numbers and texts as such, what is neither as JSON."""
-    kinds = {type(value) for value in values}
-    if kinds <= {bool}:
-        return pa.array(values, pa.bool_())
-    if kinds <= {int}:
-        return pa.array(values, pa.int64())
-    if kinds <= {int, float}:
-        return pa.array(values, pa.float64())
-    if kinds <= {str}:
-        return pa.array(values, pa.string())
-    return pa.array([json.dumps(value, default=str) for value in values], pa.string())
-
-
-def _metadata(name: str) -> dict[str, str] | None:
-    unit = unit_of(name)
-    return {"unit": unit} if unit else None

@@ -1,8 +1,7 @@
-"""The runs of a sweep over all cores of this machine, or over a Dask cluster: the same tasks through joblib.
+"""The runs of a sweep in this process, over all cores of this machine or over a Dask cluster, the last two by joblib.
 
 Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, and they are ended when the
-command leaves. What they and their helpers would write over the terminal at such an end is left out: a run's error
-comes as its result.
+command leaves. Workers write nothing to the terminal: a run's error comes as its result.
 """
 
 from __future__ import annotations
@@ -10,21 +9,20 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar, overload
-
-from joblib import Parallel, cpu_count, delayed, parallel_config
-from joblib.externals.loky import get_reusable_executor
+from typing import Any, TypeVar
 
 from scenarios.schema import ScenarioModel
 from scenarios.sweep.file import Run
-from scenarios.sweep.sweep_case import SweepRow, run_one
 
 T = TypeVar("T")
 
 Task = Callable[[int, ScenarioModel, str], T]
 """Does one run: its number, its scenario, its case."""
+
+NumberedRuns = Sequence[tuple[int, Run]]
 
 _WARNINGS = "PYTHONWARNINGS"
 
@@ -33,29 +31,28 @@ DASK_PATIENCE = 10.0
 
 
 class WorkersError(RuntimeError):
-    """The workers cannot be had, or have gone."""
+    """No worker is to be had, or one has gone."""
 
 
 def cores() -> int:
-    """Return the cores that this process may use."""
+    """Return the number of cores that this process may use."""
+    from joblib import cpu_count
+
     return int(cpu_count())
 
 
-@overload
-def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int) -> Generator[SweepRow, None, None]: ...
-@overload
-def on_this_machine(runs: Sequence[tuple[int, Run]], jobs: int, task: Task[T]) -> Generator[T, None, None]: ...
-def on_this_machine(
-    runs: Sequence[tuple[int, Run]], jobs: int, task: Task[Any] = run_one
-) -> Generator[Any, None, None]:
-    """Do the runs in `jobs` processes; each comes back as soon as it is done, in whatever order.
+def on_this_machine(runs: NumberedRuns, jobs: int, task: Task[T]) -> Generator[T, None, None]:
+    """Do the runs in `jobs` processes; each result comes as soon as it is there, in whatever order.
 
-    Close the iterator to end the workers early.
+    Close the generator to end the workers early.
     """
     if jobs == 1:
         for number, run in runs:
             yield task(number, run.scenario, run.case)
         return
+    from joblib import parallel_config
+    from joblib.externals.loky import get_reusable_executor
+
     with parallel_config(backend="loky", n_jobs=jobs, initializer=_prepare, initargs=(os.getpid(),)):
         try:
             yield from _parallel(runs, task)
@@ -63,7 +60,7 @@ def on_this_machine(
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
-def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[SweepRow, None, None]:
+def on_dask(runs: NumberedRuns, address: str, task: Task[T]) -> Generator[T, None, None]:
     """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders.
 
     Raises
@@ -72,6 +69,7 @@ def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[SweepRow
         If there is no scheduler at the address, or it has no worker.
     """
     from distributed import Client
+    from joblib import parallel_config
 
     connect: Any = Client  # it has no types
 
@@ -84,58 +82,51 @@ def on_dask(runs: Sequence[tuple[int, Run]], address: str) -> Generator[SweepRow
         ) from None
     with client, parallel_config(backend="dask", client=client, wait_for_workers_timeout=DASK_PATIENCE):
         try:
-            yield from _parallel(runs, run_one)
+            yield from _parallel(runs, task)
         except TimeoutError:
             raise WorkersError(f"--dask {address}: the scheduler has no worker; start some by `dask worker`") from None
 
 
-def _parallel(runs: Sequence[tuple[int, Run]], task: Task[T]) -> Generator[T, None, None]:
+def _parallel(runs: NumberedRuns, task: Task[T]) -> Generator[T, None, None]:
+    from joblib import Parallel, delayed
+
     tasks = (delayed(task)(number, run.scenario, run.case) for number, run in runs)
     with _without_interrupts():
-        # one run a batch: what is done is kept at once
+        # one run a batch: each result is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)
     try:
         # not `yield from`, which would close the results, with a warning, before we can
         for done in results:  # noqa: UP028
             yield done
     except GeneratorExit:
-        _close(results)
+        with warnings.catch_warnings(action="ignore"):  # joblib warns that results are lost, as they are meant to be
+            results.close()
         raise
     except (OSError, RuntimeError) as error:  # joblib's TerminatedWorkerError is a BrokenProcessPool, a RuntimeError
         first = str(error).partition("\n")[0]
         raise WorkersError(f"a worker has gone ({type(error).__name__}: {first})") from error
 
 
-def _close(results: Any) -> None:
-    """End the dispatch; joblib warns that results are lost, which is what was asked for."""
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        results.close()
-
-
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back in this thread and in what it starts; one that came meanwhile comes after.
+    """Hold Ctrl-C back in this thread and in all that it starts, until it leaves.
 
     The tracker of the workers' semaphores, started here too, else warns of those of workers that were ended.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    warnings = os.environ.get(_WARNINGS)
-    os.environ[_WARNINGS] = ",".join(filter(None, [warnings, "ignore:resource_tracker:UserWarning"]))
+    inherited = os.environ.get(_WARNINGS)
+    os.environ[_WARNINGS] = ",".join(filter(None, [inherited, "ignore:resource_tracker:UserWarning"]))
     try:
         yield
     finally:
-        if warnings is None:
-            del os.environ[_WARNINGS]
-        else:
-            os.environ[_WARNINGS] = warnings
+        os.environ.pop(_WARNINGS)
+        if inherited is not None:
+            os.environ[_WARNINGS] = inherited
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare(parent: int) -> None:
-    """Have this worker be silent, and end when the command is killed: nobody else would end it, for minutes."""
+    """Silence this worker, and end it when the command is killed: otherwise it would wait for minutes."""
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 2)
     os.close(silence)

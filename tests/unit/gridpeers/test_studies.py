@@ -70,7 +70,7 @@ def test_a_sweep_in_python_is_that_of_the_same_file(scenario: gp.Scenario, tmp_p
 
     table = gp.sweep(scenario, zip={"gains.k_p": [0.001]}, cases=["I"], jobs=1)
 
-    assert table["history_sha256"].tolist() == [run_one(0, run.scenario, run.case).sha256]
+    assert table["history_sha256"].tolist() == [run_one(0, run.scenario, run.case).history_sha256]
 
 
 def test_all_problems_of_a_sweep_come_before_the_first_run(scenario: gp.Scenario) -> None:

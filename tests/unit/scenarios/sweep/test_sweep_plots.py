@@ -7,44 +7,44 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.sweep.column_labels import label_of
-from scenarios.sweep.statistics import choose, spread_of, values
+from scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, spread_of, values_of
 from scenarios.sweep.sweep_case import FATE
 from scenarios.sweep.sweep_plots import curves, draw_all, heat_maps
 
 
-def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pa.Table:
+def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pd.DataFrame:
     """A table as a sweep writes it, case IV only."""
     n = len(next(iter(parameters.values())))
     head = {"sample": list(range(n)), "case": ["IV"] * n, "seed": [1] * n}
     fate = {name: ["ran"] * n for name in FATE}
     named = {f"event1.{name}": column for name, column in indexes.items()}
-    return pa.table(head | parameters | fate | (named or {"event1.MPSI": [0.1] * n}) | {"event1.p.inv1": [0.5] * n})
+    measures = (named or {"event1.MPSI": [0.1] * n}) | {"event1.p.inv1": [0.5] * n}
+    return pd.concat([pd.DataFrame(head | parameters | fate), pd.DataFrame(measures, dtype=float)], axis=1)
 
 
-CHOICES: list[tuple[dict[str, list[Any]], list[str], tuple[str, str] | None]] = [
+CHOICES: list[tuple[dict[str, list[Any]], list[tuple[str, ...]]]] = [
     (
         {"graph.links": [8, 8, 9, 9], "graph.number": [0, 1, 0, 1], "graph.lambda_2": [0.1, 0.2, 0.3, 0.4]},
-        ["graph.links"],
-        None,
+        [("graph.links",)],
     ),
-    ({"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}, [], ("a", "b")),
-    ({"a": [1, 1, 2, 2], "b": ["ring", "full", "ring", "full"]}, ["a", "b"], None),
-    ({"a": list(range(90)), "b": list(range(90))}, ["a", "b"], None),
-    ({"a": [1, 1], "b": [2, 2]}, [], None),
+    ({"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}, [("a", "b")]),
+    ({"a": [1, 1, 2, 2], "b": ["ring", "full", "ring", "full"]}, [("a",), ("b",)]),
+    ({"a": list(range(90)), "b": list(range(90))}, [("a",), ("b",)]),
+    ({"a": [1, 1], "b": [2, 2]}, []),
 ]
 
 
 def test_an_axis_shows_all_of_a_metric_of_somebodys_own() -> None:
     """0 neither flattens a frequency nor cuts off what is less; ours begin at 0, and their highest value is seen."""
     own = {"f_min_Hz": [59.7, 59.8], "slope": [-2.0, 1.0], "V_error": [0.00208, 0.00209]}
-    figure = curves(choose(table({"a": [0.1, 0.2]}, **own)), "event1", "a")
+    figure = curves(table({"a": [0.1, 0.2]}, **own), "event1", "a")
 
     bounds = {panel.get_ylabel(): panel.get_ylim() for panel in figure.axes if panel.get_visible()}
     assert 59.0 < bounds["f_min (Hz)"][0] < 59.7
@@ -53,18 +53,17 @@ def test_an_axis_shows_all_of_a_metric_of_somebodys_own() -> None:
     assert bounds[label_of("V_error")][1] > 0.00209 * 1.02
 
 
-@pytest.mark.parametrize(("parameters", "alone", "map_of"), CHOICES)
+@pytest.mark.parametrize(("parameters", "figures"), CHOICES)
 def test_plots_are_chosen_by_what_is_varied(
-    tmp_path: Path, parameters: dict[str, list[Any]], alone: list[str], map_of: tuple[str, str] | None
+    tmp_path: Path, parameters: dict[str, list[Any]], figures: list[tuple[str, ...]]
 ) -> None:
     """One parameter, or a text, or random draws: curves; two numbers on a grid: a map; repeats are no axes."""
     drawn = table(parameters)
-    choice = choose(drawn)
 
-    assert (choice.alone, choice.map_of) == (alone, map_of)
-    assert choice.indexes == {"event1": ["MPSI"]}
+    assert figures_of(drawn) == figures
+    assert indexes_of(drawn) == {"event1": ["MPSI"]}
     files = draw_all(drawn, tmp_path)
-    assert len(files) == len(alone) + (map_of is not None)
+    assert len(files) == len(figures)
     assert all(file.stat().st_size > 5000 for file in files)
 
 
@@ -72,7 +71,7 @@ def test_a_sweep_of_which_nothing_ran_is_drawn_too(tmp_path: Path) -> None:
     """No index at all, or none but missing ones: no figure or an empty one, and no error."""
     column: list[float | None] = [None] * 4
     grid: dict[str, list[Any]] = {"a": [1, 1, 2, 2], "b": [0.1, 0.2, 0.1, 0.2]}
-    bare = table(grid).drop_columns(["event1.MPSI", "event1.p.inv1"])
+    bare = table(grid).drop(columns=["event1.MPSI", "event1.p.inv1"])
 
     assert draw_all(bare, tmp_path) == ()
     assert len(draw_all(table(grid, MPSI=column, t_restore_s=column), tmp_path)) == 1
@@ -94,9 +93,9 @@ def test_axes_say_what_is_varied_in_words_with_units_and_no_key_of_the_file() ->
 def test_rounding_is_not_drawn_as_structure() -> None:
     """What differs by 1e-16 lies flat at the foot of an axis, and has one colour in a map; 0.1 of MPSI is seen."""
     noise = [1e-16 * number for number in range(4)]
-    swept = choose(table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
+    swept = table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1])
     flat, seen = curves(swept, "event1", "a").axes[:2]
-    mapped = choose(table({"a": [1, 1, 2, 2], "b": [1, 2, 1, 2]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1]))
+    mapped = table({"a": [1, 1, 2, 2], "b": [1, 2, 1, 2]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1])
     plain, told = (axes.collections[0] for axes in heat_maps(mapped, "event1", "a", "b", "IV").axes[:2])
 
     assert flat.get_ylim() == (0.0, 0.01)
@@ -108,28 +107,27 @@ def test_rounding_is_not_drawn_as_structure() -> None:
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | st.floats(0.0, 9.0)), min_size=1, max_size=30))
 def test_a_time_that_never_came_counts_as_later_than_all_others(runs: list[tuple[int, float | None]]) -> None:
     """Median and range by sorting, None last: no run is left out because it was bad."""
-    rows = {"event1.t_restore_s": [t for _, t in runs], "event1.MPSI": [t for _, t in runs]}
+    times = [t for _, t in runs]
+    rows = pd.DataFrame({"a": [a for a, _ in runs], "event1.t_restore_s": times, "event1.MPSI": times})
 
-    spread = spread_of([a for a, _ in runs], values(rows, "event1.t_restore_s"), 12)
+    spread = spread_of(rows["a"], values_of(rows, "event1.t_restore_s"))
 
-    for i, a in enumerate(spread.x):
-        mine = sorted(np.inf if t is None else t for b, t in runs if b == a)
+    for a in spread.index:
+        row, mine = spread.loc[a], sorted(np.inf if t is None else t for b, t in runs if b == a)
         middle = [mine[(len(mine) - 1) // 2], mine[len(mine) // 2]]
-        assert spread.median[i] == (np.inf if np.inf in middle else sum(middle) / 2)
-        assert spread.never[i] == mine.count(np.inf)
+        assert row["median"] == (np.inf if np.inf in middle else sum(middle) / 2)
+        assert row["never"] == mine.count(np.inf)
         came = [t for t in mine if t < np.inf]
-        assert [spread.low[i], spread.high[i]] == (
-            [came[0], came[-1]] if came else pytest.approx([np.nan] * 2, nan_ok=True)
-        )
-    assert np.isnan(values(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
+        assert [row["low"], row["high"]] == ([came[0], came[-1]] if came else pytest.approx([np.nan] * 2, nan_ok=True))
+    assert np.isnan(values_of(rows, "event1.MPSI")).sum() == sum(t is None for _, t in runs)
 
 
 def test_what_was_drawn_at_random_is_grouped_into_equal_parts() -> None:
     """More values than an axis can have: their medians over groups of as many runs each."""
-    at = np.random.default_rng(3).permutation(np.arange(120.0))
+    at = pd.Series(np.random.default_rng(3).permutation(np.arange(120.0)))
 
-    spread = spread_of(at.tolist(), 2.0 * at, 12)
+    spread = spread_of(at, 2.0 * at)
 
-    assert spread.binned
-    assert spread.x == [4.5 + 10 * i for i in range(12)]
-    assert spread.median.tolist() == [9.0 + 20 * i for i in range(12)]
+    assert is_drawn(at)
+    assert spread.index.tolist() == [4.5 + 10 * i for i in range(12)]
+    assert spread["median"].tolist() == [9.0 + 20 * i for i in range(12)]

@@ -116,12 +116,12 @@ def test_ctrl_c_keeps_what_is_done_says_how_to_go_on_and_leaves_no_worker(many: 
 
 
 def test_dask_gives_the_table_of_this_machine(sweep_file: Write, tmp_path: Path) -> None:
-    """The same file on a cluster on the loopback, its workers threads side by side: an equal table."""
+    """The same file on a cluster on the loopback with two worker processes: an equal table."""
     from distributed import LocalCluster
 
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.001]\n')
     with LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=1, threads_per_worker=2, processes=False, host="127.0.0.1", protocol="tcp", dashboard_address=":0"
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", protocol="tcp", dashboard_address=":0"
     ) as cluster:
         there = done(path, tmp_path / "there", dask=cluster.scheduler_address)
 
