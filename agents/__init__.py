@@ -1,1 +1,1 @@
-"""The agents: the secondary law, the communication graph, one agent's state, its Zenoh driver."""
+"""Agents: control laws, the communication graph, and one agent's state, node and process."""

@@ -1,6 +1,6 @@
-"""One agent: what it knows, and what it decides at a tick. Pure; time and messages are arguments.
+"""One agent: its knowledge, and its decision at a tick. Pure; time and messages are arguments.
 
-An agent knows its own configuration and measurement, the nameplates it was shown, and the last state it heard of each
+An agent knows its own configuration and measurement, the nameplates it has received, and the last state of each
 neighbour. SI on the wire, per unit inside: the neighbours' ratings come from their nameplates.
 """
 
@@ -22,12 +22,12 @@ from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
 from wire.messages import OFF, Measurement, Nameplate, State
 
-SPEAKS = 0.5
-"""Part of the age at which neighbours drop a state, after which they are told at the latest, whatever the law says."""
+SIGN_OF_LIFE = 0.5
+"""Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
 
 
 def neighbour_of(plate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
-    """Return what a law is told of a neighbour, per unit of the neighbour's own rating."""
+    """Return a neighbour as a law sees it, per unit of the neighbour's own rating."""
     return Neighbour(
         name=plate.sender,
         leader=plate.kind == "GFM",
@@ -49,13 +49,13 @@ class Agent:
     Parameters
     ----------
     config : AgentConfig
-        Who it is and the run's rule.
+        The agent's nameplate and the run's rule.
     law : Law, optional
-        What decides its set-points; the paper's, with the configuration's gains, if left out.
+        Law that decides the set-points; by default the paper's, with the configuration's gains.
 
     Examples
     --------
-    Where secondary control is not for this inverter, it keeps what the plant holds:
+    An inverter without secondary control keeps the set-points that the plant holds:
 
     >>> from agents.agent_config import Control
     >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
@@ -69,16 +69,15 @@ class Agent:
     def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
         self.config = config
         self.fault = ""
-        """Error of the law; empty if none. After one the agent stands still, and the inverter is on primary droop."""
-        self._no_graph = self._no_graph_told = ""
-        """Error of the graph's rule with the present roster, and the last that was reported. Meanwhile the agent stands
-        still."""
+        """Error of the law; empty if none. After an error the agent is idle, and the inverter is on primary droop."""
+        self._graph_error = self._reported_graph_error = ""
+        """Error of the graph's rule with the present roster, and the last reported one. Meanwhile the agent is idle."""
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
         """Whether the law has decided since it was last on hold."""
         self._sent_at = 0.0
-        """When neighbours were told last (s of run time)."""
+        """Run time (s) of the last state for the neighbours."""
         self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._heard: dict[str, State] = {}
@@ -86,9 +85,9 @@ class Agent:
         self._takes_part = config.control.acts(config.name, config.kind)
         handling = config.control.handling
         self._weights = StalenessWeights(handling)
-        self._silent_at_most = SPEAKS * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
+        self._silent_at_most = SIGN_OF_LIFE * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
         self._stops = handling.anti_windup == "conditional"
-        self._is_told_islands = handling.islands == "switches"
+        self._islands_from_switches = handling.islands == "switches"
         self._detector = IslandDetector(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
         self._saturation_P, self._saturation_V = SaturationDetector(handling.T_sat), SaturationDetector(handling.T_sat)
         self._P_set: float | None = None
@@ -96,21 +95,21 @@ class Agent:
         self._islands: tuple[str, str] = ("", "")
         """Own island at the last two measurements, the latest first."""
         self._apart: frozenset[str] = frozenset()
-        """Neighbours that are out of step."""
+        """Neighbours out of step."""
 
     def knows(self, name: str) -> bool:
-        """Whether the nameplate of an agent has been seen."""
+        """Whether the nameplate of an agent is known."""
         return name in self._known
 
     def meet(self, nameplate: Nameplate) -> None:
-        """Note who somebody is; what was heard of another life of it is forgotten."""
+        """Note an agent's nameplate, and forget the states of its other epochs."""
         known = self._known.get(nameplate.sender)
         if known is not None and known.epoch != nameplate.epoch:
             self._drop(nameplate.sender)
         self._known[nameplate.sender] = nameplate
 
     def forget(self, name: str) -> None:
-        """Forget who somebody is and what it said, as its process is gone."""
+        """Forget the nameplate and the states of an agent whose process is gone."""
         self._known.pop(name, None)
         self._drop(name)
 
@@ -121,73 +120,75 @@ class Agent:
             self._detector.forget(name)
 
     def restart(self) -> None:
-        """Have the next tick start from the set-points that its measurement shows, as the first one does."""
+        """Let the next tick start from the set-points of its measurement, like the first one."""
         self._P_set = self._V_set = None
         self._law_runs = False
         self._islands = ("", "")
 
     def shares_island(self, name: str) -> bool:
-        """Whether the last state heard of a neighbour is from the own island, as far as is known (`Handling.islands`).
+        """Whether a neighbour's last state is from the own island, as far as is known (`Handling.islands`).
 
-        A state is older than the own measurement. So that nobody leaves out everybody at the tick at which all go from
-        one island to another, the island before counts too.
+        A state is older than the own measurement. When all inverters change from one island to another, an agent would
+        leave out all neighbours for a tick; so the previous island counts too.
         """
         state = self._heard.get(name)
         if state is not None and state.island == OFF:
             return False
         if state is None or self._detector is not None:
             return state is not None and name not in self._apart
-        return not self._is_told_islands or not state.island or not self._islands[0] or state.island in self._islands
+        if not self._islands_from_switches or not state.island or not self._islands[0]:
+            return True
+        return state.island in self._islands
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
-        """Whom this agent listens to among the known agents of a roster, by the run's rule; nobody if that fails."""
+        """Return the in-neighbours among the known agents of a roster by the run's rule; none if the rule fails."""
         members = {name: self._known[name] for name in roster if name in self._known}
         name = self.config.name
         if name not in members:
             return ()
         try:
-            found = in_neighbours(self.config.control, name, members, self._rule)
+            neighbours = in_neighbours(self.config.control, name, members, self._rule)
         except GraphError as error:
-            self._no_graph = str(error)
+            self._graph_error = str(error)
             return ()
-        self._no_graph = ""
-        return found
+        self._graph_error = ""
+        return neighbours
 
     def hear(self, state: State) -> None:
-        """Note the latest state of somebody whose nameplate is known. Who may speak, `wire.admission` has checked."""
+        """Note the latest state of an agent whose nameplate is known; `wire.admission` has checked the sender."""
         if state.quiet:
-            return  # its law does not tell: what it told last stands
+            return  # its law sends nothing: its last state stays valid
         self._heard[state.sender] = state
         self._weights.arrived(state.sender)
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
     ) -> State:
-        """Decide the set-points of this tick, as the law has it.
+        """Decide the set-points of this tick by the law.
 
         Parameters
         ----------
         measurement : Measurement
-            What the own sensors read now; the own values are always fresh.
+            Present reading of the own sensors.
         neighbours : Sequence[str], optional
-            Whom to listen to. Of each the last state heard counts, for what `agents.degraded_communication` says it is
-            worth; one that was never heard, or stands in another island, is left out of the sums.
+            In-neighbours. The last state of each counts, with the weight by `agents.degraded_communication`; one
+            without a state, or in another island, is left out of the sums.
         ages : Mapping[str, float], optional
-            Age of these states (s of run time), where the own clock knows more than the times written in them. Without
-            it, from there to the own measurement.
+            Ages of these states (s of run time) by the own clock. By default the time from each state to the own
+            measurement.
 
         Returns
         -------
         State
             The set-points (W, V) and the own var (var).
         """
-        if self._no_graph:
-            news = self._no_graph if self._no_graph != self._no_graph_told else ""
-            self._no_graph_told = self._no_graph
-            return replace(self.stand_still(measurement), fault=news)
+        if self._graph_error:
+            news = self._graph_error if self._graph_error != self._reported_graph_error else ""
+            self._reported_graph_error = self._graph_error
+            return replace(self.idle_state(measurement), fault=news)
         if self.fault:
-            return self.stand_still(measurement)
-        if measurement.island == OFF:  # nothing to control; back in service it begins from what the plant holds
+            return self.idle_state(measurement)
+        if measurement.island == OFF:  # nothing to control; once in service it starts from the plant's set-points
             self.restart()
             return self._state(measurement, measurement.P_set, measurement.V_set)
         config = self.config
@@ -200,7 +201,7 @@ class Agent:
             self._saturation_P.begin()
             self._saturation_V.begin()
             self._law_runs = False
-        counted = self._counted(measurement.t, neighbours, ages)  # on hold too: what is usual of a link is learnt there
+        counted = self._counted(measurement.t, neighbours, ages)  # on hold too, to learn the usual ages of links
         shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
@@ -212,7 +213,7 @@ class Agent:
                 P_set, V_set, shared, send = decided(self._law, own, around, config.T_c)
             except LawError as error:
                 self.fault = f"law {config.control.law.name}: {error}"
-                return replace(self.stand_still(measurement), fault=self.fault)
+                return replace(self.idle_state(measurement), fault=self.fault)
             self._P_set, self._V_set = P_set * config.P_rated, V_set * config.V_nom
         send = send or measurement.t - self._sent_at >= self._silent_at_most - 1e-9
         if send:
@@ -220,10 +221,10 @@ class Agent:
         state = self._state(measurement, self._P_set, self._V_set)
         return replace(state, shared=dict(shared), quiet=not send) if shared or not send else state
 
-    def stand_still(self, measurement: Measurement) -> State:
+    def idle_state(self, measurement: Measurement) -> State:
         """Return the state of an agent that is paused, or has no measurement: it only shows that the agent is there.
 
-        When the agent goes on, it begins from the set-points that the plant holds.
+        When the agent resumes, it starts from the set-points that the plant holds.
         """
         self.restart()
         return replace(self._state(measurement, measurement.P_set, measurement.V_set), Q=0.0, island="", idle=True)
@@ -237,14 +238,14 @@ class Agent:
             P_set=P_set,
             V_set=V_set,
             Q=measurement.Q,
-            island=measurement.island if self._is_told_islands or measurement.island == OFF else "",
+            island=measurement.island if self._islands_from_switches or measurement.island == OFF else "",
             angle=None if self._detector is None else self._detector.angle,
         )
 
     def _out_of_step(
         self, detector: IslandDetector, measurement: Measurement, neighbours: Sequence[str]
     ) -> frozenset[str]:
-        """Neighbours that the frequency tells to stand in another island; on the grid nobody does."""
+        """Return the neighbours in another island by their frequency; while grid-connected none."""
         t = measurement.t
         if measurement.grid_connected:
             detector.restart()
@@ -289,7 +290,7 @@ class Agent:
         return {name: (aged[name], weight) for name, weight in self._weights.at_tick(aged).items()}
 
     def _saturated_sides(self, measurement: Measurement, e: float) -> tuple[int, int]:
-        """Sides on which P and V have long been off (3), (7) and (4), (8) with the set-points that the plant holds."""
+        """Return the saturated sides of P by (3), (7) and V by (4), (8), for the set-points that the plant holds."""
         config, m = self.config, measurement
         P = m.P / config.P_rated + e / config.m_p
         V = m.V / config.V_nom / config.m_q + m.Q / config.P_rated

@@ -1,4 +1,4 @@
-"""What one agent is told at its start: its own nameplate and the run's rule, nothing about others."""
+"""Configuration of one agent: its own nameplate and the run's rule, nothing about other agents."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What an agent makes of late, lost and missing states, and of its own saturation. The default is the paper's way.
+    """How an agent handles late, lost and missing states, and its own saturation. The default is the paper's way.
 
     Equations, sources and costs are in docs/handling.md.
     """
 
     stale: Literal["hold", "skip", "age-weighted"] = "hold"
-    """Neighbours' states that are not new: the last one counts in full ("hold"), not at all ("skip"), or ever less the
-    older it is beside what is usual of its link ("age-weighted")."""
+    """Weight of a neighbour's state that is not new: in full ("hold"), none ("skip"), or less the
+    older it is compared with the usual age on its link ("age-weighted")."""
     T_age: Annotated[float, Unit("s"), Plausible("a time in which a state ages", 1e-3, 60.0, above_zero=True)] = 0.2
     """Time (s) in which the weight of an ageing state falls to 1/e, for "age-weighted"."""
     max_age: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 60.0)] = 0.0
     """Age (s) beyond which a neighbour does not count at all. 0: none in simulated time, 0.25 s in wall-clock time."""
     weights: Literal["paper", "degree-normalised"] = "paper"
-    """Weights c_ij of the neighbours: 1, or 1 over their number."""
+    """Weights c_ij of the neighbours: 1 ("paper"), or 1 over their number ("degree-normalised")."""
     kappa_c: Annotated[float, Unit("1/s"), Plausible("gain kappa_c", 1e-3, 1e4, above_zero=True)] = 12.0
     """Gain (1/s) of the consensus on m_p P_set, for "degree-normalised"; the leaders' gain stays m_p / k_p."""
     beta_c: Annotated[float, Plausible("factor beta_c", 0.0, 1e4)] = 8.0
@@ -76,13 +76,14 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Time (s) of no progress towards its droop characteristic after which an inverter counts as saturated, for
     "conditional"."""
     islands: Literal["switches", "frequency", "ignored"] = "switches"
-    """How an agent knows which neighbours stand in another island, to leave them out: it is told ("switches"), it sees
-    them fall out of step ("frequency"), or it does not ("ignored"). Whether the grid is there it is always told."""
+    """How an agent knows which neighbours are in another island, to leave them out: from the positions of switches
+    ("switches"), from the drift of their angles ("frequency"), or not at all ("ignored"). It always knows whether it is
+    grid-connected."""
     slip_max: Annotated[
         float, Unit("cycles"), Plausible("the greatest slip within an island", 1e-4, 0.5, above_zero=True)
     ] = 0.01
-    """Slip (cycles) against the own inverter from which on a neighbour stands in another island, for "frequency";
-    more than the angles between inverters of one island ever swing. > 0."""
+    """Slip (cycles) against the own inverter beyond which a neighbour counts as in another island, for "frequency";
+    larger than the angles between inverters of one island ever swing. > 0."""
 
 
 Secondary = Literal["none", "GFM", "all"] | tuple[str, ...]
@@ -93,7 +94,7 @@ GraphRule = Literal["full", "none", "GFM-only", "clustered", "ring", "links"]
 
 
 class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Which control law an agent runs, and what carries it: a Python class, a program, or an FMU."""
+    """The control law of an agent, and its carrier: a Python class, a program, or an FMU."""
 
     use: str = "consensus"
     """Registered name of a class, or `module:Class`; "consensus" is the paper's law, with `Gains` and `Handling`."""
@@ -104,7 +105,7 @@ class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     parameters: dict[str, float | int | bool | str] = {}
     """Parameters that do not keep their default."""
     folder: str = ""
-    """Where the module, the program or the FMU is looked for."""
+    """Folder of the module, the program or the FMU."""
     time_limit: float = 1.0
     """Longest time (s of real time) of one step; a law that takes longer has failed. > 0."""
 
@@ -115,7 +116,7 @@ class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The run's rule of control: who takes part and who listens to whom.
+    """The run's rule of control: the inverters that take part, and the communication graph.
 
     Case I: secondary "none". II: "GFM", graph "none". III: "GFM", graph "GFM-only".
     IV: "all", graph "full".
@@ -124,17 +125,17 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     secondary: Secondary
     """Which inverters run the secondary law; the others keep their first set-points."""
     graph: str
-    """Rule of the communication graph: a `GraphRule`, or the name of the own one."""
+    """Rule of the communication graph: a `GraphRule`, or the name of a plugged-in one."""
     own_graph: Plugin | None = None
-    """A rule of somebody's own."""
+    """A plugged-in rule."""
     links: tuple[tuple[str, str], ...] = ()
     """Undirected links for the rule "links"."""
     without: tuple[tuple[str, str], ...] = ()
-    """Undirected links that are missing from what the rule makes."""
+    """Undirected links to remove from the rule's graph."""
     gains: Gains = Gains()
     """Gains of the law."""
     handling: Handling = Handling()
-    """What becomes of bad links and of saturation."""
+    """Options for degraded communication and saturation."""
     law: LawChoice = LawChoice()
     """Control law."""
 
@@ -154,7 +155,7 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything one agent process is started with (JSON on its standard input)."""
+    """Configuration of one agent process (JSON on its standard input)."""
 
     run: str
     """Name of the run, part of every key."""
@@ -176,7 +177,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Control period (s)."""
     control: Control
     deadline: float
-    """Longest wait for any message (s). Wall-clock: for the plant's first sign of life; 0 is for ever."""
+    """Longest wait for any message (s). Wall-clock: for the plant's first sign of life; 0: no limit."""
     plant_wait: float = 0.0
     """Simulated time: longest wait (s) for the first sign of life of the plant, which may have to compile."""
     connect: tuple[str, ...]
@@ -184,17 +185,16 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)
     """Where other agents can connect; port 0 is any free one."""
     epoch: int = 1
-    """Which life of this agent."""
+    """Epoch of this process; see `wire.admission`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the plant, or real time."""
     speed: float = 1.0
     """Wall-clock: run time per wall time (s/s), > 0."""
     clock_rate: float = 1.0
-    """How fast the agent's own clock goes: 1.0001 gains 100 ppm. Wall-clock: it ticks so much more often; simulated: it
-    takes a period for so much longer."""
+    """Rate of the agent's own clock: 1.0001 gains 100 ppm. Wall-clock: the agent ticks that much more often; simulated:
+    it takes a period for that much longer."""
     links: dict[str, Any] = {}
-    """Emulated links to this agent: `scenarios.emulation.emulation_config` as a tree, as agents know no netem. Empty:
-    none."""
+    """Emulated links to this agent: `scenarios.emulation.emulation_config` as a tree, because agents know no netem.
+    Empty: none."""
     max_age: float = MAX_AGE
-    """A measurement that came longer ago than this (s of run time) is not used; wall-clock: nor an older state of a
-    neighbour."""
+    """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""

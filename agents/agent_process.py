@@ -25,14 +25,14 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     Parameters
     ----------
     config : AgentConfig
-        Who the agent is, the run's rule, and where the rendezvous is.
+        The agent's nameplate, the run's rule, and the rendezvous.
     make_links : MakeLinks, optional
         Makes the emulated links, if there are any.
 
     Returns
     -------
     str
-        Why the agent could not go on; empty if the run ended and said so.
+        Why the agent could not continue; empty if the run ended with a `Stop`.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
     wall = config.clock == "wall"
-    if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
+    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
     try:
         law = make_law(config.control)
@@ -71,7 +71,7 @@ def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
 def _one_session_after_the_other(
     config: AgentConfig, make_links: MakeLinks, law: Law, log: logging.Logger
 ) -> RealtimeAgent | LockstepAgent:
-    """Take part with one session, and with a new one as long as the last was broken."""
+    """Take part with one session, and open a new one whenever the last was broken."""
     node: RealtimeAgent | LockstepAgent | None = None
     while node is None or (isinstance(node, RealtimeAgent) and node.session_broken):
         session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
@@ -89,7 +89,7 @@ def _one_session_after_the_other(
 
 
 def _take_part(node: RealtimeAgent | LockstepAgent, session: Session, log: logging.Logger) -> None:
-    """Take part with one session. All of an agent's sessions hold one token: for the others it is one agent."""
+    """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
     session.answer(*node.nameplate)
     for key in node.publications:
         session.prepare(key)
@@ -98,5 +98,5 @@ def _take_part(node: RealtimeAgent | LockstepAgent, session: Session, log: loggi
     except (StoppedError, KeyboardInterrupt) as stop:
         if isinstance(node, RealtimeAgent):
             node.leave(f"asked to leave: {stop}")
-            serve(node, session, log)  # until the plant knows
+            serve(node, session, log)  # until the plant has acknowledged
         raise

@@ -1,17 +1,16 @@
-"""What an agent makes of late, lost and missing states, and of a saturated inverter: table `[handling]`. Pure.
+"""An agent's options for late, lost and missing states, and for a saturated inverter: table `[handling]`. Pure.
 
-The law is `agents.laws.consensus`; here is decided with which weights c_ij, gains and limits it is called. With r_ij,
-from 0 to 1, what the state of neighbour j is worth to i (`StalenessWeights`), and d_i the number of neighbours that
-count:
+The law is `agents.laws.consensus`; this module sets its weights c_ij, gains and limits. r_ij, from 0 to 1, is the
+weight of neighbour j's state for i (`StalenessWeights`), and d_i the number of neighbours that count:
 
 - weights "paper": c_ij = r_ij. The gain of the consensus on y = m_p P_set is kappa = m_p/k_p.
 - weights "degree-normalised": c_ij = r_ij/d_i. The gain is kappa_c, that of the leader's frequency error stays kappa:
   y_i' = -kappa g_i e_i - kappa_c/d_i sum_j r_ij (y_i - y_j). In (14) and (15) beta becomes beta beta_c.
 
-A neighbour counts while its nameplate is known, it stands in the own island, its state was heard at all, and that state
+A neighbour counts while its nameplate is known, it is in the own island, it has sent a state, and that state
 is no older than `max_age`. So a lossy link keeps its place in d_i, and a dead one loses it.
 
-docs/handling.md has the sources, and what each option costs.
+docs/handling.md has the sources, and the cost of each option.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ from msgspec.structs import replace
 from agents.agent_config import Gains, Handling
 
 REMEMBERED = 51
-"""Arrivals over which the usual age of a link's states is taken: a second at 20 ms."""
+"""Number of arrivals in the median of a link's ages: a second at 20 ms."""
 
 OFF = 0.05
-"""Distance (pu of own rating) from which on an inverter is off its droop characteristic; so much may still wind up."""
+"""Distance (pu of own rating) beyond which an inverter is off its droop characteristic; so much may still wind up."""
 
-P_NONSENSE, V_NONSENSE = 100.0, 10.0
-"""Limits (pu) of P_set, either way, and of V_set, from 0, where nothing shall be limited but nonsense."""
+P_BOUND, V_BOUND = 100.0, 10.0
+"""Limits (pu) of P_set, either way, and of V_set, from 0, that exclude only implausible values."""
 
 
 class StalenessWeights:
-    """What the last state heard of each neighbour is worth, from 0 to 1.
+    """Weigh the last state of each neighbour, from 0 to 1.
 
     Parameters
     ----------
@@ -44,11 +43,11 @@ class StalenessWeights:
 
     Examples
     --------
-    A link whose states always are 0.1 s old loses nothing by it; one that falls silent fades:
+    A link whose states are always 0.5 s old keeps its full weight; a silent one fades:
 
-    >>> worth = StalenessWeights(Handling(stale="age-weighted", T_age=0.25))
-    >>> worth.arrived("inv2")
-    >>> worth.at_tick({"inv2": 0.5}), worth.at_tick({"inv2": 0.75})
+    >>> weights = StalenessWeights(Handling(stale="age-weighted", T_age=0.25))
+    >>> weights.arrived("inv2")
+    >>> weights.at_tick({"inv2": 0.5}), weights.at_tick({"inv2": 0.75})
     ({'inv2': 1.0}, {'inv2': 0.36787944117144233})
     """
 
@@ -56,12 +55,12 @@ class StalenessWeights:
         self._stale, self._T_age = handling.stale, handling.T_age
         self._max_age = handling.max_age or inf
         self._fresh: set[str] = set()
-        """Of whom a state has arrived since the last tick."""
+        """Neighbours with a new state since the last tick."""
         self._usual: dict[str, deque[float]] = {}
         """Ages (s) of each neighbour's last states, each at the first tick that could use it."""
 
     def arrived(self, name: str) -> None:
-        """Note that a newer state of a neighbour is here."""
+        """Note that a newer state of a neighbour has arrived."""
         self._fresh.add(name)
 
     def forget(self, name: str) -> None:
@@ -70,16 +69,16 @@ class StalenessWeights:
         self._usual.pop(name, None)
 
     def at_tick(self, ages: Mapping[str, float]) -> dict[str, float]:
-        """Worth of each neighbour that counts, at a tick; what arrives from now on is for the next one.
+        """Return the weight of each neighbour that counts at this tick; later arrivals are for the next one.
 
         Parameters
         ----------
         ages : Mapping[str, float]
-            Age (s of run time) of the last state heard of each neighbour.
+            Age (s of run time) of each neighbour's last state.
         """
-        worth = {name: self._of(name, age) for name, age in ages.items() if age <= self._max_age}
+        weights = {name: self._of(name, age) for name, age in ages.items() if age <= self._max_age}
         self._fresh.clear()
-        return worth
+        return weights
 
     def _of(self, name: str, age: float) -> float:
         if self._stale == "hold":
@@ -95,14 +94,14 @@ class StalenessWeights:
 
 
 class SaturationDetector:
-    """Whether an inverter follows its droop characteristic; where it does not for long, its set-point is in vain.
+    """Detect an inverter that has stayed off its droop characteristic: a larger set-point has no effect there.
 
-    An inverter that is only slow is off its characteristic too, but on the way to it.
+    A slow inverter is off its characteristic too, but approaches it.
 
     Parameters
     ----------
     T_sat : float
-        How long (s) it must have been off on the same side, and moved by less than half of what is missing.
+        Time (s) off on the same side, with less than half of the difference made up, that counts as saturation.
 
     Examples
     --------
@@ -115,22 +114,22 @@ class SaturationDetector:
         self._T_sat = T_sat
         self._side = 0
         self._since: deque[tuple[float, float]] = deque()
-        """When (s) it did what (pu): since it went to this side, but of what is longer ago than T_sat only the last."""
+        """Times (s) and outputs (pu) since it went to this side; of those older than T_sat only the last."""
 
     def begin(self) -> None:
-        """Forget what it did, as its set-points were not the law's meanwhile."""
+        """Forget the past outputs: their set-points were not the law's."""
         self._side = 0
         self._since.clear()
 
     def saturated_side(self, should: float, does: float, t: float) -> int:
-        """1 where the inverter gives less than it should and cannot more, -1 where more and cannot less, else 0.
+        """Return 1 where the inverter delivers too little and cannot deliver more, -1 for too much, else 0.
 
         Parameters
         ----------
         should : float
-            What the set-point asks of it (pu).
+            Output that the set-point requires (pu).
         does : float
-            What the own measurement says in its place (pu): output plus what the droop takes.
+            The measured counterpart (pu): output plus the droop's part.
         t : float
             Run time (s).
         """
@@ -148,7 +147,7 @@ class SaturationDetector:
 
 
 def gains_in_force(gains: Gains, handling: Handling) -> Gains:
-    """Gains and limits with which the law is called.
+    """Return the gains and limits of the law under these options.
 
     Examples
     --------
@@ -160,5 +159,5 @@ def gains_in_force(gains: Gains, handling: Handling) -> Gains:
     if handling.weights == "degree-normalised":
         gains = replace(gains, beta_GFM=gains.beta_GFM * handling.beta_c, beta_GFL=gains.beta_GFL * handling.beta_c)
     if handling.anti_windup == "none":
-        gains = replace(gains, P_set_min=-P_NONSENSE, P_set_max=P_NONSENSE, V_set_min=0.0, V_set_max=V_NONSENSE)
+        gains = replace(gains, P_set_min=-P_BOUND, P_set_max=P_BOUND, V_set_min=0.0, V_set_max=V_BOUND)
     return gains

@@ -2,12 +2,12 @@
 
     @gridpeers.graph("star")
     def star(members):
-        '''Everybody listens to inv1, and inv1 to everybody.'''
+        '''All agents listen to inv1, and inv1 to all.'''
         return {name: set(members) - {name} if name == "inv1" else {"inv1"} for name in members}
 
-A rule is called with the nameplates of all agents on the roster, by name in natural order, and returns whom each
-listens to. Every agent applies it for itself: the same nameplates must give the same graph. A class with parameters
-(annotated attributes, `docs/plugins.md`) and a method `__call__(self, members)` is a rule too.
+The argument of a rule is the nameplates of all agents on the roster, by name in natural order; it returns the
+in-neighbours of each. Every agent applies it by itself: the same nameplates must give the same graph. A class with
+parameters (annotated attributes, `docs/plugins.md`) and a method `__call__(self, members)` is a rule too.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from wire.suggestion import suggestion
 
 
 class Member(Protocol):
-    """The part of a nameplate that rules look at; a `wire.messages.Nameplate` has it."""
+    """The part of a nameplate that rules use; a `wire.messages.Nameplate` has it."""
 
     @property
     def kind(self) -> str:
-        """Whether "GFM" or "GFL"."""
+        """Kind: "GFM" or "GFL"."""
         ...
 
     @property
@@ -61,11 +61,11 @@ Members = Mapping[str, Member]
 """Nameplates by name."""
 
 Graph = Callable[[Members], Mapping[str, Iterable[str]]]
-"""From nameplates to the names that each agent listens to; who is left out listens to nobody."""
+"""From nameplates to each agent's in-neighbours; an agent without an entry has none."""
 
 
 class GraphError(ValueError):
-    """A rule that failed, or returned no graph; its text says what it did."""
+    """A rule that failed, or returned no graph."""
 
 
 def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -81,33 +81,33 @@ def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
 
 
 def full(members: Members) -> Mapping[str, Iterable[str]]:
-    """Everybody listens to everybody."""
+    """Let every agent listen to all others."""
     return _pairwise(members, lambda a, b: True)
 
 
 def none(members: Members) -> Mapping[str, Iterable[str]]:
-    """Nobody listens to anybody."""
+    """Let no agent listen to any other."""
     return _pairwise(members, lambda a, b: False)
 
 
 def GFM_only(members: Members) -> Mapping[str, Iterable[str]]:
-    """The grid-forming inverters listen to each other."""
+    """Let the grid-forming inverters listen to each other."""
     return _pairwise(members, lambda a, b: a.kind == b.kind == "GFM")
 
 
 def clustered(members: Members) -> Mapping[str, Iterable[str]]:
-    """Inverters of a microgrid listen to each other, and so do all grid-forming ones."""
+    """Let the inverters of a microgrid listen to each other, and all grid-forming ones too."""
     return _pairwise(members, lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM")
 
 
 def ring(members: Members) -> Mapping[str, Iterable[str]]:
-    """Each listens to the one before and the one after it, in natural order of the names."""
+    """Let each agent listen to the previous and the next one, in natural order of the names."""
     names = sorted(members, key=natural_order)
     return {name: {names[i - 1], names[(i + 1) % len(names)]} - {name} for i, name in enumerate(names)}
 
 
 class EdgeList:
-    """The pairs that the case lists under the key `links`, both ways."""
+    """Let the pairs under the case's key `links` listen to each other."""
 
     links: Annotated[tuple[tuple[str, str], ...], "Pairs; written as the case's own key `links`."] = ()
 
@@ -115,7 +115,7 @@ class EdgeList:
         self.links = tuple(links)
 
     def __call__(self, members: Members) -> Mapping[str, Iterable[str]]:
-        """Return whom each listens to."""
+        """Return the in-neighbours of each agent."""
         both = [pair for a, b in self.links for pair in ((a, b), (b, a))]
         return {name: {b for a, b in both if a == name and b in members} for name in members}
 
@@ -144,7 +144,7 @@ GRAPHS: Registry[Any] = Registry(
 
 
 def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = False) -> dict[str, tuple[str, ...]]:
-    """Return whom each agent listens to by a rule; neighbours in the order of `members`.
+    """Return each agent's in-neighbours by a rule, in the order of `members`.
 
     Parameters
     ----------
@@ -153,15 +153,15 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     members : Members
         Nameplates in any order; the rule gets them in natural order of the names.
     name : str
-        What the scenario calls the rule, for messages.
+        Name of the rule in the scenario, for messages.
     strict : bool, optional
-        Whether who is no member is a problem, as when a scenario is checked; else it is left out: in wall-clock time
-        agents meet one after the other, and may have died.
+        Whether a name that is no member is a problem, as in the check of a scenario; else it is left out: in wall-clock
+        time agents meet one after the other, and may have died.
 
     Raises
     ------
     GraphError
-        If it raises, or what it returns is no graph of these agents.
+        If the rule raises, or its result is no graph of these agents.
 
     Examples
     --------
@@ -176,11 +176,11 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     """
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
-        found = rule(ordered)
-        told = {one: frozenset(found[one]) for one in found}
-    except ANYTHING as error:  # a rule is anybody's code
+        result = rule(ordered)
+        heard_by = {one: frozenset(result[one]) for one in result}
+    except ANYTHING as error:  # a rule is foreign code
         raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
-    for one, heard in told.items() if strict else ():
+    for one, heard in heard_by.items() if strict else ():
         if one not in members:
             raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")
         for other in sorted(heard, key=str):
@@ -188,25 +188,21 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
                 raise GraphError(f"graph {name} lets {one} listen to {_shown(other)}, {_unknown(other, members)}")
             if other == one:
                 raise GraphError(f"graph {name} lets {one} listen to itself; leave it out of its own neighbours")
-    return {one: tuple(other for other in members if other != one and other in told.get(one, ())) for one in members}
+    return {
+        one: tuple(other for other in members if other != one and other in heard_by.get(one, ())) for one in members
+    }
 
 
 def make_graph(plugin: Plugin) -> Graph:
-    """Return a rule of somebody's own.
-
-    Raises
-    ------
-    PluginError
-        If there is none, or it cannot be made with these parameters.
-    """
+    """Return a plugged-in rule; raise PluginError if it is missing or cannot be made with its parameters."""
     rule = made(GRAPHS, plugin)
     if not callable(rule):
-        raise PluginError(f"{plugin.name}: its class makes what cannot be called with the members' nameplates")
+        raise PluginError(f"{plugin.name}: an instance of its class cannot be called with the members' nameplates")
     return rule  # type: ignore[no-any-return]
 
 
 def _unknown(name: Any, members: Members) -> str:
-    return f"who is no agent of the run; {suggestion(str(name), members, 'agents')}"
+    return f"which is no agent of the run; {suggestion(str(name), members, 'agents')}"
 
 
 def _shown(name: Any) -> str:

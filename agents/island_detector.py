@@ -1,19 +1,19 @@
-"""Who has fallen out of step with the own inverter: islands told apart by frequency alone. Pure.
+"""Detect neighbours in another island by angle drift, from frequency alone. Pure.
 
-Inverters of one island run in step. Their angles differ by what the lines between them ask for, a few degrees, so
-however the frequency moves, the difference of two frequencies has next to no integral:
+Inverters of one island run in step. The lines between them need angle differences of only a few degrees, so
+however the frequency moves, the difference of two frequencies has almost no integral:
 
     slip_ij(t) = int (f_i - f_j) dt        in cycles
 
-Between islands it grows without bound, unless both are at exactly the same frequency; and islands that wrongly listen
-to each other seldom are: their set-points agree on what fits none of them, and each keeps an error of its own. A slip
-beyond `slip_max` thus proves another island. Nothing proves the same one: two islands at 60 Hz look like one. So who
-was out of step is tried again after a while, and left out for longer if that was too early.
+Between islands the slip grows without bound, unless both have exactly the same frequency. Islands that wrongly listen
+to each other seldom do: their set-points agree on values that fit neither, and each keeps an error of its own. A slip
+beyond `slip_max` thus proves another island. Nothing proves the same one: two islands at 60 Hz look like one. So an
+agent tries a neighbour out of step again after a while, and leaves it out for longer if that was too early.
 
-Every agent integrates its own frequency and tells the sum, its `angle`: so states that are lost or late cost nothing.
+Every agent integrates its own frequency and sends the sum, its `angle`: so lost and late states cost nothing.
 
-The paper has no such thing; its agents know the switches. The idea is that of out-of-step and of loss-of-mains relays
-(phase-angle drift), used between peers.
+The paper has no such detector; its agents know the switches. Out-of-step and loss-of-mains relays use the same idea
+(phase-angle drift); here peers use it.
 """
 
 from __future__ import annotations
@@ -24,40 +24,40 @@ from dataclasses import dataclass
 from wire.messages import Angle
 
 T_LEAK = 10.0
-"""Time constant (s) with which slip is forgotten: sensors that disagree by less than slip_max / T_LEAK (Hz) count as in
+"""Time constant (s) with which slip decays: sensors that disagree by less than slip_max / T_LEAK (Hz) count as in
 step."""
 
 T_GAP = 0.2
-"""Longest time (s) between two own measurements over which the frequency is taken to be known."""
+"""Longest time (s) between two own measurements over which the frequency counts as known."""
 
 RETRY, LONGEST = 10.0, 600.0
-"""Time (s) after which whoever was out of step is tried again, the first time; and at most, doubled each time."""
+"""Time (s) until the first retry of a neighbour out of step, and the longest; it doubles each time."""
 
 TRUSTED = 10.0
-"""Time (s) in step after a retry from which on the next time out of step counts as the first."""
+"""Time (s) in step after a retry, after which the next loss of step counts as the first."""
 
 KEPT = 512
-"""Own measurements that are kept, to be compared with states that come late: 10 s at 20 ms."""
+"""Number of own measurements to keep for the comparison with late states: 10 s at 20 ms."""
 
 
 @dataclass
 class _Pair:
-    """How one neighbour stands to the own inverter."""
+    """Angle difference between one neighbour and the own inverter."""
 
     since: tuple[float, float] | None = None
-    """Whence the two angles count (s)."""
+    """Times (s) from which the two angles count."""
     t: float = 0.0
-    """Time of the last state that was compared (s)."""
+    """Time of the last compared state (s)."""
     slip: float = 0.0
-    """Cycles."""
+    """Difference of the angles beyond the usual one (cycles)."""
     usual: float = 0.0
-    """Difference of the angles from which slip counts (cycles)."""
+    """Usual difference of the angles, from which slip counts (cycles)."""
     back: float | None = None
-    """When it is tried again (s); None while it counts as in step."""
+    """Time of the next retry (s); None while it counts as in step."""
     tried: float | None = None
-    """When it was last tried again (s)."""
+    """Time of the last retry (s)."""
     hold: float = RETRY
-    """For how long it was left out last (s)."""
+    """How long it was left out last (s)."""
 
     def compare(self, since: tuple[float, float], t: float, difference: float) -> None:
         """Note the difference of the angles (cycles) at t (s)."""
@@ -69,14 +69,14 @@ class _Pair:
 
 
 class IslandDetector:
-    """Which neighbours are out of step with one inverter.
+    """Detect neighbours that are out of step with one inverter.
 
     Parameters
     ----------
     f_nom : float
         Nominal frequency (Hz).
     slip_max : float
-        Slip (cycles) beyond which a neighbour stands in another island.
+        Slip (cycles) beyond which a neighbour counts as in another island.
 
     Examples
     --------
@@ -101,11 +101,11 @@ class IslandDetector:
 
     @property
     def angle(self) -> Angle | None:
-        """What the own inverter tells; None if it has measured nothing."""
+        """Own angle, for the neighbours; None before the first measurement."""
         return Angle(self._own[-1][2], self._since) if self._own else None
 
     def sensed(self, t: float, f: float) -> None:
-        """Note the own frequency (Hz) at t (s of run time); after a gap the own angle counts anew."""
+        """Note the own frequency (Hz) at t (s of run time); after a gap the own angle restarts from 0."""
         e, angle = f - self._f_nom, 0.0
         if self._own and 0.0 <= t - self._own[-1][0] <= T_GAP:
             before, e_before, angle_before = self._own[-1]
@@ -116,7 +116,7 @@ class IslandDetector:
         self._own.append((t, e, angle))
 
     def heard(self, name: str, t: float, angle: Angle | None) -> None:
-        """Note a neighbour's angle at t (s), if it is news."""
+        """Note a neighbour's angle at t (s), if it is new."""
         pair = self._pairs.setdefault(name, _Pair())
         if angle is None or (pair.since is not None and t <= pair.t):
             return
@@ -125,7 +125,7 @@ class IslandDetector:
             pair.compare((self._since, angle.since), t, own - angle.cycles)
 
     def apart(self, name: str, t: float) -> bool:
-        """Whether a neighbour is taken to stand in another island at t (s of run time)."""
+        """Whether a neighbour counts as in another island at t (s of run time)."""
         pair = self._pairs.get(name)
         if pair is None:
             return False
@@ -142,11 +142,11 @@ class IslandDetector:
         self._pairs.pop(name, None)
 
     def restart(self) -> None:
-        """Forget all neighbours: on the grid all are in step."""
+        """Forget all neighbours: while grid-connected all are in step."""
         self._pairs.clear()
 
     def _own_at(self, t: float) -> float | None:
-        """Own angle (cycles) at t (s), from the last measurement before; None if that is not known."""
+        """Return the own angle (cycles) at t (s), from the last measurement before; None if it is unknown."""
         for at, e, angle in reversed(self._own):
             if at <= t:
                 return angle + e * (t - at) if t - at <= T_GAP else None

@@ -293,7 +293,7 @@ class LockstepAgent(AgentNode):
         self._hear_late(grant.t)
         measured = self.states.measured(grant.t, self._config.max_age)
         if measured is None or (self._links is not None and self._links.stalled(grant.t)):
-            state = self._agent.stand_still(grant)
+            state = self._agent.idle_state(grant)
         else:
             neighbours = tuple(name for name in self._neighbours if name in grant.roster)
             state = self._agent.tick(replace(measured, seq=grant.seq, t=grant.t), neighbours)

@@ -1,6 +1,6 @@
-"""What an agent heard last: its own measurement and its neighbours' states, and how old they are. Pure.
+"""The last measurement and the last states that an agent heard, with their ages. Pure.
 
-Times are run time (s). Under simulated time they are those of the ticks; under real time the agent counts them on its
+Times are run time (s). Simulated time takes them from the ticks. In real time the agent counts them on its
 own clock, from an origin of its own.
 """
 
@@ -12,11 +12,11 @@ from wire.messages import Measurement, State
 
 
 class NeighbourStates:
-    """The last measurement and the last state of each neighbour that the links let through.
+    """Keep the own last measurement and each neighbour's last state that the links delivered.
 
     Examples
     --------
-    The age of a state counts from its arrival; but one that was long on its way is as old as its time says:
+    The age of a state counts from its arrival; but a state that was long on its way is as old as its own time:
 
     >>> states = NeighbourStates()
     >>> states.keep(State(sender="inv2", epoch=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0), at=10.0)
@@ -30,13 +30,13 @@ class NeighbourStates:
 
     def __init__(self) -> None:
         self._states: dict[str, tuple[State, float]] = {}
-        """Last state of each agent, and when it came."""
+        """Last state of each agent, and its time of arrival (s)."""
         self.measurement: Measurement | None = None
-        """The own measurement that counts."""
+        """The own last measurement; None before the first."""
         self._measured_at = 0.0
 
     def keep(self, message: State | Measurement, at: float) -> None:
-        """Note a state or the own measurement, which came at this time."""
+        """Keep a state or the own measurement, which arrived at this time (s)."""
         if isinstance(message, State):
             self._states[message.sender] = message, at
         else:
@@ -48,24 +48,24 @@ class NeighbourStates:
         return 0.0 if self.measurement is None else self.measurement.t
 
     def measured(self, at: float, max_age: float) -> Measurement | None:
-        """Return the own measurement, if it came not longer ago than `max_age` (s)."""
+        """Return the own measurement if it arrived at most `max_age` (s) ago, else None."""
         return None if round(at - self._measured_at, 9) > max_age else self.measurement
 
     def age(self, name: str, at: float) -> float:
-        """Age of somebody's last state (s); infinite if there is none.
+        """Return the age of a neighbour's last state (s); infinite if there is none.
 
-        That since it came, or that by its own time beside the own measurement's, if that is more.
+        It is the greater of the time since its arrival, and of its own time before the own measurement's.
         """
         if name not in self._states:
             return inf
-        state, came = self._states[name]
-        return max(at - came, self.t - state.t)
+        state, arrived_at = self._states[name]
+        return max(at - arrived_at, self.t - state.t)
 
     def forget(self, name: str) -> None:
-        """Forget somebody, as its process is gone."""
+        """Forget an agent whose process is gone."""
         self._states.pop(name, None)
 
     def clear(self) -> None:
-        """Use nothing that has come so far."""
+        """Forget every state and the measurement."""
         self._states.clear()
         self.measurement = None

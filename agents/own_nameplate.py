@@ -1,4 +1,4 @@
-"""The nameplate by which an agent is known to the others. Pure."""
+"""An agent's own nameplate, which introduces it to the others. Pure."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def nameplate_of(config: AgentConfig) -> Nameplate:
 
 
 def check_nameplate(config: AgentConfig) -> None:
-    """Raise ValueError if everybody would refuse the nameplate of an agent, as a value in it cannot be."""
+    """Raise ValueError if a value of an agent's nameplate is out of bounds, so that every receiver would reject it."""
     try:
         decode(encode(nameplate_of(config)))
     except RejectedError as rejected:
-        raise ValueError(f"{config.name}: this nameplate would be refused by everybody: {rejected.text}") from None
+        raise ValueError(f"{config.name}: every participant would reject this nameplate: {rejected.text}") from None

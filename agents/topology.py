@@ -1,8 +1,8 @@
-"""The communication graph: a rule, applied to nameplates, says who listens to whom.
+"""The communication graph: a rule turns nameplates into in-neighbours. Pure.
 
-No agent is told its neighbours. Each applies the run's rule (`agents.graphs`) to the nameplates of the agents on the
-roster, so an agent that nobody has heard of can join. The rules of gridpeers are symmetric: who listens to somebody is
-heard by it; somebody's own rule need not be. Every link has weight c_ij = 1. In matrices the row is the receiver.
+No agent gets a list of neighbours. Each applies the run's rule (`agents.graphs`) to the nameplates of the agents on the
+roster, so an agent unknown so far can join. The rules of gridpeers are symmetric: if i listens to j, then j listens to
+i. A plugged-in rule need not be. Every link has weight c_ij = 1. In matrices the row is the receiver.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def rule_of(control: Control) -> Graph:
     Raises
     ------
     PluginError
-        If it is somebody's own, and is not there or cannot be made with its parameters.
+        If it is plugged in, and is missing or cannot be made with its parameters.
     """
     if control.own_graph is not None:
         return make_graph(control.own_graph)
@@ -56,7 +56,7 @@ def is_pairwise(control: Control) -> bool:
 def in_neighbours(
     control: Control, name: str, members: Mapping[str, Member], rule: Graph | None = None
 ) -> tuple[str, ...]:
-    """Whom an agent listens to.
+    """Return the agents that an agent listens to.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def in_neighbours(
     name : str
         The agent; one of `members`.
     members : Mapping[str, Member]
-        Nameplates of everybody on the roster, the agent's own included.
+        Nameplates of all agents on the roster, the agent's own included.
     rule : Graph, optional
-        What `rule_of` gives for this control, if somebody keeps it.
+        Result of `rule_of` for this control, where the caller keeps it.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def in_neighbours(
     Raises
     ------
     GraphError
-        If the rule is somebody's own, and fails or returns no graph.
+        If the rule is plugged in, and fails or returns no graph.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def in_neighbours(
 
 
 def link_problems(control: Control, names: Sequence[str]) -> tuple[str, ...]:
-    """What is wrong with the listed links, given the names of all inverters; empty if nothing is.
+    """Return the problems of the listed links, given the names of all inverters.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def link_problems(control: Control, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[float]]:
-    """Adjacency matrix c_ij (1): row i is the receiver, in the order of `members`."""
+    """Return the adjacency matrix c_ij (1): row i is the receiver, in the order of `members`."""
     names = list(members)
     rows = []
     for name in names:
@@ -122,7 +122,7 @@ def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[floa
 
 
 def laplacian(control: Control, members: Mapping[str, Member]) -> list[list[float]]:
-    """Laplacian diag(A 1) - A of the graph, in the order of `members`.
+    """Return the Laplacian diag(A 1) - A of the graph, in the order of `members`.
 
     Examples
     --------

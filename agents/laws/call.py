@@ -1,4 +1,4 @@
-"""Calls of a law: whatever it raises or returns, the agent gets set-points or one clear sentence. Pure."""
+"""Call a law: whatever it raises or returns, the agent gets set-points or one clear sentence. Pure."""
 
 from __future__ import annotations
 
@@ -15,21 +15,15 @@ from wire.printable import printable
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
-"""Place of an object in memory: another one in every run, and of no use to anybody."""
+"""Address of an object in memory: it differs in every run and helps no reader."""
 
 
 class LawError(RuntimeError):
-    """A law that raised, took too long, or returned what is no decision."""
+    """A law that raised, took too long, or returned no decision."""
 
 
 def begun(law: Law, own: Own) -> None:
-    """Have a law begin from the set-points that the plant holds.
-
-    Raises
-    ------
-    LawError
-        If it fails.
-    """
+    """Start a law from the set-points that the plant holds; raise LawError if it fails."""
     try:
         law.start(own)
     except LawError:
@@ -39,12 +33,12 @@ def begun(law: Law, own: Own) -> None:
 
 
 def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-    """Return what a law decides, within its limits.
+    """Return a law's decision, within its limits.
 
     Raises
     ------
     LawError
-        If it fails, or what it returns is none.
+        If it fails, or returns no decision.
 
     Examples
     --------
@@ -65,12 +59,12 @@ def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Se
         return _within_limits(law, result, own)
     except LawError:
         raise
-    except ANYTHING as error:  # what a law returns is anybody's code too: its bool(), float() or items() may raise
+    except ANYTHING as error:  # the result of a law is foreign code too: its bool(), float() or items() may raise
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {named(error)}") from error
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
-    """Return what a law returned, if it is a decision, within its limits."""
+    """Return a law's result within its limits; raise LawError if it is no decision."""
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
     P_set, V_set = (_number(name, getattr(result, name), own.t) for name in ("P_set", "V_set"))
@@ -96,17 +90,17 @@ def _number(name: str, value: Any, t: float) -> float:
 
 
 def _checked(shared: Any, t: float) -> Mapping[str, float]:
-    """Return what a law shares, if it may."""
+    """Return the values that a law shares; raise LawError if a name or a value is not allowed."""
     if not isinstance(shared, Mapping) or len(shared) > MOST_SHARED:
         raise LawError(f"step at t = {t:.6g} s shares {_shown(shared)}; share at most {MOST_SHARED} numbers by name")
-    found = {}
+    checked = {}
     for name, value in shared.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise LawError(f"step at t = {t:.6g} s shares {_shown(name)}; a name has up to 32 letters, digits and _")
-        found[name] = _number(f'shared["{name}"]', value, t)
-        if abs(found[name]) > SHARED_LIMIT:
+        checked[name] = _number(f'shared["{name}"]', value, t)
+        if abs(checked[name]) > SHARED_LIMIT:
             raise LawError(f"step at t = {t:.6g} s shares {name} = {value:g}; at most {SHARED_LIMIT:g} may travel")
-    return found
+    return checked
 
 
 def _shown(value: Any) -> str:

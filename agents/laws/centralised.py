@@ -8,12 +8,12 @@ central controller measures the errors, and sends the same corrections to all in
     \delta\omega = k_p (\omega^* - \omega) + k_i \int (\omega^* - \omega) dt, \qquad
     \delta E = k_{pE} (E^* - E) + k_{iE} \int (E^* - E) dt .
 
-The controller runs in the agent of one inverter (`centre`), which must have a link from and to everybody (graph "full",
-or a star); E is the mean of the voltages that it is told. In per unit delta omega = m_p P_set and delta E = V_set - 1.
-An inverter that does not hear the centre keeps the corrections it heard last.
+The controller runs in the agent of one inverter (`centre`), which must have a link from and to every other agent (graph
+"full", or a star); E is the mean of the voltages that it receives. In per unit delta omega = m_p P_set and
+delta E = V_set - 1. An inverter that does not hear the centre keeps the last corrections.
 
-**What the paper claims.** Frequency and voltage return to nominal, and droop goes on sharing real power; vars are left
-to droop, and without the centre nobody restores anything.
+**Claim of the paper.** Frequency and voltage return to nominal, and droop continues to share real power. Vars are left
+to droop, and without the centre nothing is restored.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Centralised(Law):
         """Integrals of the centre (pu)."""
 
     def start(self, own: Own) -> None:
-        """Begin without a bump: the integrals are what the own set-points are."""
+        """Set the integrals to the own set-points, for a bumpless start."""
         self._omega, self._E = own.m_p * own.P_set, own.V_set - 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:

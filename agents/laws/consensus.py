@@ -14,8 +14,8 @@ with g_i = 1 for a leader (GFM) and 0 for a follower (GFL).
 have no s. Here P is always pu of own rating and w pu of nominal, so m_p is 0.01 for 1 % droop, every term of (12), (13)
 is a pu frequency and k_p is in seconds. Hz or rad/s enter nowhere.
 
-**Discretisation.** Not explicit Euler, which needs kappa T lambda_max < 2: nine fully meshed agents at T = 20 ms have
-2.6 with kappa = 14 1/s. Instead, all terms from the same old values, added:
+**Discretisation.** Explicit Euler needs kappa T lambda_max < 2, but nine fully meshed agents at T = 20 ms have
+2.6 with kappa = 14 1/s. Instead, all terms come from the same old values and are added:
 
 .. math::
     y &\leftarrow y + \tfrac12 (1 - e^{-2 \kappa d T}) (\bar y - y) - g (1 - e^{-\kappa T}) e \\
@@ -24,15 +24,16 @@ is a pu frequency and k_p is in seconds. Hz or rad/s enter nowhere.
 
 where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To first order in T this is (12)-(15).
 
-- *Consensus term*: the exact solution when the neighbours come towards me as I go towards them, which they do, as
-  they run the same law; so at most half of the way. Holding them still, y += (1 - exp(-kappa d T)) (ybar - y), lets a
-  pair with kappa d T >> 1 swap its values for ever, and with a leader added stars, even rings and bipartite graphs
-  have spectral radii up to 1.6. Half of the way leaves no eigenvalue of the consensus below 0, whatever T and d, and
-  nine meshed agents at 20 ms still share within 0.1 s. For vars it is the same wherever 2 beta d >= alpha.
+- *Consensus term*: the exact solution when the neighbours move towards agent i as it moves towards them. They do,
+  because they run the same law; so i goes at most half of the way. Holding them still,
+  y += (1 - exp(-kappa d T)) (ybar - y), lets a pair with kappa d T >> 1 swap its values for ever, and with a leader
+  added stars, even rings and bipartite graphs have spectral radii up to 1.6. Half of the way leaves no eigenvalue of
+  the consensus below 0, whatever T and d, and nine meshed agents at 20 ms still share within 0.1 s. For vars it is the
+  same wherever 2 beta d >= alpha.
 - *Leader term of P_set*: the exact solution against the own quasi-steady response de/dy = 1, that of a lone leader,
   which is the strongest. Under one exponential with the consensus term it would be multiplied by
   (1 - exp(-kappa d T))/(kappa d T): restoration with eight neighbours at 20 ms would be 2.5 times slower.
-- *Leader term of V_set*: under one factor F with the consensus term, and slower for it (see Equilibrium). F does not
+- *Leader term of V_set*: under one factor F with the consensus term, and therefore slower (see Equilibrium). F does not
   overshoot either: on the droop v + z = V_set, so dv/dV_set + dz/dV_set = 1, and max(alpha, 2 beta d) bounds
   alpha dv/dV_set + 2 beta d dz/dV_set. A leader without neighbours has F = (1 - exp(-alpha T/k_q))/alpha.
 - *Equilibrium of P*, the paper's: followers have y = ybar and leaders a (ybar - y) = b e, a and b the two factors
@@ -40,10 +41,10 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   and all e of an island are equal, so e = 0, and then all y agree. So a and b may differ.
 - *Equilibrium of V*, the paper's at every T: V_set rests exactly where the bracket, the right-hand side of (14), (15),
   is 0. There alpha (v - 1) and beta d (z - zbar) need not be 0 each, they cancel; so their factors must be as alpha to
-  beta d. With factors like those of P_set, the one capped and the other not, vars are the less equal the longer T: MQSI
+  beta d. With factors like those of P_set, one capped and the other not, a longer T makes vars less equal: MQSI
   on the scenario islanding is 0.0062, 0.0098, 0.0295 at T = 2, 20, 100 ms, where the paper's law has 0.0058. The price:
-  voltage with eight neighbours at 20 ms comes back 1.7 times slower than with the factor 1 - exp(-alpha T/k_q), and a
-  leader takes back alpha/(2 beta d) of its voltage error in a period at most.
+  voltage with eight neighbours at 20 ms recovers 1.7 times slower than with the factor 1 - exp(-alpha T/k_q), and a
+  leader corrects at most alpha/(2 beta d) of its voltage error in a period.
 - *Stability* was found by search over random and structured graphs, not proven. With the quasi-steady plant
   e = sum_i w_i y_i + const, w_i = (s_i/m_p,i)/sum_j (s_j/m_p,j), the spectral radius is below 1 for every connected
   graph tried, of up to 30 inverters with one leader or more, for every T, with one rating up to thirtyfold the others.
@@ -54,8 +55,8 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   `tests/unit/agents/test_law.py` repeats the searches, for the paper's weights and for degree-normalised ones.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
-`agents.degraded_communication` has these and other ways, and other weights c_ij than 1; with any of them the law stays
-this.
+`agents.degraded_communication` has these and other options, and other weights c_ij than 1; the law itself stays the
+same.
 """
 
 from __future__ import annotations
@@ -70,14 +71,14 @@ from wire.plausible import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:
-    """Part of the way to the neighbours' mean in one period; at most a half, because they come as well.
+    """Return the part of the way to the neighbours' mean in one period; at most a half, because they move as well.
 
     Parameters
     ----------
     rate : float
         Gain of each unit of c_ij (1/s): kappa for P_set, beta/k_q for V_set.
     d : float
-        Sum of c_ij over the neighbours that are heard.
+        Sum of c_ij over the neighbours that count.
     T : float
         Control period (s).
 
@@ -101,7 +102,7 @@ def P_set_step(
     T: float,
     kappa_c: float | None = None,
 ) -> float:
-    """P_set (pu of own rating) after one control period, (12) for a follower, (13) for a leader.
+    """Return P_set (pu of own rating) after one control period, (12) for a follower, (13) for a leader.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def P_set_step(
     y_bar : float
         Weighted mean of the neighbours' m_p P_set (pu); without effect when `d` is 0.
     d : float
-        Sum of c_ij over the neighbours that are heard.
+        Sum of c_ij over the neighbours that count.
     e : float
         Own frequency error (f - f_nom)/f_nom (pu).
     leader : bool
@@ -122,7 +123,7 @@ def P_set_step(
     T : float
         Control period (s).
     kappa_c : float, optional
-        Gain of each unit of c_ij (1/s), where it is not the leader's kappa = m_p/k_p.
+        Gain of each unit of c_ij (1/s); by default the leader's kappa = m_p/k_p.
 
     Examples
     --------
@@ -140,13 +141,13 @@ def P_set_step(
 
 
 def alpha_in_force(gains: Gains, v: float) -> float:
-    r"""Weight of the voltage error (1): alpha, or less near nominal voltage where the gains ask for it.
+    r"""Return the weight of the voltage error (1): alpha, or less near nominal voltage if V_full is positive.
 
     .. math:: \alpha(v) = \max(\alpha_{min}, \alpha \min(1, |v - 1| / V_{full}))
 
-    In equilibrium a leader's alpha (v - 1) stands against its beta times the difference of vars: so alpha decides both
-    how soon voltage is back and how equal vars become. Large where voltage is far off and small where it is nearly
-    back, it takes less from one for the other. The paper mentions adaptive weights and gives none; this one is ours.
+    In equilibrium a leader's alpha (v - 1) balances its beta times the difference of vars. So alpha decides both
+    how soon voltage recovers and how equal vars become. An alpha that is large far from nominal voltage and
+    small near it eases this conflict. The paper mentions adaptive weights and gives none; this one is ours.
 
     Parameters
     ----------
@@ -167,11 +168,11 @@ def alpha_in_force(gains: Gains, v: float) -> float:
 
 
 def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> tuple[float, float]:
-    r"""Factors of z - z_bar and of v - 1 in one period: those of the paper's (15), beta d and alpha, times one F.
+    r"""Return the factors of z - z_bar and of v - 1 in one period: beta d and alpha of (15), times one F.
 
     .. math:: F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(\alpha, 2 \beta d)
 
-    One F for both: so they cancel where the paper's terms do, whatever T. It is T/k_q while T is short.
+    With one F for both, they cancel where the paper's terms do, for every T. F is T/k_q for a short T.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> t
     beta : float
         Weight of equal var sharing (1).
     d : float
-        Sum of c_ij over the neighbours that are heard.
+        Sum of c_ij over the neighbours that count.
     k_q : float
         Gain (s).
     T : float
@@ -202,7 +203,7 @@ def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> t
 def V_set_step(
     V_set: float, z: float, z_bar: float, d: float, v: float, *, leader: bool, gains: Gains, T: float
 ) -> float:
-    """V_set (pu of nominal) after one control period, (14) for a follower, (15) for a leader.
+    """Return V_set (pu of nominal) after one control period, (14) for a follower, (15) for a leader.
 
     Parameters
     ----------
@@ -213,11 +214,11 @@ def V_set_step(
     z_bar : float
         Weighted mean of the neighbours' m_q q; without effect when `d` is 0.
     d : float
-        Sum of c_ij over the neighbours that are heard.
+        Sum of c_ij over the neighbours that count.
     v : float
         Own terminal voltage (pu of nominal).
     leader : bool
-        Whether the inverter is a GFM; only these hold the voltage up.
+        Whether the inverter is a GFM; only a GFM restores the voltage.
     gains : Gains
         k_q, alpha, beta and the limits.
     T : float
@@ -241,7 +242,7 @@ def V_set_step(
 class Consensus(Law):
     """The paper's law, (12)-(15): leaders restore frequency and voltage, all agree on shares of load and vars.
 
-    Its parameters are those of `Gains`, where a scenario writes them, with what `[handling]` makes of them.
+    Its parameters are those of `Gains`, which a scenario sets, under its `[handling]`.
     """
 
     source = (
@@ -267,7 +268,7 @@ class Consensus(Law):
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Decide the set-points of one control period, (12) and (14) for a follower, (13) and (15) for a leader."""
         y_bar, z_bar, d = self._means(neighbours)
-        # A saturated leader that cannot lessen the frequency error is a follower: it does not integrate it.
+        # A saturated leader that cannot reduce the frequency error acts as a follower: it does not integrate it.
         leader = own.leader and -own.e * own.P_saturated <= 0.0
         P_set = P_set_step(
             own.P_set,
@@ -286,7 +287,7 @@ class Consensus(Law):
         return SetPoints(P_set, V_set)
 
     def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:
-        """Neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
+        """Return the neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""
         y = z = d = 0.0
         for other in neighbours:
             y += other.weight * other.m_p * other.P_set

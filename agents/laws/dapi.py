@@ -12,9 +12,9 @@ microgrids", Automatica 49(9), 2013.
 with the droops :math:`\omega_i = \omega^* - m_i P_i + \Omega_i` and :math:`E_i = E^* - n_i Q_i + e_i`. Here per unit:
 Omega = m_p P_set, e = V_set - 1, Q/Q* = m_q q; E is the measured terminal voltage. Every inverter integrates its own
 frequency error, leaders and followers alike. In discrete time each sum is one explicit Euler step with all old values,
-whose part of the way to the neighbours is limited to a half: theirs is the other.
+limited to half of the way to the neighbours, which go the other half.
 
-**What the papers claim.** For any connected graph and any gains the frequency returns to nominal and power is shared in
+**Claims of the papers.** For any connected graph and any gains the frequency returns to nominal and power is shared in
 proportion to the droops (2013). With beta = 0 vars are shared exactly, with b = 0 voltages are regulated exactly; in
 between lies a compromise (2015).
 """

@@ -1,4 +1,4 @@
-r"""Consensus by event-based broadcasting: neighbours are told only when they would be wrong by too much. Pure.
+r"""Consensus by event-based broadcasting: an agent sends only when its last broadcast is wrong by too much. Pure.
 
 G. S. Seyboth, D. V. Dimarogonas, K. H. Johansson, "Event-based broadcasting for multi-agent average consensus",
 Automatica 49(1), 2013:
@@ -7,11 +7,11 @@ Automatica 49(1), 2013:
     u_i = -\sum_j c_{ij} (\hat x_i - \hat x_j), \qquad
     \text{broadcast when } |\hat x_i - x_i| > c_0 + c_1 e^{-\alpha t}
 
-where a hat is the value broadcast last, the own one included. Here x is m_p P_set, and a second trigger of the same
-form watches m_q q. Leaders add their own frequency and voltage errors as in (13), (15) of the paper that gridpeers
-began with, as their own measurements need no broadcast. Time in the trigger counts from the last `start`.
+where a hat marks the last broadcast value, the own one included. Here x is m_p P_set, and a second trigger of the same
+form watches m_q q. Leaders add their own frequency and voltage errors as in (13), (15) of Singhal et al. 2022, because
+their own measurements need no broadcast. Time in the trigger counts from the last `start`.
 
-**What the paper claims.** Agents reach a ball around agreement whose radius is proportional to c_0, at most
+**Claim of the paper.** Agents reach a ball around agreement whose radius is proportional to c_0, at most
 norm(L) sqrt(N) c_0 / lambda_2, without Zeno behaviour, and with fewer messages than periodic broadcasting.
 """
 
@@ -31,31 +31,32 @@ class EventTriggered(Consensus):
 
     source = "Seyboth, Dimarogonas, Johansson, Automatica 49(1), 2013"
 
-    c_0: Annotated[float, Unit("pu frequency"), Range(0, 1), "Error of m_p P_set that is tolerated for good."] = 2e-5
-    c_1: Annotated[float, Unit("pu frequency"), Range(0, 1), "Error tolerated besides at the start."] = 2e-4
-    rate: Annotated[float, Unit("1/s"), Range(0, 1e3), "Rate alpha at which that besides fades."] = 1.0
-    q_0: Annotated[float, Unit("pu voltage"), Range(0, 1), "Error of m_q q that is tolerated."] = 2e-4
+    c_0: Annotated[float, Unit("pu frequency"), Range(0, 1), "Permanent tolerance of m_p P_set."] = 2e-5
+    c_1: Annotated[float, Unit("pu frequency"), Range(0, 1), "Additional tolerance at the start."] = 2e-4
+    rate: Annotated[float, Unit("1/s"), Range(0, 1e3), "Rate alpha at which the additional tolerance decays."] = 1.0
+    q_0: Annotated[float, Unit("pu voltage"), Range(0, 1), "Tolerance of m_q q."] = 2e-4
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
-        self._told: tuple[float, float] | None = None
-        self._began = 0.0
+        self._last_broadcast: tuple[float, float] | None = None
+        """Last broadcast P_set and m_q q (pu)."""
+        self._started_at = 0.0
 
     def start(self, own: Own) -> None:
-        """Begin with a broadcast."""
-        self._told, self._began = None, own.t
+        """Start with a broadcast."""
+        self._last_broadcast, self._started_at = None, own.t
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide on the values broadcast last, the own ones included, and whether to broadcast new ones."""
-        P_hat, z_hat = self._told or (own.P_set, own.z)
+        """Decide from the last broadcast values, the own ones included, and whether to broadcast new ones."""
+        P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
         seen = super().step(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
         P_set = min(max(own.P_set + (seen.P_set - P_hat), self.P_set_min), self.P_set_max)
         wrong = abs(P_hat - P_set) * own.m_p
         send = (
-            self._told is None
-            or wrong > self.c_0 + self.c_1 * exp(-self.rate * (own.t - self._began))
+            self._last_broadcast is None
+            or wrong > self.c_0 + self.c_1 * exp(-self.rate * (own.t - self._started_at))
             or abs(z_hat - own.z) > self.q_0
         )
         if send:
-            self._told = P_set, own.z
+            self._last_broadcast = P_set, own.z
         return SetPoints(P_set, seen.V_set, send=send)

@@ -13,7 +13,7 @@ m_q q and the reference is nominal voltage. Near zero the gain of sig grows with
 chatter there: no term moves further than half of its own difference (the neighbour moves the other half), and a
 leader's term for frequency no further than the whole of it.
 
-**What the paper claims.** Over a connected undirected graph agents agree in finite time; asymptotic laws never do.
+**Claim of the paper.** Over a connected undirected graph agents agree in finite time; asymptotic laws never do.
 With V = 1/2 sum_i (x_i - mean)^2 and unit weights, V' = -c/2 sum_ij |x_j - x_i|^{1+gamma} is at most
 -c/2 (4 lambda_2 V)^{(1+gamma)/2}, so they agree at the latest after
 

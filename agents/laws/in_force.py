@@ -1,4 +1,4 @@
-"""The paper's law with the gains of a scenario and what `[handling]` makes of them. Pure."""
+"""The paper's law with the gains of a scenario under its `[handling]`. Pure."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """The contract of a control law: one object per inverter, called once a control period, in per unit. Pure.
 
-A law sees its own inverter (`Own`) and what its neighbours share (`Neighbour`), and returns the set-points of the next
-period (`SetPoints`). All it may remember are its own attributes. It asks for no time, file, randomness or network: the
+A law sees its own inverter (`Own`) and its neighbours' last states (`Neighbour`), and returns the set-points of the
+next period (`SetPoints`). Its only memory is its own attributes. It uses no clock, file, randomness or network: the
 same calls give the same results in one process and in many.
 
-The agent that holds a law decides when to call it: not while the inverter is connected to the grid or out of service,
-nor without a fresh measurement. When it calls again after such a pause, it calls `start` first.
+The agent of a law decides when to call it: not while the inverter is grid-connected or out of service,
+nor without a fresh measurement. After such a pause it calls `start` first.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Own(NamedTuple):
     z: float
     """m_q q, q measured, as in (14) and (15) (pu)."""
     P_set: float
-    """Own set-point of real power (pu): what the law returned last, or what the plant held at `start`."""
+    """Own set-point of real power (pu): the law's last result, or the plant's set-point at `start`."""
     V_set: float
     """Own set-point of voltage (pu)."""
     m_p: float
@@ -56,9 +56,9 @@ class Own(NamedTuple):
     f_nom: float
     """Nominal frequency (Hz)."""
     P_saturated: int = 0
-    """1 if the inverter gives less than P_set asks and cannot give more, -1 if more and cannot less, else 0."""
+    """1 if the inverter delivers less than P_set and cannot deliver more, -1 if more and not less, else 0."""
     V_saturated: int = 0
-    """The same of V_set."""
+    """The same for V_set."""
 
 
 class Neighbour(NamedTuple):
@@ -85,11 +85,11 @@ class Neighbour(NamedTuple):
     P_rated: float
     """Its rating (W)."""
     shared: Mapping[str, float] = NOTHING
-    """What its law shares beside these."""
+    """Further values that its law shares."""
 
 
 class SetPoints(NamedTuple):
-    """What a law decides."""
+    """Decision of a law."""
 
     P_set: float
     """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
@@ -98,7 +98,7 @@ class SetPoints(NamedTuple):
     shared: Mapping[str, float] = NOTHING
     """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
     send: bool = True
-    """Whether the neighbours are told. If not, they keep the last state that they heard."""
+    """Whether the neighbours get the state. If not, they keep the last one that they heard."""
 
 
 class Law:
@@ -146,7 +146,7 @@ class Law:
             setattr(self, name, value)
 
     def start(self, own: Own) -> None:
-        """Begin, or begin again, from the set-points that the plant holds: forget what was remembered."""
+        """Start, or restart, from the set-points that the plant holds, and clear the law's memory."""
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Decide the set-points of one control period.
@@ -156,18 +156,18 @@ class Law:
         own : Own
             The own inverter.
         neighbours : Sequence[Neighbour]
-            Those whose states count, in the order of the inverters; empty if there is none.
+            Neighbours whose states count, in the order of the inverters.
         T : float
             Control period (s).
         """
         raise NotImplementedError
 
     def close(self) -> None:
-        """End: give back what was opened."""
+        """Release whatever the law has opened."""
 
 
 LIMITS = ("P_set_min", "P_set_max", "V_set_min", "V_set_max")
-"""Parameters of every law, whatever carries it: the agent limits to them what `step` returns."""
+"""Parameters of every law under every carrier: the agent limits the result of `step` to them."""
 
 
 def limits_in(parameters: Mapping[str, Any]) -> dict[str, Any]:

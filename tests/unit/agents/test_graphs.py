@@ -106,10 +106,10 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
 @pytest.mark.parametrize(
     ("rule", "said"),
     [
-        (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, who is no agent of the run"),
-        (lambda members: {"inv9": []}, "graph mine names inv9, who is no agent of the run"),
+        (lambda members: {"inv1": ["inv9"]}, "graph mine lets inv1 listen to inv9, which is no agent of the run"),
+        (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
         (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
-        (lambda members: {"inv1": [3]}, "graph mine lets inv1 listen to 3, who is no agent of the run"),
+        (lambda members: {"inv1": [3]}, "graph mine lets inv1 listen to 3, which is no agent of the run"),
         (lambda members: {"inv1": 3}, "graph mine of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
         (lambda members: None, "graph mine of inv1, inv2 failed: TypeError"),
         (lambda members: 1 / 0, "graph mine of inv1, inv2 failed: ZeroDivisionError: division by zero"),
