@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
     from plant.equipment import Feeder
-    from scenarios.results.benchmark_registry import CLAIMS
-    from scenarios.results.claims import Claim
-    from scenarios.results.own.metric import METRICS
-    from scenarios.results.own.window_metrics import WindowData
+    from scenarios.results.evaluation.benchmark_registry import CLAIMS
+    from scenarios.results.evaluation.claims import Claim
+    from scenarios.results.evaluation.metric import METRICS
+    from scenarios.results.evaluation.window_metrics import WindowData
     from scenarios.results.run_files import FolderError
     from scenarios.run import BrokenRunError
     from scenarios.schema.loading import catalogue
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
-    "Claim": "scenarios.results.claims",
+    "Claim": "scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
     "Feeder": "plant.equipment",
     "FolderError": "scenarios.results.run_files",
@@ -64,15 +64,15 @@ _HOME = {
     "ScenarioError": "scenarios.schema.scenario_errors",
     "SetPoints": "agents.laws.law",
     "Unit": "wire.plausible",
-    "WindowData": "scenarios.results.own.window_metrics",
+    "WindowData": "scenarios.results.evaluation.window_metrics",
     "catalogue": "scenarios.schema.loading",
-    "claim": "scenarios.results.benchmark_registry:CLAIMS.register",
+    "claim": "scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.law_registry:LAWS.register",
     "link_fault": "netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
-    "metric": "scenarios.results.own.metric:METRICS.register",
+    "metric": "scenarios.results.evaluation.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
     "read": "gridpeers.runs.running",
     "sweep": "gridpeers.studies.sweeping",

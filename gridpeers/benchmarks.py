@@ -5,7 +5,7 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from scenarios.results.benchmark_registry import (
+from scenarios.results.evaluation.benchmark_registry import (
     BENCHMARKS,
     DIGITS,
     HEADINGS,
@@ -15,7 +15,7 @@ from scenarios.results.benchmark_registry import (
     Quantity,
     benchmark_of,
 )
-from scenarios.results.claims import Claim, Judge, Verdict, judge
+from scenarios.results.evaluation.claims import Claim, Judge, Verdict, judge
 from scenarios.results.findings import Findings, label
 from scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 

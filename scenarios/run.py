@@ -22,12 +22,12 @@ from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.numbers.departures import Compared, compare
-from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.claims import judge, judged
-from scenarios.results.drawing import drawing_of
+from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from scenarios.results.evaluation.claims import judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
 from scenarios.results.findings import find
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
+from scenarios.results.plots.drawing import drawing_of
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
@@ -149,7 +149,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, found, facts))
     if request.lasting:
-        from scenarios.results.plots import draw_all  # matplotlib takes longer to import than a case to run
+        from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
         last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
         histories = {case: record.history for case, record in cases.items()}

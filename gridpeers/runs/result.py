@@ -19,12 +19,12 @@ from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
-from scenarios.results.benchmark_registry import benchmark_of
-from scenarios.results.claims import Verdict, judge, judged
-from scenarios.results.drawing import Drawing, drawing_of
+from scenarios.results.evaluation.benchmark_registry import benchmark_of
+from scenarios.results.evaluation.claims import Verdict, judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
+from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.schema import scenario_model as model
 from scenarios.schema.own_modules import claims_of
@@ -127,7 +127,7 @@ class Results(Mapping[str, "Result"]):
         FolderError
             If there is something in it, or it cannot be written.
         """
-        from scenarios.results.plots import draw_all
+        from scenarios.results.plots.run_figures import draw_all
 
         folder = empty_folder(folder)
         try:

@@ -6,7 +6,7 @@ import sys
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from scenarios.results.drawing import Drawing
+from scenarios.results.plots.drawing import Drawing
 from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def drawn(drawing: Drawing, name: str) -> Figure:
     ValueError
         If the run has no figure of this name.
     """
-    from scenarios.results.plots import draw, figures_of
+    from scenarios.results.plots.run_figures import draw, figures_of
 
     shown_in_notebooks()
     names = figures_of(drawing)

@@ -109,7 +109,7 @@ class Comparison:
 
     def plot(self) -> Figure:
         """Draw f, MPSI, V and MQSI of both, case by case."""
-        from scenarios.results.plots.comparison_plot import comparison
+        from scenarios.results.plots.comparison_figure import comparison
 
         shown_in_notebooks()
         return comparison(

@@ -12,8 +12,8 @@ import pandas as pd
 
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
+from scenarios.results.evaluation.metric import METRICS
 from scenarios.results.history import History
-from scenarios.results.own.metric import METRICS
 from scenarios.schema import ScenarioModel
 from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.portability import check_portable

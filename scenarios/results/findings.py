@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from plant.equipment import F_NOM, Feeder
-from scenarios.results.benchmark_registry import Published
+from scenarios.results.evaluation.benchmark_registry import Published
+from scenarios.results.evaluation.metric import Measured
+from scenarios.results.evaluation.window_metrics import own_measures
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.history import Nameplates
 from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Settling, Steady, measure, settling
-from scenarios.results.own.metric import Measured
-from scenarios.results.own.window_metrics import own_measures
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import without_agent
 from scenarios.schema.power_limits import limits_of

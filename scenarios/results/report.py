@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from scenarios.results.benchmark_registry import DIGITS, NO_BENCHMARK, UNITS, Benchmark, Quantity, heading
-from scenarios.results.claims import Verdict
+from scenarios.results.evaluation.benchmark_registry import DIGITS, NO_BENCHMARK, UNITS, Benchmark, Quantity, heading
+from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.metrics import Steady
 from scenarios.results.steadiness import STEADY

@@ -7,8 +7,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.results.benchmark_registry import BENCHMARKS, CLAIMS
-from scenarios.results.own.metric import ALWAYS, METRICS, good_name, name_of
+from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
+from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.schema.plugins import check_plugin, placed
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import PluginKey, ScenarioModel

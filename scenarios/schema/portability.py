@@ -8,7 +8,7 @@ from typing import Any
 from agents.carriers.law_registry import LAWS
 from agents.graphs import GRAPHS
 from netem.models.own_fault import FAULTS
-from scenarios.results.own.metric import METRICS
+from scenarios.results.evaluation.metric import METRICS
 from scenarios.schema.graph import graph_of
 from scenarios.schema.law_choice import law_of
 from scenarios.schema.netem_tables import netem_of

@@ -22,10 +22,10 @@ from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
+from scenarios.results.evaluation.window_metrics import own_measures
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.history import History, Nameplates
 from scenarios.results.link_record import LinkRecord
-from scenarios.results.own.window_metrics import own_measures
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs

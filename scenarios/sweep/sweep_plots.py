@@ -21,7 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from scenarios.results.plots import PAGE, case_style, save
+from scenarios.results.plots.style import PAGE, case_style, save
 from scenarios.sweep.column_labels import INDEXES, label_of
 from scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, is_number, spread_of, values_of
 

@@ -72,6 +72,6 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to p
 
     Example:  gridpeers doc scenario
     """
-    from scenarios.results.reference import page
+    from scenarios.reference import page
 
     typer.echo(page(topic.value), nl=False)

@@ -10,10 +10,10 @@ import msgspec
 
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import Compared
-from scenarios.results.drawing import Drawing, Mark, drawing_of
 from scenarios.results.event_windows import as_they_came
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
+from scenarios.results.plots.drawing import Drawing, Mark, drawing_of
 from scenarios.schema import ScenarioModel
 from wire.messages import PlantEvent
 

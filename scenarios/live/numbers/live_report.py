@@ -12,7 +12,7 @@ from scenarios.live.live_folders import Folders
 from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Compared, compare
 from scenarios.live.numbers.live_figures import drawing_by_hand
-from scenarios.results.benchmark_registry import NO_BENCHMARK, benchmark_of
+from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.event_windows import CaseRecord, Window, late_moves
 from scenarios.results.findings import find
 from scenarios.results.island_membership import taken_part
@@ -80,7 +80,7 @@ class LiveReport:
         )
         write_whole(ran.folder / "report.txt", plain(report))
 
-        from scenarios.results.plots import draw_all  # matplotlib takes longer to import than all else
+        from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else
 
         draw_all(
             drawing_by_hand(compared, ran.scenario, ran.feeder, case, record.history, recorded.events),

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from matplotlib.axes import Axes
 
-from scenarios.results.drawing import Drawing, Mark
+from scenarios.results.plots.drawing import Drawing, Mark
 
 TextSide = Literal["left", "center", "right"]
 """Which part of a text stands at the line."""

@@ -16,7 +16,7 @@ from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, 
 from papers.singhal2022.reproduce.settings import settings
 from papers.singhal2022.reproduce.topology_study import graphs
 from papers.singhal2022.tables import TABLES, Cell, tables_of
-from scenarios.results.claims import judge
+from scenarios.results.evaluation.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.schema import load_scenario

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import pytest
 
 from papers.singhal2022.claims import CLAIMS
-from scenarios.results.claims import judge
+from scenarios.results.evaluation.claims import judge
 from scenarios.results.event_windows import CaseRecord, windows
 from scenarios.results.findings import Findings, SteadyValues, find
 from scenarios.results.history import History, Nameplates

@@ -8,7 +8,7 @@ from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
 from papers.singhal2022.tables import tables_of
 from papers.singhal2022.tolerances import TABLE
-from scenarios.results.claims import Verdict, judge
+from scenarios.results.evaluation.claims import Verdict, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Settling, Steady
 

@@ -32,7 +32,7 @@ def test_an_entry_point_adds_to_a_registry(entry_points: None) -> None:
 
 def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(entry_points: None) -> None:
     """One line; the page of what there is still prints."""
-    from scenarios.results.reference import page
+    from scenarios.reference import page
 
     ((_, said),) = plugin_problems(GRAPHS, Plugin(use="broken"))
 

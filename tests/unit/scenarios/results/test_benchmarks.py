@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.results.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
-from scenarios.results.claims import Claim, judge
+from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
+from scenarios.results.evaluation.claims import Claim, judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.report import RunReport, plain
@@ -18,9 +18,9 @@ from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_writing import to_toml
 
 MODULE = """
-from scenarios.results.benchmark_registry import Benchmark
-from scenarios.results.claims import Claim
-from scenarios.results.benchmark_registry import Published
+from scenarios.results.evaluation.benchmark_registry import Benchmark
+from scenarios.results.evaluation.claims import Claim
+from scenarios.results.evaluation.benchmark_registry import Published
 
 PLACE = {"case": "IV", "event": "event1", "quantity": "MPSI"}
 MINE = Benchmark(

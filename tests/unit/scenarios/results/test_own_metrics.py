@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.results.benchmark_registry import CLAIMS
-from scenarios.results.claims import Claim, judged
+from scenarios.results.evaluation.benchmark_registry import CLAIMS
+from scenarios.results.evaluation.claims import Claim, judged
+from scenarios.results.evaluation.metric import ALWAYS, METRICS, make_metrics, measured, name_of
+from scenarios.results.evaluation.window_metrics import WindowData
 from scenarios.results.event_windows import Window
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Nameplates, read_only
 from scenarios.results.metrics import Steady
-from scenarios.results.own.metric import ALWAYS, METRICS, make_metrics, measured, name_of
-from scenarios.results.own.window_metrics import WindowData
 from scenarios.sweep.column_labels import unit_of
 from wire.plugin import Plugin, plugin_problems
 from wire.registry import PluginError

@@ -9,13 +9,14 @@ import pytest
 from matplotlib.image import imread
 
 from plant.tables import read_feeder
-from scenarios.results.drawing import Mark
 from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval
-from scenarios.results.plots import CASE_STYLES, Drawing, case_style, draw_all, microgrids, overview
-from scenarios.results.plots.inverters_plot import powers
+from scenarios.results.plots.case_figures import overview
+from scenarios.results.plots.drawing import Drawing, Mark
+from scenarios.results.plots.inverter_figures import microgrids, powers
 from scenarios.results.plots.marks import GAP, LETTER, placed
-from scenarios.results.plots.style import Format, save
+from scenarios.results.plots.run_figures import draw_all
+from scenarios.results.plots.style import CASE_STYLES, Format, case_style, save
 from scenarios.schema import catalogue, load_scenario
 
 

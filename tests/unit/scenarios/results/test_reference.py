@@ -15,7 +15,7 @@ from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import field_docs
-from scenarios.results.reference import TOPICS, page
+from scenarios.reference import TOPICS, page
 from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from wire import keys, messages
 from wire.table_schema import fields_of

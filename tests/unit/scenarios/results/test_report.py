@@ -10,8 +10,8 @@ from rich.console import Console
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
 from papers.singhal2022.tables import tables_of
-from scenarios.results.benchmark_registry import NO_BENCHMARK
-from scenarios.results.claims import judge
+from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK
+from scenarios.results.evaluation.claims import judge
 from scenarios.results.findings import Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.metrics_file import RunMetrics, metrics_json

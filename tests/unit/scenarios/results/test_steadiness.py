@@ -9,7 +9,7 @@ import pytest
 
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
-from scenarios.results.claims import judge
+from scenarios.results.evaluation.claims import judge
 from scenarios.results.event_windows import Window
 from scenarios.results.findings import Findings
 from scenarios.results.history import History, Nameplates

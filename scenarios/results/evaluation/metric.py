@@ -23,7 +23,7 @@ from wire.printable import printable
 from wire.registry import PluginError, Registry
 
 if TYPE_CHECKING:
-    from scenarios.results.own.window_metrics import WindowData
+    from scenarios.results.evaluation.window_metrics import WindowData
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
 
@@ -37,7 +37,7 @@ METRICS: Registry[Any] = Registry(
     "metric",
     "metrics",
     lambda it: callable_objection(it, "window", (*KEYS, "name")),
-    own={name: f"scenarios.results.own.window_metrics:{name}" for name in _OURS},
+    own={name: f"scenarios.results.evaluation.window_metrics:{name}" for name in _OURS},
 )
 """Metrics by name; those of gridpeers come first."""
 

@@ -9,9 +9,9 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results.drawing import Drawing
 from scenarios.results.island_membership import worst
-from scenarios.results.plots.cases import MEASURES, PlotMeasure
+from scenarios.results.plots.case_figures import MEASURES, PlotMeasure
+from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import BLACK, mark_events
 from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, time_axis
 

@@ -16,7 +16,7 @@ from wire.printable import printable
 from wire.registry import Registry
 
 if TYPE_CHECKING:
-    from scenarios.results.claims import Claim
+    from scenarios.results.evaluation.claims import Claim
     from scenarios.results.findings import Findings
 
 Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]
@@ -91,13 +91,13 @@ class Published:
 
 
 def _claim_objection(it: Any) -> str:
-    from scenarios.results.claims import Claim  # numpy, which a scenario is read without
+    from scenarios.results.evaluation.claims import Claim  # numpy, which a scenario is read without
 
     return "" if isinstance(it, Claim) else callable_objection(it, "findings")
 
 
 CLAIMS: Registry[Any] = Registry("claim", "claims", _claim_objection)
-"""Claims by name. Those of a publication come with its benchmark (`scenarios.results.benchmark_registry`)."""
+"""Claims by name. Those of a publication come with its `Benchmark`."""
 
 
 def _nothing(found: Findings) -> Sequence[str]:

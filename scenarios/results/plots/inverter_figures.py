@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results import metrics
-from scenarios.results.drawing import Drawing
 from scenarios.results.island_membership import part_of
-from scenarios.results.plots.cases import curves, draw_measure
+from scenarios.results.plots.case_figures import curves, draw_measure
+from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import mark_events, note_above
 from scenarios.results.plots.style import (
     MOVER,

@@ -1,27 +1,54 @@
-"""The reference pages that `gridpeers doc` prints, made from the code: keys, messages, the scenario file."""
+"""The reference pages that `gridpeers doc` prints, made from the code: keys, messages, scenario file, plugins."""
 
 from __future__ import annotations
 
+import inspect
 import typing
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import msgspec
 
+from agents import graphs
 from agents.agent_config import Gains, Handling
+from agents.carriers.law_registry import LAWS
+from agents.graphs import GRAPHS
+from netem.models import own_fault
+from netem.models.own_fault import FAULTS
 from netem.schema.fault import Fault
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
-from scenarios.results.own import pages as own_pages
+from scenarios.results.evaluation import claims, metric
+from scenarios.results.evaluation.benchmark_registry import CLAIMS
+from scenarios.results.evaluation.metric import METRICS
 from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, ScenarioModel, Time
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
+from wire.registry import PluginError, Registry
 from wire.table_schema import fields_of
 
-TOPICS = ("keys", "messages", "scenario", *own_pages.PAGES)
+_LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
+
+    @gridpeers.law("mine")
+    class Mine(gridpeers.Law):
+        gain: Annotated[float, Unit("1/s"), Range(0, 100), "Rate."] = 5.0
+        def step(self, own, neighbours, T):
+            return gridpeers.SetPoints(P_set=own.P_set, V_set=own.V_set)
+"""
+
+_REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
+    "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
+    "metrics": (METRICS, metric.__doc__ or "", 'metrics = ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05 }]'),
+    "claims": (CLAIMS, claims.__doc__ or "", 'claims = ["mine:restored"]'),
+    "faults": (FAULTS, own_fault.__doc__ or "", '"mine:Jammer" = { share = 0.2 } in an entry [[link]]'),
+    "graphs": (GRAPHS, graphs.__doc__ or "", 'graph = "mine:star", or graph = { use = "mine:Nearest", k = 3 }'),
+}
+"""By topic: the registry, how an entry is written, and how a scenario names one."""
+
+TOPICS = ("keys", "messages", "scenario", *_REGISTRIES)
 """Pages there are."""
 
 _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
@@ -52,10 +79,9 @@ def page(topic: str) -> str:
     topic : str
         One of `TOPICS`.
     """
-    if topic in own_pages.PAGES:
-        return "\n".join(own_pages.page(topic)) + "\n"
     makers = {"keys": _keys, "messages": _messages, "scenario": _scenario}
-    return "\n".join(makers[topic]()) + "\n"
+    lines = makers[topic]() if topic in makers else _registry(topic)
+    return "\n".join(lines) + "\n"
 
 
 def _keys() -> Iterator[str]:
@@ -114,3 +140,38 @@ def _has_section(kind: Any) -> bool:
     """Return whether a field is a table, or a list of tables, with a section of its own."""
     tables = {cls for _, cls in _SCENARIO_TABLES}
     return kind in tables or any(_has_section(part) for part in typing.get_args(kind))
+
+
+def _registry(topic: str) -> Iterator[str]:
+    """Yield the page of one registry: how an entry is written and named, and the entries that there are."""
+    registry, how, key = _REGISTRIES[topic]
+    title, _, rest = how.strip().partition("\n")
+    yield f"# {registry.plural[:1].upper()}{registry.plural[1:]}"
+    yield ""
+    yield title
+    yield from rest.rstrip().split("\n")
+    yield ""
+    yield f"In a scenario: {key}. A module is looked for beside the scenario's file, then on the Python path. A"
+    yield f"distribution adds its own under the entry points `{registry.group}`."
+    if not registry.names:
+        yield ""
+        yield "None come with gridpeers."
+    for name in registry.names:
+        yield ""
+        yield f"## {name}"
+        yield ""
+        yield from _entry(registry, name)
+
+
+def _entry(registry: Registry[Any], name: str) -> Iterator[str]:
+    """Yield the sentence and the parameters of one entry."""
+    try:
+        it = registry.resolve(name)
+    except PluginError as error:  # an entry point of somebody's that is broken
+        yield f"Cannot be used: {error}"
+        return
+    yield (inspect.getdoc(it) or "").partition("\n\n")[0].replace("\n", " ") or "Its author tells nothing of it."
+    if not isinstance(it, type):
+        return
+    if lines := list(field_table(it)):
+        yield from ("", *lines)

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results import metrics
-from scenarios.results.drawing import Drawing
 from scenarios.results.history import Floats, History, Nameplates
 from scenarios.results.island_membership import RowMeasure, worst
+from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import (
     PAGE,

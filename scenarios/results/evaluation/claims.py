@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scenarios.results.benchmark_registry import CLAIMS, Quantity
+from scenarios.results.evaluation.benchmark_registry import CLAIMS, Quantity
 from scenarios.results.findings import Findings
 from wire.anybody import ANYTHING, named
 from wire.plugin import Plugin, made

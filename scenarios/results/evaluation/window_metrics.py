@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant.equipment import Feeder
+from scenarios.results.evaluation.metric import Measured, make_metrics, measured
 from scenarios.results.event_windows import CaseRecord, Window
 from scenarios.results.history import History, Nameplates, read_only
 from scenarios.results.metrics import Settling, Steady, measure, settling
-from scenarios.results.own.metric import Measured, make_metrics, measured
 from scenarios.schema import ScenarioModel
 from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.participants import without_agent

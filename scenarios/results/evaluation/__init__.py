@@ -1,0 +1,1 @@
+"""Evaluation of a run: metrics, benchmarks and claims, of gridpeers and of users, in the same registries."""

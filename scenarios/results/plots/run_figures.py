@@ -1,0 +1,57 @@
+"""The figures of a run, as PNG files: those of all experiments, and those that belong to what happens in this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from scenarios.results.plots.case_figures import MEASURES, overview, single
+from scenarios.results.plots.drawing import Drawing
+from scenarios.results.plots.inverter_figures import available_power, microgrids, plug_and_play, powers
+from scenarios.results.plots.style import PAGE, save
+
+
+def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
+    """Return how each figure of a run is drawn, by its name."""
+    figures: dict[str, Callable[[], Figure]] = {name: partial(single, drawing, name) for name in MEASURES}
+    figures |= {
+        "power_GFM": lambda: powers(drawing, GFM=True),
+        "power_GFL": lambda: powers(drawing, GFM=False),
+        "overview": lambda: overview(drawing),
+    }
+    if drawing.moves:
+        figures["plug-n-play"] = lambda: plug_and_play(drawing)
+    if drawing.limited:
+        figures["available-power"] = lambda: available_power(drawing)
+    if drawing.islands:
+        figures |= {f"microgrids_{case}": partial(microgrids, drawing, case) for case in drawing.histories}
+    return figures
+
+
+def draw(drawing: Drawing, name: str) -> Figure:
+    """Draw one figure of a run in the style of all.
+
+    Raises
+    ------
+    KeyError
+        If the run has no figure of this name.
+    """
+    with mpl.rc_context(PAGE):
+        return figures_of(drawing)[name]()
+
+
+def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
+    """Draw every figure of a run into a folder.
+
+    Returns
+    -------
+    tuple of Path
+        The files.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context(PAGE):
+        return tuple(file for name, make in figures_of(drawing).items() for file in save(make(), folder, name))
