@@ -19,7 +19,7 @@ to the agents, which start with the plant: for listening, or as the near end of 
 _TRIES = 100
 
 
-class EndpointError(ValueError):
+class ListenError(ValueError):
     """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
 
     def __init__(self, text: str, *, in_use: bool = False) -> None:
@@ -28,7 +28,7 @@ class EndpointError(ValueError):
         """Whether something listens there already."""
 
 
-class Endpoint(NamedTuple):
+class ZenohEndpoint(NamedTuple):
     """A Zenoh endpoint, e.g. tcp/127.0.0.1:7447."""
 
     protocol: str
@@ -47,16 +47,16 @@ class Endpoint(NamedTuple):
         return self.protocol in ("tcp", "tls")
 
 
-def parse_endpoint(text: str) -> Endpoint | None:
+def parse_endpoint(text: str) -> ZenohEndpoint | None:
     """Return the endpoint of a text; None if the text has not the form of one.
 
     Examples
     --------
     >>> parse_endpoint("tcp/[::1]:7447")
-    Endpoint(protocol='tcp', host='[::1]', port=7447, rest='')
+    ZenohEndpoint(protocol='tcp', host='[::1]', port=7447, rest='')
     """
     match = _FORM.fullmatch(text)
-    return match and Endpoint(match["protocol"], match["host"], int(match["port"]), match["rest"] or "")
+    return match and ZenohEndpoint(match["protocol"], match["host"], int(match["port"]), match["rest"] or "")
 
 
 def local_endpoint(port: int) -> str:
@@ -82,12 +82,12 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
 
     Raises
     ------
-    EndpointError
+    ListenError
         If the port is in use, or the address is not one of this host.
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:
-        raise EndpointError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
+        raise ListenError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
     if not endpoint.connects:
         return text
     ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_OWN, _TRIES)
@@ -97,7 +97,7 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
             return str(endpoint._replace(port=port))
         except OSError as error:
             reason = error
-    raise EndpointError(
+    raise ListenError(
         f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
         f"{_way_out(endpoint.host, reason)}",
         in_use=reason.errno == errno.EADDRINUSE,

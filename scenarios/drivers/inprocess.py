@@ -36,7 +36,7 @@ class _Delivery(NamedTuple):
     payload: bytes
 
 
-class Bus:
+class InprocessBus:
     """Delivers what the cores publish, in the order of publication.
 
     Parameters
@@ -213,7 +213,7 @@ def run_inprocess(
             agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
             return agents[-1]
 
-        Bus(side, agents, note, on_links, newcomer).run()
+        InprocessBus(side, agents, note, on_links, newcomer).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

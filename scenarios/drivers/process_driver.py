@@ -83,7 +83,7 @@ def run_processes(
 
     Raises
     ------
-    EndpointError, SessionError
+    ListenError, SessionError
         If the port is in use, or Zenoh is missing; nothing has been started then.
     """
     agents = {config.name: config for config in agent_configs}

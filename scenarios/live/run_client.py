@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.drivers.free_endpoint import EndpointError, free_endpoint
+from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -240,12 +240,12 @@ def endpoint_for_run(listen: str) -> str:
     ------
     UsageError
         If it is no endpoint, or another run is there, which the message names.
-    EndpointError
+    ListenError
         If it cannot be listened on.
     """
     try:
         return free_endpoint(check_endpoint("--listen", listen), option="--listen")
-    except EndpointError as error:
+    except ListenError as error:
         where = loopback_of(listen)
         there = runs_at(where) if error.in_use and accepting((where,)) else []
         if not there:

@@ -41,7 +41,7 @@ def run_client(run: str, connect: list[str] | None, wait: float, *, meet_agents:
 @contextmanager
 def usage_errors() -> Iterator[None]:
     """End the command with one line and exit code 2 on a usage error, or if the run is not there."""
-    from scenarios.drivers.free_endpoint import EndpointError
+    from scenarios.drivers.free_endpoint import ListenError
     from scenarios.live.run_address import UsageError
     from scenarios.live.run_client import NobodyError
     from scenarios.live.run_requests import RefusedError
@@ -53,7 +53,7 @@ def usage_errors() -> Iterator[None]:
         yield
     except (
         ConfigurationError,
-        EndpointError,
+        ListenError,
         FolderError,
         NobodyError,
         RefusedError,

@@ -92,7 +92,7 @@ def run(
 
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import progress
-    from scenarios.drivers.free_endpoint import EndpointError, free_endpoint, local_endpoint
+    from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.report import show
     from scenarios.results.run_files import FolderError, new_folder, shown
     from scenarios.run import BrokenRunError, Request
@@ -102,7 +102,7 @@ def run(
         if driver is DriverName.processes:
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
-    except (EndpointError, FolderError) as error:
+    except (ListenError, FolderError) as error:
         fail([str(error)], BAD_INPUT)
 
     console = Console()

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.live.show.snapshot import Line, Snapshot
+from scenarios.live.show.snapshot import InverterStatus, Snapshot
 from scenarios.short_names import short
 
 EVENTS = 6
@@ -23,7 +23,7 @@ OLD = 0.2
 class _Column:
     head: str
     unit: str
-    text: Callable[[Line], str]
+    text: Callable[[InverterStatus], str]
     right: bool = True
 
 
@@ -35,27 +35,27 @@ def _count(value: int | None) -> str:
     return "-" if value is None else str(value)
 
 
-def _oldest(line: Line) -> str:
-    return _number(max(line.ages.values(), default=None), 2)
+def _oldest(inverter: InverterStatus) -> str:
+    return _number(max(inverter.ages.values(), default=None), 2)
 
 
 _COLUMNS = (
-    _Column("agent", "", lambda line: line.name, right=False),
-    _Column("island", "", lambda line: line.island or "-", right=False),
-    _Column("f", "Hz", lambda line: _number(line.f, 3)),
-    _Column("P", "kW", lambda line: _number(line.P, 1)),
-    _Column("P_set", "kW", lambda line: _number(line.P_set, 1)),
-    _Column("P", "pu", lambda line: _number(line.P_share, 3)),
-    _Column("Q", "kvar", lambda line: _number(line.Q, 1)),
-    _Column("V", "pu", lambda line: _number(line.V, 4)),
-    _Column("V_set", "pu", lambda line: _number(line.V_set, 4)),
-    _Column("hears", "", lambda line: short(list(line.ages)), right=False),
+    _Column("agent", "", lambda inverter: inverter.name, right=False),
+    _Column("island", "", lambda inverter: inverter.island or "-", right=False),
+    _Column("f", "Hz", lambda inverter: _number(inverter.f, 3)),
+    _Column("P", "kW", lambda inverter: _number(inverter.P, 1)),
+    _Column("P_set", "kW", lambda inverter: _number(inverter.P_set, 1)),
+    _Column("P", "pu", lambda inverter: _number(inverter.P_share, 3)),
+    _Column("Q", "kvar", lambda inverter: _number(inverter.Q, 1)),
+    _Column("V", "pu", lambda inverter: _number(inverter.V, 4)),
+    _Column("V_set", "pu", lambda inverter: _number(inverter.V_set, 4)),
+    _Column("hears", "", lambda inverter: short(list(inverter.ages)), right=False),
     _Column("age", "s", _oldest),
-    _Column("in", "", lambda line: _count(line.received)),
-    _Column("out", "", lambda line: _count(line.sent)),
-    _Column("lost", "", lambda line: _count(line.lost)),
-    _Column("impaired", "", lambda line: short(line.impaired) if line.impaired else "", right=False),
-    _Column("", "", lambda line: line.note, right=False),
+    _Column("in", "", lambda inverter: _count(inverter.received)),
+    _Column("out", "", lambda inverter: _count(inverter.sent)),
+    _Column("lost", "", lambda inverter: _count(inverter.lost)),
+    _Column("impaired", "", lambda inverter: short(inverter.impaired) if inverter.impaired else "", right=False),
+    _Column("", "", lambda inverter: inverter.note, right=False),
 )
 """What is shown of each agent; "age" is that of the oldest of what it heard from the neighbours that count, "impaired"
 are those between whom and it an emulated fault holds."""
@@ -63,14 +63,14 @@ are those between whom and it an emulated fault holds."""
 
 def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
     """The columns that there is something to show in."""
-    calm = not any(line.impaired for line in snapshot.lines)
+    calm = not any(inverter.impaired for inverter in snapshot.inverters)
     return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
 def head(snapshot: Snapshot) -> str:
     """One line on the whole run."""
     t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
-    islands = list(dict.fromkeys(line.island for line in snapshot.lines if line.island))
+    islands = list(dict.fromkeys(inverter.island for inverter in snapshot.inverters if inverter.island))
     parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
     parts.append(f"impaired to the plant: {short(snapshot.impaired)}" if snapshot.impaired else "")
     return "   ".join(part for part in parts if part)
@@ -86,10 +86,10 @@ def plain(snapshot: Snapshot) -> str:
     """
     columns = _columns(snapshot)
     titles = [f"{column.head} {column.unit}".strip() for column in columns]
-    rows = [titles, *([column.text(line) for column in columns] for line in snapshot.lines)]
+    rows = [titles, *([column.text(inverter) for column in columns] for inverter in snapshot.inverters)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(columns))]
     text = [head(snapshot)]
-    for row in rows if snapshot.lines else []:
+    for row in rows if snapshot.inverters else []:
         cells = [
             cell.rjust(width) if column.right else cell.ljust(width)
             for cell, width, column in zip(row, widths, columns, strict=True)
@@ -114,17 +114,17 @@ def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
     for column in columns:
         title = f"{column.head}\n{column.unit}" if column.head else ""
         grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
-    for line in snapshot.lines:
-        grid.add_row(*(Text(column.text(line), style=_style(column, line)) for column in columns))
+    for inverter in snapshot.inverters:
+        grid.add_row(*(Text(column.text(inverter), style=_style(column, inverter)) for column in columns))
     events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
     return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
 
 
-def _style(column: _Column, line: Line) -> str:
-    if line.note and not line.note.startswith("apart") and column.head in ("agent", ""):
+def _style(column: _Column, inverter: InverterStatus) -> str:
+    if inverter.note and not inverter.note.startswith("apart") and column.head in ("agent", ""):
         return "yellow"  # to be in another island is no fault
-    if column.head == "age" and max(line.ages.values(), default=0.0) >= OLD:
+    if column.head == "age" and max(inverter.ages.values(), default=0.0) >= OLD:
         return "yellow"
-    if (column.head == "lost" and line.lost) or column.head == "impaired":
+    if (column.head == "lost" and inverter.lost) or column.head == "impaired":
         return "yellow"
     return ""

@@ -12,7 +12,7 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from scenarios.live.show.events import line_of
-from scenarios.live.show.snapshot import Line, Snapshot
+from scenarios.live.show.snapshot import InverterStatus, Snapshot
 from scenarios.short_names import in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -141,12 +141,12 @@ class RunMonitor:
             t=self._t,
             pace=pace,
             impaired=self._impaired if current else (),
-            lines=tuple(self._line(name, name in present, current, now) for name in names),
+            inverters=tuple(self._inverter(name, name in present, current, now) for name in names),
             events=tuple(line_of(event) for event in self._events),
         )
 
-    def _line(self, name: str, present: bool, current: bool, now: float) -> Line:
-        """Return the line of one inverter; with values of the plant only if they are current."""
+    def _inverter(self, name: str, present: bool, current: bool, now: float) -> InverterStatus:
+        """Return the status of one inverter; with values of the plant only if they are current."""
         f = P = Q = V = P_set = V_set = None
         if current and name in self._inverters and self._row:
             start = 1 + _PER_INVERTER * self._inverters.index(name)
@@ -156,7 +156,7 @@ class RunMonitor:
         if not present or now - at > SILENT:
             status = None
         ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
-        return Line(
+        return InverterStatus(
             name=name,
             kind=config.kind if config else "",
             island=status.island if status else "",

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
-    """One inverter and its agent. What is not known (yet) is None."""
+class InverterStatus:
+    """One inverter and its agent at one moment; None stands for an unknown value."""
 
     name: str
     kind: str = ""
@@ -29,7 +29,7 @@ class Line:
     V_set: float | None = None
     """pu of its nominal voltage."""
     ages: dict[str, float] = field(default_factory=dict)
-    """Its neighbours, and how old (s) what it heard of each is."""
+    """Age (s) of the latest state of each neighbour that it uses."""
     received: int | None = None
     """Messages that came in."""
     sent: int | None = None
@@ -41,7 +41,7 @@ class Line:
     impaired: tuple[str, ...] = ()
     """Senders between whom and it an emulated fault holds."""
     note: str = ""
-    """What a person should know: "no agent", "waits for ...", "silent for 3 s"."""
+    """A note for the reader: "no agent", "waits for ...", "silent for 3 s"."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class Snapshot:
     """How well the plant keeps real time, in a few words."""
     impaired: tuple[str, ...] = ()
     """Agents between whom and the plant an emulated fault holds."""
-    lines: tuple[Line, ...] = ()
-    """In the order of the inverters."""
+    inverters: tuple[InverterStatus, ...] = ()
+    """All inverters, in their order."""
     events: tuple[str, ...] = ()
-    """What happened, a line each, the latest last."""
+    """Events, a line each, the latest last."""

@@ -16,7 +16,7 @@ from time import monotonic
 import msgspec
 import pytest
 
-from scenarios.drivers.free_endpoint import EndpointError, free_endpoint
+from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.drivers.process_driver import run_processes
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -142,7 +142,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
         plant, agents = toy_configs(2)
         run = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
 
-        with pytest.raises(EndpointError, match=r"listen: tcp/127.* in use; .* choose another port, or 0"):
+        with pytest.raises(ListenError, match=r"listen: tcp/127.* in use; .* choose another port, or 0"):
             run()
     assert run.children is None
     assert not (tmp_path / "log").exists()

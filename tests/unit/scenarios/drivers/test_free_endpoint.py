@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from scenarios.drivers.free_endpoint import EndpointError, free_endpoint
+from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 
 
 def test_a_port_in_use_is_told_before_anything_starts() -> None:
@@ -15,7 +15,7 @@ def test_a_port_in_use_is_told_before_anything_starts() -> None:
         text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
 
         with pytest.raises(
-            EndpointError,
+            ListenError,
             match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT",
         ):
             free_endpoint(text, option="--listen")
@@ -29,7 +29,7 @@ def test_port_0_becomes_a_free_port() -> None:
 def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
     """192.0.2.0/24 belongs to nobody: there is nothing to end there, and the line does not say so."""
     with pytest.raises(
-        EndpointError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host"
+        ListenError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host"
     ) as told:
         free_endpoint("tcp/192.0.2.1:7447")
 
@@ -38,5 +38,5 @@ def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
 
 def test_a_name_without_an_address_cannot_be_listened_on() -> None:
     """The names under .invalid never have one."""
-    with pytest.raises(EndpointError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
+    with pytest.raises(ListenError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
         free_endpoint("tcp/lab.invalid:7447")

@@ -9,7 +9,7 @@ from rich.console import Console
 from agents.agent_config import AgentConfig, Control
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
-from scenarios.live.show.snapshot import Line, Snapshot
+from scenarios.live.show.snapshot import InverterStatus, Snapshot
 from scenarios.short_names import short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -80,7 +80,7 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
 
 def test_a_frozen_agent_is_silent() -> None:
     """A token without a status is told with the time since the last one."""
-    (line, _) = monitor().snapshot({"inv1"}, now=14.0).lines
+    (line, _) = monitor().snapshot({"inv1"}, now=14.0).inverters
 
     assert line.note == "silent for 4 s"
     assert line.received is None
@@ -91,7 +91,7 @@ def test_a_silent_plant_is_told() -> None:
     assert monitor().snapshot({"inv1"}, now=14.0).pace == "the plant has been silent for 4 s"
 
 
-def numbers(line: Line) -> set[float | None]:
+def numbers(line: InverterStatus) -> set[float | None]:
     """What the plant tells of an inverter."""
     return {line.f, line.P, line.P_set, line.P_share, line.Q, line.V, line.V_set}
 
@@ -103,7 +103,7 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
     broke.telemetry(replace(told(2.2), final=True, outcome="the deadline of inv1 passed"), now=10.2)
     look = ended.snapshot((), now=10.3)
 
-    assert [numbers(line) for line in look.lines] == [{None}, {None}]
+    assert [numbers(line) for line in look.inverters] == [{None}, {None}]
     assert (look.t, look.pace, look.impaired) == (2.2, "the run has ended", ())
     assert plain(look).splitlines()[2].split() == ["inv1", *"-" * 13, "no", "agent"]
     assert broke.snapshot((), now=10.3).pace == "the run has ended: the deadline of inv1 passed"
@@ -112,12 +112,12 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
 def test_numbers_of_a_silent_plant_are_not_shown() -> None:
     """A plant that was killed has told no end: its numbers go when it has been silent, and come back with the next."""
     seen = monitor()
-    before, silent = seen.snapshot({"inv1"}, now=11.4).lines[0], seen.snapshot({"inv1"}, now=11.6).lines[0]
+    before, silent = seen.snapshot({"inv1"}, now=11.4).inverters[0], seen.snapshot({"inv1"}, now=11.6).inverters[0]
     seen.telemetry(told(0.2, life=2), now=20.0)
 
     assert before.P == 300.0
     assert numbers(silent) == {None}
-    assert seen.snapshot((), now=20.0).lines[0].P == 300.0
+    assert seen.snapshot((), now=20.0).inverters[0].P == 300.0
 
 
 def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
@@ -127,7 +127,7 @@ def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
     seen.telemetry(told(0.2, life=2), now=20.0)
 
     assert seen.snapshot((), now=20.0).pace.startswith("pace: 100.00 %")
-    assert seen.snapshot((), now=20.0).lines[0].P == 300.0
+    assert seen.snapshot((), now=20.0).inverters[0].P == 300.0
 
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
@@ -142,7 +142,7 @@ def test_only_neighbours_in_use_count_as_heard() -> None:
     """Who is too old, or in another island, is named in the note."""
     seen = monitor()
     seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
-    line = seen.snapshot({"inv1"}, now=10.0).lines[0]
+    line = seen.snapshot({"inv1"}, now=10.0).inverters[0]
 
     assert line.ages == {"inv2": 0.01, "inv3": 0.02}
     assert line.note == "without inv4"
@@ -176,14 +176,14 @@ def test_watch_shows_the_same_as_a_table() -> None:
 def test_a_look_at_nothing_is_one_line() -> None:
     """No agent, no plant: only the run's name."""
     assert plain(Snapshot(run="lab")) == "run lab   has not begun\n"
-    assert Line(name="inv1").note == ""
+    assert InverterStatus(name="inv1").note == ""
 
 
 def test_impaired_links_are_shown_only_while_there_are_any() -> None:
     """A column of few characters, and a word in the first line of whom the plant hears badly; else nothing of it."""
-    hurt = Line(name="inv4", impaired=("inv1", "inv7", "plant"))
-    calm = Snapshot(run="lab", t=1.0, lines=(Line(name="inv4"), Line(name="inv5")))
-    bad = Snapshot(run="lab", t=1.0, lines=(hurt, Line(name="inv5")), impaired=("inv2", "inv3", "inv4"))
+    hurt = InverterStatus(name="inv4", impaired=("inv1", "inv7", "plant"))
+    calm = Snapshot(run="lab", t=1.0, inverters=(InverterStatus(name="inv4"), InverterStatus(name="inv5")))
+    bad = Snapshot(run="lab", t=1.0, inverters=(hurt, InverterStatus(name="inv5")), impaired=("inv2", "inv3", "inv4"))
 
     assert "impaired" not in plain(calm)
     assert plain(bad).splitlines()[0].endswith("impaired to the plant: inv2-4")
