@@ -58,7 +58,7 @@ deaf       the cut lasts about 1.5 s, until the others are restored; with TCP's 
            other within {AFTERMATH + BOTH_WAYS:g} s more, then one is restarted; and the observer, who no longer
            hears the status of an agent and opens a new session
 one-way    handed to Zenoh -> in the receiving thread of another process, at the rate of ticks ({TICK * 1e3:g} ms)
-All times in ms, from when the observer did it to when news of it reached his session; he shares the machine."""
+All times in ms, from the act of the observer to the arrival of its effect at the observer; both share the machine."""
 
 
 class Budget:

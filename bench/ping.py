@@ -6,41 +6,49 @@ which it was handed to Zenoh; the time at which it has come is taken in Zenoh's 
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
-from contextlib import suppress
+import tempfile
+from pathlib import Path
 from struct import pack, unpack_from
-from time import monotonic_ns
+from time import monotonic
 
-from wire.driver.inbox import Event, Inbox
+import msgspec
+
+from scenarios.drivers.children import Child, Children
 from wire.driver.session import Session
 
 STAMP = 8
-"""Bytes of a time (ns)."""
+"""Bytes of a time (s)."""
 
 TICK = 0.02
-"""Distance of two messages (s): the control period."""
+"""Time (s) between two messages: the control period."""
 
 NEVER = 1 << 30
-"""More messages than ever come: who waits for so many waits for the time."""
+"""More messages than ever come: a process that waits for so many waits for the time."""
 
 LONGEST = 60.0
 """Longest wait for a message (s)."""
 
 
-class StampedInbox(Inbox):
-    """An inbox that puts the time (ns) at which a payload came before it."""
+class Role(msgspec.Struct, frozen=True):
+    """The configuration of one of the two processes."""
 
-    def put(self, event: Event) -> None:
-        """Put an event in, from any thread."""
-        kind, key, payload = event
-        super().put((kind, key, pack("<q", monotonic_ns()) + payload))
+    role: str
+    """receive, send, ping or echo."""
+    key: str
+    """The key of the messages."""
+    size: int
+    """Bytes of a message."""
+    count: int
+    """Number of messages."""
+    listen: tuple[str, ...]
+    connect: tuple[str, ...]
+    """Endpoints."""
 
 
-def stamp_of(payload: bytes, offset: int = 0) -> float:
-    """Return the time (s) that stands in a payload."""
-    return float(unpack_from("<q", payload, offset)[0]) * 1e-9
+def sent_at(payload: bytes) -> float:
+    """Return the time (s) at which a payload was handed to Zenoh."""
+    return float(unpack_from("<d", payload)[0])
 
 
 def one_way(
@@ -60,25 +68,29 @@ def one_way(
         What both connect to, beside what the other listens on: the plant of a run, or nothing.
     """
     first = tuple(endpoint for endpoint in receiver if not endpoint.endswith(":0"))
-    return _pair(("receive", key, size, count, receiver, connect), ("send", key, size, count, sender, first + connect))
+    receive = Role("receive", key, size, count, receiver, connect)
+    return _pair(receive, Role("send", key, size, count, sender, first + connect))
 
 
 def round_trip(size: int, count: int, *, key: str, endpoint: str) -> list[float]:
     """Return the times (s) of so many messages there and back, each sent when the one before is back."""
-    return _pair(("ping", key, size, count, (endpoint,), ()), ("echo", key, size, count, (), (endpoint,)))
+    return _pair(Role("ping", key, size, count, (endpoint,), ()), Role("echo", key, size, count, (), (endpoint,)))
 
 
-def _pair(measuring: tuple[object, ...], other: tuple[object, ...]) -> list[float]:
-    """Run two processes; what the first prints."""
-    command = [sys.executable, __file__]
-    with subprocess.Popen([*command, json.dumps(other)], stdin=subprocess.PIPE) as second:
+def _pair(measuring: Role, other: Role) -> list[float]:
+    """Run two processes and return the times that the first prints."""
+    children, words = Children(), list[str]()
+    with tempfile.TemporaryDirectory() as folder:
         try:
-            done = subprocess.run(
-                [*command, json.dumps(measuring)], stdout=subprocess.PIPE, check=True, timeout=LONGEST
-            )
+            for role, on_word in ((other, None), (measuring, words.append)):
+                log = Path(folder) / f"{role.role}.log"
+                children.add(Child(role.role, [__file__], role, log, lambda child: None, on_word))
+            measurer = children[measuring.role]
+            if not measurer.join(monotonic() + LONGEST) or measurer.status != 0:
+                raise TimeoutError(measurer.report(f"within {LONGEST:g} s"))
         finally:
-            second.kill()
-    return [float(seconds) for seconds in json.loads(done.stdout)]
+            children.end()
+    return msgspec.json.decode(words[-1], type=list[float])
 
 
 def receive(session: Session, key: str, count: int) -> list[float]:
@@ -89,18 +101,18 @@ def receive(session: Session, key: str, count: int) -> list[float]:
         events = session.inbox.take(1, LONGEST)
         if not events:
             raise TimeoutError(f"nothing came for {LONGEST:g} s")
-        took += [stamp_of(payload) - stamp_of(payload, STAMP) for _, _, payload, _ in events]
+        took += [at - sent_at(payload) for _, _, payload, at in events]
     return took[WARM_UP : WARM_UP + count]
 
 
 def send(session: Session, key: str, size: int) -> None:
     """Publish at the rate of ticks on a drift-free timer, until the process is ended; not for ever, if nobody does."""
-    due, padding = monotonic_ns(), bytes(size - STAMP)
+    due, padding = monotonic(), bytes(size - STAMP)
     for _ in range(round(LONGEST / TICK)):
-        session.publish(key, pack("<q", monotonic_ns()) + padding)
-        due += round(TICK * 1e9)
-        while (left := due - monotonic_ns()) > 0:
-            session.inbox.take(NEVER, left * 1e-9)
+        session.publish(key, pack("<d", monotonic()) + padding)
+        due += TICK
+        while (left := due - monotonic()) > 0.0:
+            session.inbox.take(NEVER, left)
 
 
 def ping(session: Session, key: str, size: int, count: int) -> list[float]:
@@ -108,8 +120,8 @@ def ping(session: Session, key: str, size: int, count: int) -> list[float]:
     session.subscribe(f"{key}/back")
     took: list[float] = []
     while len(took) < count + WARM_UP:
-        session.publish(key, pack("<q", monotonic_ns()) + bytes(size - STAMP))
-        took += [stamp_of(p) - stamp_of(p, STAMP) for _, _, p, _ in session.inbox.take(1, 0.5)]
+        session.publish(key, pack("<d", monotonic()) + bytes(size - STAMP))
+        took += [at - sent_at(payload) for _, _, payload, at in session.inbox.take(1, 0.5)]
     return took[WARM_UP : WARM_UP + count]
 
 
@@ -118,26 +130,27 @@ def echo(session: Session, key: str) -> None:
     session.subscribe(key)
     while events := session.inbox.take(1, LONGEST):
         for _, _, payload, _ in events:
-            session.publish(f"{key}/back", payload[STAMP:])
+            session.publish(f"{key}/back", payload)
 
 
 WARM_UP = 25
 """Messages that are not counted: links and publishers are new."""
 
 
-def run(role: str, key: str, size: int, count: int, listen: list[str], connect: list[str]) -> None:
-    """Be one of the two."""
-    session = Session(role, listen=tuple(listen), connect=tuple(connect), clock="wall")
-    session.inbox = StampedInbox()
-    with suppress(KeyboardInterrupt):
-        if role == "send":
-            send(session, key, size)
-        elif role == "echo":
-            echo(session, key)
-        else:
-            print(json.dumps(receive(session, key, count) if role == "receive" else ping(session, key, size, count)))
+def run(config: Role) -> None:
+    """Be one of the two processes."""
+    session = Session(config.role, listen=config.listen, connect=config.connect, clock="wall")
+    match config.role:
+        case "send":
+            send(session, config.key, config.size)
+        case "echo":
+            echo(session, config.key)
+        case "receive":
+            print(msgspec.json.encode(receive(session, config.key, config.count)).decode())
+        case _:
+            print(msgspec.json.encode(ping(session, config.key, config.size, config.count)).decode())
     session.close()
 
 
 if __name__ == "__main__":
-    run(*json.loads(sys.argv[1]))
+    run(msgspec.json.decode(sys.stdin.buffer.readline(), type=Role))

@@ -1,8 +1,7 @@
-"""The paper's feeder in wall-clock time with an observer, who notes when what he sees came, and who hurts agents."""
+"""The paper's feeder in real time with an observer, which notes when messages came and injects faults into agents."""
 
 from __future__ import annotations
 
-import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,16 +11,15 @@ from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
-from ping import STAMP, StampedInbox, stamp_of
 
 from plant.equipment import F_NOM
-from scenarios.drivers.children import Child, Children
+from scenarios.drivers.supervisor import Supervisor
 from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.run_address import RunAddress
+from scenarios.live.run_client import RunClient
 from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from scenarios.schema import load_scenario
 from wire.codec import decode, encode
-from wire.driver.session import Session
-from wire.keys import Keys
 from wire.messages import PLANT, AgentStatus, Command, Measurement, PlantEvent, State, Telemetry
 
 RUN = "latency"
@@ -34,20 +32,21 @@ QUIET = 2.0
 """Time (s) after which an agent that works but is not heard is out of reach; it reports twice a second."""
 
 BUILD = 600.0
-"""Longest wait (s) for the plant to stand."""
+"""Longest wait (s) for the plant to be built."""
 
 HOLD = 0.5
-"""How long (s of run time) the bands must hold to count as restored; longer than noticing takes."""
+"""Run time (s) for which the bands must hold to count as restored; longer than noticing takes."""
 
-_AGENT = "scenarios.emulation.emulated_agent"
-"""Agents by hand stand behind emulated links, that somebody may hurt."""
-
-_ELSEWHERE = "import os, sys; os.execvp(sys.argv[1], sys.argv[1:])"
-"""What becomes another command, with the process id and the standard input of this one."""
+LOOK = 0.5
+"""Longest wait (s) between two looks at a condition that no message may end."""
 
 
 class NotInTimeError(Exception):
-    """Something did not come; the message says what."""
+    """A condition did not come true in time; the message names it."""
+
+
+def _ignore(_: object) -> None:
+    """Take no notice: the observer looks at the processes itself."""
 
 
 class Watched:
@@ -68,64 +67,57 @@ class Watched:
     def __init__(self, folder: Path, endpoint: str, listen: str, elsewhere: dict[str, tuple[str, list[str]]]) -> None:
         scenario, feeder = load_scenario("islanding")
         scenario = replace(scenario, events=scenario.events[:1])
-        self.plant_config, agents = configure(
-            scenario, feeder, LiveOptions(run=RUN, case="IV", wait=PATIENCE), endpoint
-        )
-        self.names = self.plant_config.agents
-        self._places = {name: elsewhere.get(name, (listen, [])) for name in self.names}
+        plant, agents = configure(scenario, feeder, LiveOptions(run=RUN, case="IV", wait=PATIENCE), endpoint)
+        self.names = plant.agents
         self.agents = {
-            agent.name: replace(agent, connect=(endpoint,), listen=(self._places[agent.name][0],), deadline=BUILD)
+            agent.name: replace(agent, connect=(endpoint,), listen=(elsewhere.get(agent.name, (listen, []))[0],))
             for agent in agents
             if agent.name in self.names
         }
-        self.endpoint, self.keys, self.children = endpoint, Keys(RUN), Children()
+        prefixes = {name: prefix for name, (_, prefix) in elsewhere.items()}
+        self._supervisor = Supervisor(plant, self.agents.values(), folder, _ignore, _ignore, prefixes=prefixes)
+        self.endpoint, self.children = endpoint, self._supervisor.children
         self.telemetry: Telemetry | None = None
         self.events: list[PlantEvent] = []
         self.tokens: dict[str, float] = {}
-        """Agents whose token is there, and when it came."""
+        """When the token of each agent that is present came (s, monotonic)."""
         self.used: dict[str, tuple[str, ...]] = {}
-        """Of each agent who is in its sums."""
+        """By agent, the neighbours in its sums."""
         self.turns: list[tuple[float, str, str, bool]] = []
-        """When, in whose sums, who came in (True) or went out, since `mark`."""
+        """Since `mark`: when a neighbour came into an agent's sums (True) or went out: time, agent, neighbour."""
         self.size = 0
         """Bytes of a State."""
         self._judged: tuple[str, ...] = self.names
         self._verdicts: list[tuple[float, bool]] = []
         self._offsets: deque[float] = deque(maxlen=250)
-        self._folder, self._listen, self._commands = folder, listen, 0
+        self._commands = 0
         self._reports: dict[str, float] = {}
         """When the last status of each agent came."""
-        self.session = self._open()
-
-    def _open(self) -> Session:
-        session = Session(OBSERVER, listen=(self._listen,), connect=(self.endpoint,), clock="wall")
-        session.inbox = StampedInbox()
+        self._client = RunClient(RunAddress(run=RUN, connect=(endpoint,)), listen=(listen,))
+        self.keys = self._client.keys
         for key in (self.keys.telemetry, self.keys.measurement(self.names[0]), self.keys.state(self.names[0])):
-            session.subscribe(key)
+            self._client.listen(key)
         for name in self.names:
-            session.subscribe(self.keys.status(name))
-        session.watch(self.keys.any_alive)
-        return session
+            self._client.listen(self.keys.status(name))
 
     def listen_again(self) -> bool:
-        """Open a new session if a running agent is not heard any more, until all are heard. Whether that was so."""
+        """Open a new session if a running agent is not heard any more, until all are heard; return whether it did."""
         since, deaf = monotonic(), False
 
         def heard() -> bool:
             return all(self._reports.get(name, 0.0) > since for name in self.names)
 
         try:
-            self.until(heard, "a status of everybody", QUIET)
+            self.until(heard, "a status of every agent", QUIET)
         except NotInTimeError:
             deaf = True
-            self.session.close()
             self.tokens.clear()
-            self.session = self._open()
-            self.until(heard, "a status of everybody")
+            self._client.renew()
+            self.until(heard, "a status of every agent")
         return deaf
 
     def __enter__(self) -> Watched:
-        """Start everybody; return when all nine share, in the island."""
+        """Start all processes; return once all nine agents share, in the island."""
         try:
             self.start(PLANT, *self.names)
             self.until(lambda: self.telemetry is not None and self.telemetry.t > 2.0, "the run begins", BUILD)
@@ -139,34 +131,15 @@ class Watched:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End everybody."""
-        self.session.close()
-        self.children.end()
+        """End all processes."""
+        self._client.__exit__(kind, error, trace)
+        self._supervisor.__exit__(kind, error, trace)
 
     def start(self, *names: str) -> None:
-        """Start processes; one of a name that has run before is started anew."""
+        """Start processes, or start them again."""
         for name in names:
-            for former in self.children.lives(name):
-                former.release()
             self.used.pop(name, None)
-            log = self._folder / f"{name}-{len(self.children.lives(name))}.log"
-            if name == PLANT:
-                child = Child(
-                    name,
-                    ["-m", "scenarios.emulation.emulated_plant"],
-                    self.plant_config,
-                    log,
-                    self._ended,
-                    lambda word: None,
-                )
-            else:
-                _, prefix = self._places[name]
-                command = ["-c", _ELSEWHERE, *prefix, sys.executable, "-P", "-m", _AGENT] if prefix else ["-m", _AGENT]
-                child = Child(name, command, self.agents[name], log, self._ended)
-            self.children.add(child)
-
-    def _ended(self, child: Child) -> None:
-        self.session.inbox.put(("word", child.name, b""))
+        self._supervisor.start(*names)
 
     # ---------------------------------------------------------------- waiting
 
@@ -178,8 +151,9 @@ class Watched:
             if left <= 0.0:
                 ends = [child.report("") for name in self.names if (child := self.children[name]).status is not None]
                 raise NotInTimeError("\n".join((f"not within {patience:g} s: {what}; sums {self.used}", *ends)))
-            for kind, key, payload, _ in self.session.inbox.take(1, left):
-                self._take(kind, key, payload)
+            for key, payload, at in self._client.take(min(left, LOOK)):
+                self._take(key, payload, at)
+            self._note_tokens()
             if self.children[PLANT].status is not None:
                 raise NotInTimeError(self.children[PLANT].report("while it was needed"))
 
@@ -258,19 +232,15 @@ class Watched:
         command = Command(
             sender=OBSERVER, epoch=1, seq=self._commands, t=0.0, verb=verb, argument=name, reply_to=OBSERVER
         )
-        self.session.publish(self.keys.command, encode(command))
+        self._client.publish(self.keys.command, encode(command))
 
     # ---------------------------------------------------------------- what comes
 
-    def _take(self, kind: str, key: str, stamped: bytes) -> None:
-        at, payload = stamp_of(stamped), stamped[STAMP:]
-        match self.keys.parts(key):
-            case ("alive", "agent", name, _) if kind == "appeared":
-                self.tokens[name] = at
-            case ("alive", "agent", name, _) if kind == "vanished":
-                self.tokens.pop(name, None)
-        if kind != "message":
-            return
+    def _note_tokens(self) -> None:
+        present = self._client.present
+        self.tokens = {name: self.tokens.get(name, monotonic()) for name in present}
+
+    def _take(self, key: str, payload: bytes, at: float) -> None:
         message = decode(payload)
         if isinstance(message, State):
             self.size = len(payload)

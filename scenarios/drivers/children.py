@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from time import monotonic
 
@@ -43,6 +43,8 @@ class Child:
         Called from another thread when it has ended.
     on_word : Callable[[str], None], optional
         Called from another thread with every line of its standard output.
+    prefix : Sequence[str], optional
+        What stands before the interpreter in the command, e.g. ip netns exec NAME.
     """
 
     def __init__(
@@ -53,12 +55,13 @@ class Child:
         log: Path,
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,
+        prefix: Sequence[str] = (),
     ) -> None:
         self.name, self.log = name, log
         # -P: a folder named like one of our packages, where the user stands, must not be imported instead
         with log.open("wb") as stderr:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", *command, LEASH, name],  # the name is for people who look at ps
+                [*prefix, sys.executable, "-P", *command, LEASH, name],  # the name is for people who look at ps
                 stdin=subprocess.PIPE,
                 stdout=stderr if on_word is None else subprocess.PIPE,
                 stderr=stderr,

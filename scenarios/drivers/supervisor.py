@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
 from msgspec.structs import replace
 
@@ -34,6 +34,8 @@ class Supervisor:
         Called with "listening", "compiling", "ready" as the plant comes up.
     plant_command : Sequence[str], optional
         Arguments of the interpreter for another plant than the usual one.
+    prefixes : Mapping[str, Sequence[str]], optional
+        By agent, what stands before its command, e.g. to run it on another host.
     """
 
     def __init__(
@@ -44,10 +46,11 @@ class Supervisor:
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,
         plant_command: Sequence[str] = (),
+        prefixes: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         self.children = Children()
         self._plant, self._agents, self._log_dir = plant, {config.name: config for config in agents}, log_dir
-        self._on_exit, self._on_word, self._plant_command = on_exit, on_word, plant_command
+        self._on_exit, self._on_word, self._plant_command, self._prefixes = on_exit, on_word, plant_command, prefixes
         self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
         self._awaited: set[str] = set()
 
@@ -74,7 +77,8 @@ class Supervisor:
                 continue
             config = replace(self._agents[name], epoch=life)
             command = ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
-            self.children.add(Child(name, command, config, log, self._on_exit))
+            prefix = self._prefixes.get(name, ())
+            self.children.add(Child(name, command, config, log, self._on_exit, prefix=prefix))
 
     def start_when_gone(self, names: Iterable[str]) -> None:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""

@@ -47,11 +47,13 @@ class RunClient:
         The run and its endpoints.
     meet_agents : bool, optional
         Whether to connect to the agents too, to hear what they publish; the plant alone is enough to ask it.
+    listen : tuple[str, ...], optional
+        Where agents can connect to this client, as they do after a cut.
     """
 
-    def __init__(self, where: RunAddress, *, meet_agents: bool = False) -> None:
+    def __init__(self, where: RunAddress, *, meet_agents: bool = False, listen: tuple[str, ...] = ()) -> None:
         self.where, self.keys = where, Keys(where.run)
-        self._meet_agents = meet_agents
+        self._meet_agents, self._listen = meet_agents, listen
         self._heard: list[str] = []
         """Keys that are listened to."""
         self._runs: set[str] = set()
@@ -63,7 +65,9 @@ class RunClient:
         self.agents: dict[str, set[str]] = {}
         """Tokens of agents: inverter -> its instances."""
         self._runs.clear()
-        self._session = Session(VISITOR, connect=self.where.connect, clock="wall", meets_all=self._meet_agents)
+        self._session = Session(
+            VISITOR, listen=self._listen, connect=self.where.connect, clock="wall", meets_all=self._meet_agents
+        )
         for key in (self.keys.answer(self._session.id), *self._heard):
             self._session.subscribe(key)
         self._session.watch(self.keys.any_alive)
@@ -138,11 +142,11 @@ class RunClient:
         """Publish bytes."""
         self._session.publish(key, payload)
 
-    def take(self, seconds: float) -> Iterator[tuple[str, bytes]]:
-        """Wait (s) for something to happen; give key and bytes of the messages among it."""
-        for kind, key, payload, _ in self._session.take(1, max(0.0, seconds)):
+    def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
+        """Wait (s) for messages or tokens; yield key, bytes and time of arrival (s, monotonic) of each message."""
+        for kind, key, payload, at in self._session.take(1, max(0.0, seconds)):
             if kind == "message":
-                yield key, payload
+                yield key, payload, at
             elif kind != "word":
                 self._note(key, there=kind == "appeared")
 

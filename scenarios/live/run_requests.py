@@ -68,7 +68,7 @@ def _request(
     answers: dict[str, LinkAcknowledgement] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
-        for key, payload in client.take(left):
+        for key, payload, _ in client.take(left):
             message = client.read(key, payload)
             if isinstance(message, LinkAcknowledgement):
                 answers[message.sender] = message
@@ -129,7 +129,7 @@ def configurations(client: RunClient, name: str = "") -> dict[str, AgentConfig]:
     client.fetch(client.keys.config("*"))
     end = monotonic() + HANDOUT
     while not (name in known if name else known) and (left := end - monotonic()) > 0.0:
-        for _, payload in client.take(left):
+        for _, payload, _ in client.take(left):
             config = read_config(payload)
             if config is not None:
                 known[config.name] = config

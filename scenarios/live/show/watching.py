@@ -58,20 +58,20 @@ class RunSubscriber:
     def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
         """Wait (s) for messages, feed them into the monitor and return them."""
         heard: list[Telemetry | AgentStatus] = []
-        for key, payload in self._client.take(seconds):
+        for key, payload, at in self._client.take(seconds):
             config = read_config(payload)
             if config is not None:
                 self._monitor.config(config)
                 continue
             message = self._client.read(key, payload)
             if isinstance(message, Telemetry):
-                self._monitor.telemetry(message, monotonic())
+                self._monitor.telemetry(message, at)
             elif isinstance(message, AgentStatus):
-                self._monitor.status(message, monotonic())
+                self._monitor.status(message, at)
                 self._used[message.sender] = message.used
             else:
                 continue
-            self._heard_at[message.sender] = monotonic()
+            self._heard_at[message.sender] = at
             heard.append(message)
         if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
             self._client.fetch(self._client.keys.config("*"))

@@ -105,7 +105,7 @@ def test_a_picture_of_other_inverters_waits_for_their_values() -> None:
     monitor.telemetry(telemetry(1.0), 0.0)
     monitor.telemetry(replace(telemetry(0.0, 8, ("inv1", "inv2", "inv3")), rows=()), 0.1)
 
-    assert [entry.P for entry in monitor.snapshot((), 0.2).lines] == [None, None, None]
+    assert [entry.P for entry in monitor.snapshot((), 0.2).inverters] == [None, None, None]
 
 
 @pytest.mark.parametrize("change", [{"P_rated": 0.0}, {"V_nom": -1.0}, {"name": "\x1b[2J"}, {"m_p": 1e300}])
