@@ -2,7 +2,7 @@
 
 Each row islands the feeder at 0.1 s with some inverters removed and prints the largest peak-to-peak of any inverter's
 power in the windows 0.5-1 s, 2-2.5 s and 5.5-6 s. A settled plant has zeros in the last; "no solution" means that the
-network could not carry what the inverters did.
+network could not carry what the inverters did. Protection is off, as it would trip the inverters that swing.
 
     .venv/bin/python bench/damping.py
 """
@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from plant.dynamics import PlantError
 from plant.feeder import Plant, raise_for_trip
 from plant.network import Network
-from plant.plant_config import GflParameters, PlantSettings, SwitchEvent
+from plant.plant_config import GflParameters, PlantSettings, Protection, SwitchEvent
 from plant.tables import read_feeder
 
 FLEETS = {
@@ -45,7 +45,8 @@ def ripple(removed: tuple[str, ...], switches: tuple[str, ...], gfl: GflParamete
     feeder = replace(feeder, inverters=tuple(unit for unit in feeder.inverters if unit.name not in removed))
     events = tuple(SwitchEvent(t=0.1, switch=name, action="open") for name in switches)
     try:
-        plant = Plant(Network(feeder), PlantSettings(events=events, gfl=gfl), 0.02, 0.02)
+        settings = PlantSettings(events=events, gfl=gfl, protection=Protection(category="off"))
+        plant = Plant(Network(feeder), settings, 0.02, 0.02)
         for _ in range(300):
             plant.advance()
         raise_for_trip(plant.take_events())

@@ -1,14 +1,13 @@
 """One-line map of a feeder with its microgrids, inverters and switches, from its tables. A figure for docs/concepts.md.
 
-.venv/bin/python bench/feeder_map.py [FEEDER] [--figure docs/images/microgrid123.png]
+.venv/bin/python bench/feeder_map.py [--feeder FEEDER] [--figure docs/images/microgrid123.png]
 """
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import Any
 
+from harness import options
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -120,12 +119,8 @@ def figure(feeder: Feeder) -> Figure:
 
 def main() -> None:
     """Read the command line and write the figure."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("feeder", nargs="?", default="microgrid123")
-    parser.add_argument("--load-set", default="event2")
-    parser.add_argument("--figure", type=Path, default=Path("docs/images/microgrid123.png"))
-    options = parser.parse_args()
-    figure(read_feeder(options.feeder, options.load_set)).savefig(options.figure, dpi=130)
+    given = options(__doc__, feeder="microgrid123", load_set="event2", figure="docs/images/microgrid123.png")
+    figure(read_feeder(given.feeder, given.load_set)).savefig(given.figure, dpi=130)
 
 
 if __name__ == "__main__":

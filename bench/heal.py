@@ -18,8 +18,8 @@ from itertools import permutations
 from pathlib import Path
 from time import monotonic
 
+from harness import load, machine, say
 from latency import two_hosts
-from machine import load, machine, say
 from watched import NotInTimeError, Watched, describe
 
 from scenarios.drivers.free_endpoint import free_endpoint

@@ -23,7 +23,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Literal
 
-from machine import load, machine, say
+from harness import load, machine, say
 from ping import TICK, one_way, round_trip
 from watched import HOLD, RUN, NotInTimeError, Watched, describe
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from machine import machine
+from harness import machine
 from matplotlib.figure import Figure
 from ping import TICK
 

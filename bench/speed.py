@@ -8,26 +8,27 @@ processes over Zenoh, and bare Zenoh with empty messages, the floor under any lo
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
-
-import statistics
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 from typing import Any
+from unittest.mock import patch
 
 import floor
-from machine import machine
+from harness import machine, options, ratios
 
 import wire.codec
 from agents.agent import Agent
+from agents.agent_config import AgentConfig
 from plant.build import build_plant
+from plant.feeder import Plant
+from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
 from scenarios.results.record import Recorder
@@ -38,126 +39,104 @@ IN_PROCESS_TARGET, PROCESSES_TARGET = 0.7, 4.0
 """Seconds for one case of 7 s simulated: warm in one process; with processes, their start included."""
 
 
+class Case:
+    """One case, run by both drivers into a folder each."""
+
+    def __init__(self, plant: PlantConfig, agents: tuple[AgentConfig, ...], folder: Path) -> None:
+        assert plant.end is not None
+        self.plant, self.agents, self._end = plant, agents, plant.end
+        self._folders = (folder / str(number) for number in count())
+        self.starts: list[float] = []
+        self.whole: list[float] = []
+        """Times (s) of each run with processes: until its first row, and in all."""
+
+    def in_one_process(self) -> float:
+        """Return the time (s) of a run in this process, plant built and history written included."""
+        began = perf_counter()
+        with Recorder(next(self._folders)) as recorder:
+            outcome = run_inprocess(self.plant, self.agents, recorder)
+            recorder.finish(self._end, self.plant.record_step)
+        assert not outcome.broke, outcome.broke
+        return perf_counter() - began
+
+    def with_processes(self) -> float:
+        """Return the time (s) of the ticks of a run with processes."""
+        folder, began = next(self._folders), perf_counter()
+        with Recorder(folder) as recorder:
+            outcome = run_processes(self.plant, self.agents, folder / "log", recorder)
+            assert not outcome.broke, outcome.broke
+            recorder.finish(self._end, self.plant.record_step)
+        self.starts.append(outcome.start_s)
+        self.whole.append(perf_counter() - began)
+        return outcome.run_s
+
+    def shares(self) -> dict[str, float]:
+        """Return the seconds by part of a warm run in one process, timed at the borders of the parts."""
+        spent: defaultdict[str, float] = defaultdict(float)
+
+        def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+            def call(*arguments: Any, **named: Any) -> Any:
+                began = perf_counter()
+                try:
+                    return function(*arguments, **named)
+                finally:
+                    spent[part] += perf_counter() - began
+
+            return call
+
+        borders: list[tuple[str, Any, str]] = [
+            ("plant: dynamics and network", Plant, "advance"),
+            *(("plant: readings, set-points, rows", Plant, name) for name in ("measure", "hold", "take_rows")),
+            ("agents: the law", Agent, "tick"),
+        ]
+        for function in (wire.codec.encode, wire.codec.decode):
+            name = function.__name__
+            owners = [module for module in list(sys.modules.values()) if getattr(module, name, None) is function]
+            borders += [("codec", module, name) for module in owners]
+        with ExitStack() as stack:
+            for part, owner, name in borders:
+                stack.enter_context(patch.object(owner, name, timed(part, getattr(owner, name))))
+            began = perf_counter()
+            built = timed("plant: tables and initial state", build_plant)(self.plant)
+            run_inprocess(self.plant, self.agents, lambda telemetry: None, plant=built)
+            whole = perf_counter() - began
+        return dict(spent) | {"lock-step, bus, and the timing itself": whole - sum(spent.values())}
+
+
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--repeat", type=int, default=5, help="how often each is run; medians are shown")
-    parser.add_argument("--case", default="IV", help="case of the islanding experiment")
-    arguments = parser.parse_args()
+    given = options(__doc__, repeat=5, case="IV")
     scenario, feeder = load_scenario("islanding")
-    plant_config, agent_configs = configs(scenario, feeder, arguments.case)
+    plant, agents = configs(scenario, feeder, given.case)
     end = scenario.time.end_s
-    ticks = round(end / plant_config.T_c)
+    ticks, steps = round(end / plant.T_c), round(end / plant.settings.h)
     print(machine())
-    print(
-        f"islanding, case {arguments.case}: {end:g} s simulated, {ticks} ticks, "
-        f"{round(end / plant_config.settings.h)} steps, {len(agent_configs)} agents; "
-        f"medians of {arguments.repeat}\n"
-    )
+    print(f"islanding, case {given.case}: {end:g} s simulated, {ticks} ticks, {steps} steps, {len(agents)} agents\n")
     with tempfile.TemporaryDirectory() as folder:
-        cold = run_in_process(plant_config, agent_configs, Path(folder) / "first")
-        rows: list[tuple[float, float, float, float]] = []
-        for i in range(arguments.repeat):
-            one = run_in_process(plant_config, agent_configs, Path(folder) / f"one{i}")
-            start, run, whole = run_fleet(plant_config, agent_configs, Path(folder) / f"many{i}")
-            rows.append((one, start, run, whole))
-        bare = statistics.median(floor.measure(len(agent_configs), ticks) for _ in range(min(arguments.repeat, 3)))
-        shares = breakdown(plant_config, agent_configs)
-    one, start, run, whole = (statistics.median(column) for column in zip(*rows, strict=True))
-    line("in one process, first run (loads the compiled step)", cold)
-    fastest_one, _, _, fastest_whole = (min(column) for column in zip(*rows, strict=True))
-    line("in one process, warm", one, f"{verdict(one, IN_PROCESS_TARGET)}; fastest {fastest_one:.3f} s")
-    for name, seconds in shares.items():
-        line(f"  {name}", seconds, f"{100 * seconds / sum(shares.values()):3.0f} %")
-    line("with processes, start to end", whole, f"{verdict(whole, PROCESSES_TARGET)}; fastest {fastest_whole:.3f} s")
-    line("  until the first row", start, "interpreters, imports, initial state, finding each other")
-    line(f"  {ticks} ticks", run, f"{1e3 * run / ticks:.2f} ms a tick")
-    line("  closing", whole - start - run)
-    line("bare Zenoh, empty messages, same mesh", bare, f"{1e3 * bare / ticks:.2f} ms a tick")
-    print()
-    print(f"ticks with processes : bare Zenoh     {run / bare:5.2f}")
-    print(f"ticks with processes : in one process {run / one:5.2f}")
-    print(f"start to end         : in one process {whole / one:5.2f}")
+        case = Case(plant, agents, Path(folder))
+        print(f"in one process, first run (loads the compiled step) {case.in_one_process():.3f} s\n")
+        warm: list[float] = []
 
+        def in_one_process() -> float:
+            warm.append(case.in_one_process())
+            return warm[-1]
 
-def run_in_process(plant_config: Any, agent_configs: Any, folder: Path) -> float:
-    """Return the time (s) of one case in this process, plant built and history written included."""
-    began = perf_counter()
-    with Recorder(folder) as recorder:
-        outcome = run_inprocess(plant_config, agent_configs, recorder)
-        recorder.finish(plant_config.end, plant_config.record_step)
-    assert not outcome.broke, outcome.broke
-    return perf_counter() - began
-
-
-def run_fleet(plant_config: Any, agent_configs: Any, folder: Path) -> tuple[float, float, float]:
-    """Time (s) of one case with processes: until the first row, from there to the last, and from start to end."""
-    began = perf_counter()
-    with Recorder(folder) as recorder:
-        outcome = run_processes(plant_config, agent_configs, folder / "log", recorder)
-        assert not outcome.broke, outcome.broke
-        recorder.finish(plant_config.end, plant_config.record_step)
-    return outcome.start_s, outcome.run_s, perf_counter() - began
-
-
-def breakdown(plant_config: Any, agent_configs: Any) -> dict[str, float]:
-    """Return the seconds by part of a warm run in one process, timed at the borders of the parts."""
-    spent: defaultdict[str, float] = defaultdict(float)
-
-    def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any, **named: Any) -> Any:
-            began = perf_counter()
-            try:
-                return function(*arguments, **named)
-            finally:
-                spent[part] += perf_counter() - began
-
-        return call
-
-    class TimedPlant:
-        """A plant whose calls are timed."""
-
-        def __init__(self, inner: Any) -> None:
-            self._inner = inner
-            self.advance = timed("plant: dynamics and network", inner.advance)
-            self.measure = timed("plant: readings, set-points, rows", inner.measure)
-            self.hold = timed("plant: readings, set-points, rows", inner.hold)
-            self.take_rows = timed("plant: readings, set-points, rows", inner.take_rows)
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._inner, name)
-
-    kept = Agent.tick
-    codecs = [
-        (module, name, function)
-        for name, function in (("encode", wire.codec.encode), ("decode", wire.codec.decode))
-        for module in list(sys.modules.values())
-        if getattr(module, name, None) is function
-    ]
-    try:
-        Agent.tick = timed("agents: the law", kept)  # type: ignore[method-assign]
-        for module, name, function in codecs:
-            setattr(module, name, timed("codec", function))
-        began = perf_counter()
-        built: Any = TimedPlant(timed("plant: tables and initial state", build_plant)(plant_config))
-        run_inprocess(plant_config, agent_configs, lambda telemetry: None, plant=built)
-        whole = perf_counter() - began
-    finally:
-        Agent.tick = kept  # type: ignore[method-assign]
-        for module, name, function in codecs:
-            setattr(module, name, function)
-    shares = dict(sorted(spent.items(), key=lambda item: -item[1]))
-    return shares | {"lock-step, bus, and the timing itself": whole - sum(spent.values())}
-
-
-def verdict(seconds: float, target: float) -> str:
-    """Return whether a target is met."""
-    return f"{'meets' if seconds < target else 'MISSES'} the target of {target:g} s"
-
-
-def line(what: str, seconds: float, remark: str = "") -> None:
-    """Print one measurement."""
-    print(f"{what:52} {seconds:6.3f} s   {remark}".rstrip())
+        rivals = {
+            f"bare Zenoh, empty messages, same mesh, {ticks} ticks": lambda: floor.measure(len(agents), ticks),
+            "in one process, warm": in_one_process,
+            f"with processes, {ticks} ticks": case.with_processes,
+        }
+        ratios(rivals, given.repeat)
+        shares = case.shares()
+    print(f"\nwith processes, until the first row {median(case.starts):.3f} s: imports, finding each other")
+    for what, seconds, target in (
+        ("in one process, warm", median(warm), IN_PROCESS_TARGET),
+        ("with processes, start to end", median(case.whole), PROCESSES_TARGET),
+    ):
+        print(f"{what} {seconds:.3f} s: {'meets' if seconds < target else 'MISSES'} the target of {target:g} s")
+    print("\nparts of a warm run in one process")
+    for part, seconds in sorted(shares.items(), key=lambda item: -item[1]):
+        print(f"  {part:46} {seconds:6.3f} s {100 * seconds / sum(shares.values()):3.0f} %")
 
 
 if __name__ == "__main__":

@@ -10,19 +10,15 @@ machine does.
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
-
 import resource
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter, process_time
 
-from machine import machine
+from harness import machine, options
 
+from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results import metrics
 from scenarios.results.event_windows import windows
@@ -52,18 +48,15 @@ samples = {runs}
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--runs", type=int, default=500, help="runs of the sweep")
-    parser.add_argument("--loop", type=int, default=20, help="runs of the plain loop")
-    arguments = parser.parse_args()
+    given = options(__doc__, runs=500, loop=20)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "bench.toml").write_text(SWEEP.format(runs=arguments.runs), encoding="utf-8")
+        (folder / "bench.toml").write_text(SWEEP.format(runs=given.runs), encoding="utf-8")
         began = perf_counter()
         plan = read_sweep(folder / "bench.toml")
         read = perf_counter() - began
         run_one(0, plan.runs[0].scenario, plan.runs[0].case)  # loads the compiled step for all of them
-        half = max(arguments.loop // 2, 1)
+        half = max(given.loop // 2, 1)
         busy = process_time()
         before = loop(plan.runs[:half], folder / "before")
         busy = process_time() - busy
@@ -83,8 +76,6 @@ def main() -> None:
 
 def loop(runs: Sequence[Run], folder: Path) -> float:
     """Return the time (s) of runs one after the other."""
-    from plant.tables import read_feeder
-
     began = perf_counter()
     for number, run in enumerate(runs):
         scenario = run.scenario

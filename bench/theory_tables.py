@@ -6,12 +6,10 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numpy as np
+from harness import cells, run_parts
 
 import gridpeers as gp
 from gridpeers.theory import (
@@ -88,40 +86,28 @@ def load() -> LoadStep:
     return step.load
 
 
-def fleet(title: str) -> Any:
+def inverters(title: str) -> Any:
     """Return the inverters on a graph."""
     return inverter_group_of(scenario().spec, feeder_of(scenario().spec), name(title))
 
 
-def measured(titles: tuple[str, ...], end_s: float, d: float) -> dict[tuple[str, float], str]:
-    """Return the times to restore and to share on the plant, by graph and k_q."""
+def compare(titles: tuple[str, ...], end_s: float, d: float) -> None:
+    """Print times to restore and to share: predicted, measured with V_set left alone, and with the whole law."""
     link = [{"on": "* <-> *", "delay": d}] if d else None
     rows = gp.sweep(
         scenario().replace({"time.end_s": end_s, "link": link}),
-        {"gains.k_q": [0.25, ALONE]},
+        {"gains.k_q": [ALONE, 0.25]},
         cases=[name(title) for title in titles],
         metrics=["t_f_s", "t_share_s"],
-    )
-    by_case = {name(title): title for title in titles}
-    return {
-        (by_case[row["case"]], row["gains.k_q"]): both(row["event1.t_f_s"], row["event1.t_share_s"])
-        for row in rows.to_dict("records")
-    }
-
-
-def both(restore_s: float | None, share_s: float | None) -> str:
-    """Return two times in words; never as None or not a number."""
-    return " | ".join("never" if t is None or np.isnan(t) else f"{t:.3g}" for t in (restore_s, share_s))
-
-
-def compare(titles: tuple[str, ...], end_s: float, d: float) -> None:
-    """Predicted, V_set left alone, whole law."""
-    print(f"links late by {d:g} s: predicted, V_set left alone, whole law: f | sharing (s)")
-    found = measured(titles, end_s, d)
+    ).to_dict("records")
+    print(f"links late by {d:g} s: f / sharing (s), predicted | V_set left alone | whole law")
     for title in titles:
-        said = predicted_times(fleet(title), link_delay_s=d, load=load())
-        cells = both(said.restore_s, said.share_s), found[title, ALONE], found[title, 0.25]
-        print(f"{title:20}", "   ".join(f"{cell:14}" for cell in cells))
+        predicted = predicted_times(inverters(title), link_delay_s=d, load=load())
+        texts = [cells({"f": predicted.restore_s, "P": predicted.share_s}, "f", "P")]
+        for k_q in (ALONE, 0.25):
+            (row,) = (row for row in rows if (row["case"], row["gains.k_q"]) == (name(title), k_q))
+            texts.append(cells(row, "event1.t_f_s", "event1.t_share_s"))
+        print(f"{title:20}", " | ".join(f"{text:14}" for text in texts))
 
 
 def times() -> None:
@@ -140,13 +126,13 @@ def limits() -> None:
     answers = sensitivity(calm(), feeder_of(scenario().spec))
     print("links | both alike (continuous) | f or P_set late (continuous) | V, Q or V_set late")
     for title in LIMITS:
-        one = fleet(title)
-        cells = [f"{delay_limit(one, 'neighbours'):.2f}"]
-        cells += [
+        one = inverters(title)
+        limits_s = [f"{delay_limit(one, 'neighbours'):.2f}"]
+        limits_s += [
             f"{delay_limit(one, kind):.2f} ({delay_limit_closed(one, kind):.3f})"
             for kind in ("disagreement", "local loop")
         ]
-        print(f"{title:20}", " | ".join([*cells, f"{var_delay_limit(one, answers):.2f}"]))
+        print(f"{title:20}", " | ".join([*limits_s, f"{var_delay_limit(one, answers):.2f}"]))
 
 
 def vars_() -> None:
@@ -154,11 +140,10 @@ def vars_() -> None:
     response = var_response(calm(), feeder_of(scenario().spec))
     print("delay (s)  " + "  ".join(GROWTH))
     for d in DELAYS:
-        print(f"{d:<10}", "  ".join(f"{var_growth(fleet(title), response, link_delay_s=d):.2f}" for title in GROWTH))
+        print(
+            f"{d:<10}", "  ".join(f"{var_growth(inverters(title), response, link_delay_s=d):.2f}" for title in GROWTH)
+        )
 
-
-PARTS: dict[str, Callable[[], None]] = {"times": times, "late": late, "limits": limits, "vars": vars_}
 
 if __name__ == "__main__":
-    for part in sys.argv[1:] or PARTS:
-        PARTS[part]()
+    run_parts(times=times, late=late, limits=limits, vars=vars_)

@@ -26,7 +26,7 @@ MISSING = """GridLAB-D is not there: {python} is no interpreter that has the pac
 Install the wheel (Linux, x86-64) into an environment of its own and name the interpreter of that one:
 
     python3 -m venv gld && gld/bin/pip install gridlabd==6.0.0
-    .venv/bin/python -m bench.gridlabd --gridlabd gld/bin/python"""
+    .venv/bin/python -m bench.gridlabd.compare_gridlabd --gridlabd gld/bin/python"""
 
 
 class GridlabdError(RuntimeError):
