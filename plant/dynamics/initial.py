@@ -215,3 +215,22 @@ def _by_droop(
     Q[free] = found.x
     J, V = flow.solve(J, P, Q, swing)
     return J, V, Q
+
+
+def require_within_limits(units: Inverters, online: NDArray[np.bool_]) -> None:
+    """Raise PlantError if the start is no equilibrium: a GFM that forms an island must be within its limits."""
+    for k, i in enumerate(units.gfm_at.tolist()):
+        if not online[i]:
+            continue
+        unit, limits, state = units.units[i], units.gfm[k], units.gfm_state[k]
+        for what, value, base, symbol, low, high in (
+            ("give", units.set_points[i, 0], unit.S_b / 1e3, "kW", "P_min", "P_max"),
+            ("give", state["q"], unit.S_b / 1e3, "kvar", "Q_min", "Q_max"),
+            ("have an internal voltage of", state["E"], 1.0, "pu", "E_min", "E_max"),
+        ):
+            if not limits[low] - 1e-9 <= value <= limits[high] + 1e-9:
+                raise PlantError(
+                    f"no equilibrium at t = 0: {unit.name} would have to {what} {value * base:.5g} {symbol}, "
+                    f"it can from {limits[low] * base:.5g} to {limits[high] * base:.5g} {symbol} ({low}_pu, "
+                    f"{high}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
+                )

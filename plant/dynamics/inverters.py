@@ -157,14 +157,16 @@ class Inverters:
         Parameters
         ----------
         online
-            Inverters that deliver; of the others f is nominal, P and Q are 0.
+            Inverters that deliver; of the others f is nominal, or 0 where there is no voltage, and P and Q are 0.
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[~online] = 0.0
         f = np.full(S.size, self.f_nom)
         f[self.gfm_at] += np.where(online[self.gfm_at], self.gfm_state["w"], 0.0) / (2.0 * np.pi)
         f[self.gfl_at] = np.where(online[self.gfl_at], self.gfl_state["f"], self.f_nom)
-        return np.column_stack([f, S.real, S.imag, np.mean(np.abs(self.V), axis=1)])
+        V = np.mean(np.abs(self.V), axis=1)
+        f[~online & (V == 0.0)] = 0.0
+        return np.column_stack([f, S.real, S.imag, V])
 
 
 def _pack(unit: Inverter) -> NDArray[np.void]:

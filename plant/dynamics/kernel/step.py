@@ -109,7 +109,8 @@ def run_steps(
     x
         Branch voltages in the islands' frames, the first guess of the next solution.
     out
-        steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second solution.
+        steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second solution. An inverter that
+        delivers nothing reads `f_nom`, or 0 Hz where there is no voltage.
     """
     n = J.shape[0]
     m = net.S.size
@@ -193,8 +194,10 @@ def run_steps(
         if second:
             for i in range(n):
                 if not online[i]:
-                    out[step, i, 0], out[step, i, 1], out[step, i, 2] = f_nom, 0.0, 0.0
                     read_voltage(V[i], out[step, i])
+                    # where there is no voltage there is no frequency
+                    out[step, i, 0] = f_nom if out[step, i, 3] > 0.0 else 0.0
+                    out[step, i, 1], out[step, i, 2] = 0.0, 0.0
                 elif not np.isfinite(out[step, i, 0]):
                     return -1 - (FAILURES * step + 2)
     return total
