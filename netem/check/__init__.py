@@ -1,1 +1,1 @@
-"""Does a link do what it was told? Configured against realised, for reports: here numpy and scipy are fine."""
+"""The self-check of links: their configuration beside what they did, for reports and tests. Needs numpy and scipy."""

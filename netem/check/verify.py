@@ -1,17 +1,21 @@
-"""All links of a run, all that can be tested, and a warning for what chance does not explain."""
+"""Tests of all links of a run, and a warning for each deviation that chance does not explain."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-from scipy import stats
-
-from netem.check.delay_check import check_delay
-from netem.check.loss_check import FEWEST, Finding, check_loss
-from netem.check.own_check import AS_IT_SAYS, added_by, check_own
-from netem.check.rows import LinkTest, Messages, messages
+from netem.check.fault_checks import (
+    AS_IT_SAYS,
+    Finding,
+    added_by,
+    check_delay,
+    check_gate,
+    check_loss,
+    check_own,
+    check_share,
+)
+from netem.check.sent_messages import sent_messages
 from netem.draws import Stream
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace
@@ -29,11 +33,32 @@ MASKS = {
     "partition": "a partition that holds",
     "flap": "a flap that holds",
 }
-"""What adds to a delay, so that its law cannot be seen alone."""
+"""Faults that add to a delay, so that its law cannot be seen alone."""
+
+
+class LinkTest(NamedTuple):
+    """One test of one link."""
+
+    src: str
+    """Sender."""
+    dst: str
+    """Receiver."""
+    what: str
+    """Name of the test, e.g. "loss" or "bursts"."""
+    configured: str
+    """Value of the entry."""
+    realised: str
+    """Value in the run; why nothing was tested, if nothing was."""
+    n: int
+    """Number of messages, bursts or copies."""
+    p: float | None = None
+    """Probability that chance alone is as far off; 0 or 1 where nothing is left to chance, None if not tested."""
+    ok: bool | None = None
+    """Whether that is plausible among all tests of the run; None if nothing was tested."""
 
 
 class Report(NamedTuple):
-    """What was found."""
+    """The result of all tests."""
 
     rows: tuple[LinkTest, ...]
     """Every test, by link."""
@@ -46,14 +71,14 @@ def verify(
     spans: Mapping[Link, Sequence[Span]],
     seed: int,
 ) -> Report:
-    """Compare what links did with what is configured.
+    """Compare links in a run with their configuration.
 
     Parameters
     ----------
     traces : Iterable[LinkTrace]
         Verdicts of all receivers, as they were taken.
     spans : Mapping[Link, Sequence[Span]]
-        What is configured for each link, without overlaps: `Netem.spans`, or after live changes `FaultSchedule.flat`.
+        Faults of each link, without overlaps: `Netem.spans`, or after live changes `FaultSchedule.flat`.
     seed : int
         Seed of the run.
 
@@ -93,7 +118,7 @@ def _findings(
     """Tests of one entry of one link."""
     if span.kind in ("rate", "slots"):
         return []
-    sent = messages(traces, span)
+    sent = sent_messages(traces, span)
     own = [other for other in others if isinstance(other.model, Plugin) and _overlap(other, span)]
     if isinstance(span.model, Plugin):
         if beside := [other.kind for other in own if other is not span]:
@@ -103,18 +128,18 @@ def _findings(
     if span.kind == "loss":
         return check_loss(sent, span.model)
     if span.kind in GATES:
-        return [_gate(sent, span)]
-    arrived = sent.those(np.isfinite(sent.delay))
+        return [check_gate(sent, span)]
+    arrived = sent.arrived()
     if span.kind == "duplicate":
-        return [_share("duplicate", int((arrived.copies - 1).sum()), len(arrived.seq), span.model.p)]
+        return [check_share("duplicate", int((arrived.copies - 1).sum()), len(arrived.seq), span.model.p)]
     if span.kind == "corrupt":
-        return [_share("corrupt", int(arrived.flipped.sum()), int(arrived.copies.sum()), span.model.p)]
+        return [check_share("corrupt", int(arrived.flipped.sum()), int(arrived.copies.sum()), span.model.p)]
     masks = [MASKS.get(other.kind, other.kind) for other in others if _masks(other, span)]
     masks += ["fifo"] if span.model.fifo else []
     if len(own) == 1 and masks == [own[0].kind]:  # what it added is known, and taken away
         added, why = added_by(sent, own[0], link, seed)
         sent = sent._replace(delay=sent.delay - added)
-        masks = [] if not why else masks
+        masks = masks if why else []
     if masks:
         return [("delay", str(span.model.__struct_config__.tag), f"not tested: {' and '.join(masks)} on it", 0, None)]
     return check_delay(sent, span.model, Stream(seed, *link, "delay"))
@@ -131,27 +156,6 @@ def _masks(other: Span, span: Span) -> bool:
 def _overlap(one: Span, other: Span) -> bool:
     """Whether two entries hold at the same time."""
     return one.from_s < other.to_s and other.from_s < one.to_s
-
-
-def _share(what: str, found: int, n: int, p: float) -> Finding:
-    if n < FEWEST:
-        return (what, f"{p:.4g}", f"too few messages to tell: {n}", n, None)
-    return (what, f"{p:.4g}", f"{found / n:.4g}", n, float(stats.binomtest(found, n, p).pvalue))
-
-
-def _gate(sent: Messages, span: Span) -> Finding:
-    """A cut lets nothing through; of one that holds, or of a flap, only what is dropped without need is wrong."""
-    n = len(sent.seq)
-    if span.kind == "flap" or span.model.hold:
-        return (
-            span.kind,
-            "held" if span.model.hold else "up and down",
-            "not tested: it depends on the time alone",
-            n,
-            None,
-        )
-    through = int((sent.reason == "").sum())
-    return (span.kind, "nothing passes", f"{through} passed", n, float(through == 0) if n else None)
 
 
 def _holm(rows: Sequence[LinkTest]) -> list[LinkTest]:

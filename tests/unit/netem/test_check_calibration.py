@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from netem.check.count_law import COUNTED, blocks, law, mean
-from netem.check.loss_check import count_bursts
+from netem.check.fault_checks import count_bursts
 from netem.models.chain import RESTART
 from netem.models.delay import Lognormal, Uniform
 from netem.models.loss import GilbertElliott, LossModel, Markov

@@ -10,8 +10,7 @@ import msgspec
 import pytest
 
 from netem.channel import Channel
-from netem.check.rows import LinkTest
-from netem.check.verify import verify
+from netem.check.verify import LinkTest, verify
 from netem.ledger import LinkTrace
 from netem.models.own_fault import FAULTS, LinkFault
 from netem.receiver import Receiver
