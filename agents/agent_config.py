@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from wire.plausible import Plausible, Unit
+from wire.plausible import Plausible, Range, Unit
 from wire.plugin import Plugin
-from wire.table_schema import Below, Label
+from wire.table_schema import NO_KEY, Below, Example, Label
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
@@ -98,16 +98,16 @@ class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     use: str = "consensus"
     """Registered name of a class, or `module:Class`; "consensus" is the paper's law, with `Gains` and `Handling`."""
-    command: tuple[str, ...] = ()
+    command: Annotated[tuple[str, ...], Example('["./mylaw", "--fast"], the program first')] = ()
     """Program and arguments, in place of a class; one JSON line a tick on its standard input and output."""
     fmu: str = ""
     """Path of an FMU, in place of a class."""
-    parameters: dict[str, float | int | bool | str] = {}
+    parameters: Annotated[dict[str, float | int | bool | str], NO_KEY] = {}
     """Parameters that do not keep their default."""
     folder: str = ""
     """Folder of the module, the program or the FMU."""
-    time_limit: float = 1.0
-    """Longest time (s of real time) of one step; a law that takes longer has failed. > 0."""
+    time_limit: Annotated[float, Unit("s"), Range(0.001, 60.0)] = 1.0
+    """Longest time (s of real time) of one step; a law that takes longer has failed."""
 
     @property
     def name(self) -> str:

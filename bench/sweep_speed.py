@@ -24,8 +24,7 @@ from scenarios.results import metrics
 from scenarios.results.event_windows import windows
 from scenarios.results.history import History, Nameplates
 from scenarios.results.record import Recorder
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_changes import as_in
+from scenarios.schema.configs import as_in, configs
 from scenarios.sweep.file import Plan, Run, read_sweep
 from scenarios.sweep.sweep_case import run_one
 from scenarios.sweep.sweep_folder import SweepFolder

@@ -18,7 +18,7 @@ from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_in
 from scenarios.predict.var_response import VarResponse, var_growth, var_response
 from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
 from scenarios.schema import Case, ScenarioModel
-from scenarios.schema.scenario_changes import as_in
+from scenarios.schema.configs import as_in
 
 __all__ = [
     "Case",

@@ -32,7 +32,7 @@ from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.schema.configs import configs
-from scenarios.schema.own_modules import claims_of
+from scenarios.schema.plugin_keys import claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry

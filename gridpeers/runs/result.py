@@ -27,7 +27,7 @@ from scenarios.results.history import History, read_history
 from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.schema import scenario_model as model
-from scenarios.schema.own_modules import claims_of
+from scenarios.schema.plugin_keys import claims_of
 from wire.messages import PlantEvent
 from wire.printable import printable
 from wire.suggestion import suggestion

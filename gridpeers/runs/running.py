@@ -15,9 +15,9 @@ from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.schema import ScenarioError
+from scenarios.schema.configs import as_in
 from scenarios.schema.loading import read_tables, read_toml
-from scenarios.schema.portability import check_portable
-from scenarios.schema.scenario_changes import as_in
+from scenarios.schema.plugin_keys import check_portable
 from scenarios.schema.scenario_errors import Problems
 from wire.suggestion import suggestion
 

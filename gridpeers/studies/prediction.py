@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from agents.carriers.law_check import PAPER
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
@@ -21,8 +22,8 @@ from scenarios.predict.vars import Sensitivity, sensitivity
 from scenarios.run import BrokenRunError
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
-from scenarios.schema.law_choice import PAPER, law_of
 from scenarios.schema.netem_tables import is_calm, netem_of
+from scenarios.schema.plugin_keys import law_of
 
 _LIMITS: dict[str, DelayKind] = {
     "agent to agent": "neighbours",

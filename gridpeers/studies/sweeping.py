@@ -15,8 +15,7 @@ from gridpeers.values import plain
 from scenarios.results.evaluation.metric import METRICS
 from scenarios.results.history import History
 from scenarios.schema import ScenarioModel
-from scenarios.schema.own_modules import metrics_of
-from scenarios.schema.portability import check_portable
+from scenarios.schema.plugin_keys import check_portable, metrics_of
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.sweep.column_labels import unit_of
 from scenarios.sweep.file.plan import Plan

@@ -14,8 +14,8 @@ from plant.equipment import F_NOM, Feeder, InverterRow
 from plant.plant_config import GflParameters, GfmParameters
 from scenarios.results.history import Flags, Floats
 from scenarios.schema import ScenarioModel
-from scenarios.schema.graph import graph_of
 from scenarios.schema.participants import inverters_of, without_agent
+from scenarios.schema.plugin_keys import graph_of
 
 
 @dataclass(frozen=True, kw_only=True)

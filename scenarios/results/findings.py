@@ -14,8 +14,8 @@ from scenarios.results.history import Nameplates
 from scenarios.results.island_membership import islands_of, part_of
 from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.schema import ScenarioModel
+from scenarios.schema.configs import limits_of
 from scenarios.schema.participants import without_agent
-from scenarios.schema.power_limits import limits_of
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""

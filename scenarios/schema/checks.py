@@ -1,13 +1,16 @@
-"""What the keys of a scenario ask of each other and of the feeder."""
+"""Relations between the keys of a scenario, and between them and the feeder."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Mapping
 
 from plant.equipment import Feeder
 from plant.trip_settings import DEFAULTS, defaults
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
+from scenarios.schema.scenario_model import InverterTable, ScenarioModel
 from wire.plugin import plugin_of
 from wire.suggestion import suggestion
 
@@ -129,6 +132,27 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
                 problems.add(f"case.{name}.P_max_kW", f'no event "{label}"; {suggestion(label, labels, "events")}')
 
 
+def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Note limits of available power that are not of a GFL, or beyond its rating."""
+    for i, event in enumerate(scenario.events):
+        _check_limits(f"event[{i}].P_max_kW", event.P_max_kW, scenario, feeder, problems)
+    for name, case in scenario.cases.items():
+        for label, limits in case.P_max_kW.items():
+            _check_limits(f"case.{name}.P_max_kW.{label}", limits, scenario, feeder, problems)
+
+
+def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Note inverters that there are not, and tables that change nothing."""
+    rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
+    keys = InverterTable.__struct_fields__
+    for name, table in scenario.plant.inverter.items():
+        path = f"plant.inverter.{name}"
+        if name not in rows:
+            problems.add(path, f'no inverter "{name}"; {suggestion(name, rows, "inverters")}')
+        elif table == InverterTable() and not problems.below(path):
+            problems.add(path, f"changes nothing; give it one of {', '.join(keys)}")
+
+
 def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note switches that there are not, and those that are in the position already into which an event brings them."""
     position = {switch.name: switch.closed for switch in feeder.switches}
@@ -207,3 +231,24 @@ def _unknown_switch(name: str, known: list[str], buses: set[str]) -> str:
     strange = [end for end in ends if end[:1].isdigit() and end not in buses]
     why = f" (there is no bus {' and no bus '.join(strange)})" if strange else ""
     return f'no switch "{name}"{why}; {suggestion(name, known, "switches")}'
+
+
+def _check_limits(
+    path: str, limits: Mapping[str, float], scenario: ScenarioModel, feeder: Feeder, problems: Problems
+) -> None:
+    rows = {row.name: row for row in inverters_of(scenario, feeder)}
+    for name, kW in limits.items():
+        if name not in rows:
+            problems.add(path, f'no inverter "{name}"; {suggestion(name, rows, "inverters")}')
+            continue
+        row, most = rows[name], rows[name].P_rated * scenario.plant.gfl.P_max / 1e3
+        if row.kind == "GFM":
+            following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
+            problems.add(
+                path,
+                f"{name} is grid-forming and gives what the network takes; only a grid-following inverter can be "
+                f"limited: {following or 'there is none'}",
+            )
+        elif not math.isfinite(kW) or kW < 0.0 or kW > most * (1.0 + 1e-9):
+            hint = f"; it is in kW: write {kW / 1e3:g}" if kW > most and kW / 1e3 <= most else ""
+            problems.add(path, f"{name} can have from 0 to {most:g} kW available, got {kW:g} kW{hint}")

@@ -1,4 +1,4 @@
-"""What the plant and the agents of one case are started with."""
+"""From a checked scenario to the configurations of its plant and agents, and to its feeder."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from typing import Literal
 
 from agents.agent_config import MAX_AGE, AgentConfig, Control
 from plant.equipment import Feeder
-from plant.plant_config import PlantConfig, PlantSettings, SwitchEvent
-from scenarios.schema.graph import graph_of
-from scenarios.schema.law_choice import law_of
+from plant.plant_config import FeederChanges, InverterChange, PlantConfig, PlantSettings, PowerLimit, SwitchEvent
+from plant.tables.feeder_changes import changed
 from scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
 from scenarios.schema.participants import inverters_of, schedule_of, with_agent
-from scenarios.schema.power_limits import limits_of
-from scenarios.schema.scenario_changes import changes_of
-from scenarios.schema.scenario_model import Event, ScenarioModel
+from scenarios.schema.plugin_keys import graph_of, law_of
+from scenarios.schema.scenario_model import Event, InverterTable, ScenarioModel
 
 
 def configs(
@@ -109,6 +107,47 @@ def configs(
     return plant, agents
 
 
+def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
+    """Return the power that inverters have available in one case; a case's own numbers take the place of an event's.
+
+    Examples
+    --------
+    >>> from scenarios.schema import load_scenario
+    >>> limits_of(load_scenario("intermittency")[0], "225kW")[0]
+    PowerLimit(t=2.5, inverter='inv2', P_max=225000.0)
+    """
+    own = scenario.cases[case].P_max_kW
+    return tuple(
+        PowerLimit(t=event.t_s, inverter=name, P_max=1e3 * kW)
+        for event in scenario.events
+        for name, kW in (event.P_max_kW | own.get(event.label, {})).items()
+    )
+
+
+def changes_of(scenario: ScenarioModel) -> FeederChanges:
+    """Return what a scenario changes in its feeder, in SI units and per unit.
+
+    Examples
+    --------
+    >>> from scenarios.schema import load_scenario
+    >>> changes_of(load_scenario("islanding")[0]) == FeederChanges()
+    True
+    """
+    plant = scenario.plant
+    return FeederChanges(
+        f_nom=plant.f_nom_Hz,
+        load_factor=plant.load_factor,
+        m_p_factor=plant.m_p_factor,
+        m_q_factor=plant.m_q_factor,
+        inverters={name: _inverter_change(table) for name, table in plant.inverter.items()},
+    )
+
+
+def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
+    """Return a scenario's feeder, given the feeder as its tables have it."""
+    return changed(feeder, changes_of(scenario))
+
+
 def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
     return tuple(
         SwitchEvent(t=event.t_s, switch=switch, action=action, synchronised=event.synchronised and action == "close")
@@ -120,3 +159,8 @@ def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
 
 def _actions(event: Event) -> tuple[tuple[Literal["open", "close"], tuple[str, ...]], ...]:
     return ("open", event.open), ("close", event.close)
+
+
+def _inverter_change(table: InverterTable) -> InverterChange:
+    P_rated = None if table.P_rated_kW is None else 1e3 * table.P_rated_kW
+    return InverterChange(m_p=table.m_p_pu, m_q=table.m_q_pu, P_rated=P_rated)

@@ -15,24 +15,23 @@ from plant.tables import FeederError, feeders, is_folder, read_feeder
 from scenarios.catalogue_files import CATALOGUE, names_in
 from scenarios.schema.checks import (
     check_cases,
+    check_changes,
     check_events,
+    check_limits,
     check_names,
     check_protection,
     check_start,
     check_switches,
 )
-from scenarios.schema.file_lookup import find_file
-from scenarios.schema.graph import check_graphs, with_graph_folders
-from scenarios.schema.law_choice import check_laws, with_law_folders
+from scenarios.schema.configs import as_in
 from scenarios.schema.netem_tables import check_netem, with_delays
-from scenarios.schema.own_modules import check_benchmark, check_own, with_benchmark_folder, with_own_folders
 from scenarios.schema.participants import check_agentless, check_schedule, inverters_of
-from scenarios.schema.power_limits import check_limits
-from scenarios.schema.scenario_changes import as_in, check_changes
+from scenarios.schema.plugin_keys import check_benchmark, check_graphs, check_laws, check_measures, with_folders
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from scenarios.schema.supply import check_supply
 from scenarios.schema.time_checks import check_step, check_times
+from wire.suggestion import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""
@@ -52,6 +51,51 @@ def find_scenario(name: str) -> Path:
         If there is neither.
     """
     return find_file(name, CATALOGUE, "scenario")
+
+
+def find_file(name: str, folder: Path, what: str) -> Path:
+    """Return the path of a file that is named as in a catalogue, or given as a path.
+
+    Parameters
+    ----------
+    name : str
+        Name or path, as the user gave it.
+    folder : Path
+        Folder of the catalogue.
+    what : str
+        What its files are, for the message.
+
+    Raises
+    ------
+    ScenarioError
+        If there is neither, or the system does not let one look.
+
+    Examples
+    --------
+    >>> from scenarios.catalogue_files import CATALOGUE, SWEEPS
+    >>> find_file("islanding", CATALOGUE, "scenario").name
+    'islanding.toml'
+    >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    scenarios.schema.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? ...
+    """
+    names = names_in(folder)
+    if name in names:
+        return folder / f"{name}.toml"
+    path = Path(name)
+    listed = ", ".join(names)
+    try:
+        is_file, is_dir = path.is_file(), path.is_dir()
+    except OSError as error:  # a name too long, a folder that is closed to us
+        raise ScenarioError([f"{name}: cannot be read: {error.strerror}"]) from None
+    if is_file:
+        return path
+    if is_dir:
+        raise ScenarioError([f"{name}: this is a folder; give a {what} file (.toml) or a name: {listed}"])
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise ScenarioError([f"{name}: there is no such file; give the path of a {what} file, or a name: {listed}"])
+    raise ScenarioError([f'no {what} "{name}"; {suggestion(name, names, f"{what}s of the catalogue")}'])
 
 
 def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
@@ -126,11 +170,9 @@ def check_tables(
     check_times(scenario, problems)
     check_step(scenario, problems)
     check_names(scenario, problems)
-    scenario = with_benchmark_folder(scenario, path.parent)
+    scenario = with_folders(scenario, path.parent)
     check_benchmark(scenario, problems)
-    scenario = with_graph_folders(with_law_folders(scenario, path.parent), path.parent)
-    scenario = with_own_folders(scenario, path.parent)
-    check_own(scenario, problems)
+    check_measures(scenario, problems)
     check_laws(scenario, problems)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, problems)
     feeder = _feeder_of(scenario, problems, read_feeder)

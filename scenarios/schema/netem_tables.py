@@ -8,7 +8,6 @@ from pathlib import Path
 
 import msgspec
 
-from netem.models.own_fault import FAULTS
 from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.trace_file import with_traces
@@ -16,7 +15,6 @@ from plant.equipment import Feeder
 from plant.plant_config import ScheduledAction
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.schema.participants import inverters_of
-from scenarios.schema.plugins import placed_plugin
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from wire.table_schema import Problem
@@ -72,7 +70,7 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
     """Return the scenario with the delays of its trace files, whose paths start in its folder."""
 
     def read(netem: Netem, path: str) -> Netem:
-        netem, wrong = with_traces(_with_folders(netem, folder), folder)
+        netem, wrong = with_traces(netem, folder)
         _add(wrong, path, problems)
         return netem
 
@@ -81,15 +79,6 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
         for name, case in scenario.cases.items()
     }
     return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
-
-
-def _with_folders(netem: Netem, folder: Path) -> Netem:
-    """Return the entries with the folder of each user's fault that stands beside the file."""
-    if not any(fault.own for fault in netem.links):
-        return netem
-    replace = msgspec.structs.replace
-    own = [tuple(placed_plugin(it, FAULTS, folder) for it in fault.own) for fault in netem.links]
-    return replace(netem, links=tuple(replace(fault, own=it) for fault, it in zip(netem.links, own, strict=True)))
 
 
 def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:

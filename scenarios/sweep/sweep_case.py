@@ -28,9 +28,8 @@ from scenarios.results.history import History, Nameplates
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
+from scenarios.schema.configs import as_in, configs
 from scenarios.schema.participants import without_agent
-from scenarios.schema.scenario_changes import as_in
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""

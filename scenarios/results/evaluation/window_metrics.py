@@ -15,8 +15,8 @@ from scenarios.results.event_windows import CaseRecord, Window
 from scenarios.results.history import History, Nameplates, read_only
 from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.schema import ScenarioModel
-from scenarios.schema.own_modules import metrics_of
 from scenarios.schema.participants import without_agent
+from scenarios.schema.plugin_keys import metrics_of
 
 if TYPE_CHECKING:
     import pandas as pd

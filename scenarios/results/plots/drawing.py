@@ -10,8 +10,8 @@ from plant.equipment import Feeder
 from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval, island_intervals, islands_of
 from scenarios.schema import ScenarioModel
+from scenarios.schema.configs import limits_of
 from scenarios.schema.participants import inverters_of, without_agent
-from scenarios.schema.power_limits import limits_of
 from scenarios.schema.scenario_model import Event
 from scenarios.short_names import in_order, short
 

@@ -12,8 +12,7 @@ import msgspec
 from scenarios.catalogue_files import SWEEPS, names_in
 from scenarios.duration import duration
 from scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
-from scenarios.schema.file_lookup import find_file
-from scenarios.schema.loading import read_toml
+from scenarios.schema.loading import find_file, read_toml
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Axis, graph_axes, grid_axes, of_values, samples, zip_axes

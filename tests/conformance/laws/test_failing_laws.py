@@ -104,7 +104,7 @@ def _text(path: Path) -> str:
     ({"command": ["ls"], "folder": "/nowhere"}, r"case.IV.law.folder: there is no folder /nowhere"),
     ({"use": "dapi", "P_set_min": 1.0, "P_set_max": 0.5}, r"law.P_set_min: 1 must not be above P_set_max = 0.5"),
     ({"command": ["ls"], "P_set_max": "much"}, r'case.IV.law.P_set_max: must be a number, got "much"'),
-    ({"command": "./nothing"}, r"case.IV.law.command: must be a list of texts, the program first"),
+    ({"command": "./nothing"}, r"case.IV.law.command: must be a list such as .*, the program first"),
     ({"fmu": "x.fmu"}, r"case.IV.law.fmu: there is no file x.fmu; write its path, seen from the scenario"),
     ({"fmu": __file__, "folder": "/"}, r"case.IV.law.fmu: test_failing_laws.py is no FMU: BadZipFile"),
     (3, r"case.IV.law: must be a text in quotes or a table, got 3"),

@@ -11,7 +11,7 @@ import pytest
 
 import gridpeers as gp
 from agents.carriers.law_registry import LAWS
-from scenarios.schema.law_choice import law_of
+from scenarios.schema.plugin_keys import law_of
 
 MINE = '''
 from typing import Annotated

@@ -12,7 +12,7 @@ from plant.plant_config import PlantSettings, PowerLimit, SwitchEvent
 from plant.tables import read_feeder
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.schema import load_scenario
-from scenarios.schema.power_limits import limits_of
+from scenarios.schema.configs import limits_of
 from scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import problems, written
 

@@ -1,0 +1,100 @@
+"""Check, before a run, that there is a law, that it takes its parameters, and that it can be made."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from agents.agent_config import LawChoice
+from agents.carriers.executable import executable_problem
+from agents.carriers.law_registry import CARRIERS, KEYS, LAWS
+from agents.carriers.time_limit import make_limited
+from agents.laws.law import Law, limits_in
+from wire.path_text import is_no_path
+from wire.plugin import scalar_objection
+from wire.registry import PluginError
+from wire.table_reading import read_parameters, read_table
+from wire.table_schema import Problem
+
+PAPER = LawChoice().use
+"""Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
+
+
+def law_problems(table: Mapping[str, Any]) -> list[Problem]:
+    """Return all that is wrong with the table `law` of a scenario, at its keys, or at "" for the whole.
+
+    Examples
+    --------
+    >>> law_problems({"use": "dapi", "k": -1.0, "time_limit_s": 0})[0]
+    Problem(path='time_limit_s', text='must be from 0.001 to 60 s, got 0')
+    """
+    given = [key for key in CARRIERS if key in table]
+    if len(given) != 1:
+        text = f"needs one of use, command, fmu; got {' and '.join(given) or 'none'}"
+        return [Problem("", f'{text}; e.g. law = "mine:Mine" or law = {{ command = ["./mylaw"] }}')]
+    choice, found = read_table(LawChoice, {key: value for key, value in table.items() if key in KEYS})
+    rest = {key: value for key, value in table.items() if key not in KEYS}
+    found += [Problem(key, text) for key, value in rest.items() if (text := scalar_objection(value))]
+    for key in ("use", "fmu", "folder"):
+        if is_no_path(getattr(choice, key)):
+            found.append(Problem(key, "can be no name of a module, folder or file"))
+    if "command" in table and not any(it.path == "command" for it in found):
+        found += [Problem("command", text) for text in _command_problems(choice.command)]
+    wrong = {problem.path for problem in found}
+    if wrong & {*CARRIERS, "folder"}:  # there is no law to ask
+        return found
+    parameters = {key: value for key, value in rest.items() if key not in wrong}
+    checks = {"use": _class_problems, "command": _program_problems, "fmu": _fmu_problems}
+    return found + checks[given[0]](choice, parameters)
+
+
+def _command_problems(command: tuple[str, ...]) -> list[str]:
+    if not command:
+        return ["is empty; write the program first"]
+    if is_no_path(command[0]):
+        return ["begins with what can be no name of a program"]
+    if not all(word.isprintable() or word.isascii() for word in command):
+        return ["has a character in it that is no text"]
+    return ["has the character 0 in it, which no command can have"] if any("\0" in word for word in command) else []
+
+
+def _class_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
+    if choice.use == PAPER:
+        text = f'the parameters of "{PAPER}" are those of [gains] and [handling]; write them there'
+        return [Problem(key, text) for key in parameters]
+    try:
+        law = LAWS.resolve(choice.use, choice.folder)
+    except PluginError as error:
+        return [Problem("use", str(error))]
+    if found := read_parameters(law, parameters)[1]:
+        return found
+    try:
+        failed = make_limited(law, parameters, choice.time_limit).close_failure()
+    except ValueError as error:
+        return [Problem("use", f"{choice.use} {error}")]
+    return [Problem("use", f"the close of {choice.use} failed: {failed}")] if failed else []
+
+
+def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
+    program, folder = choice.command[0], Path(choice.folder)
+    if not folder.is_dir():
+        return [Problem("folder", f"there is no folder {folder}")]
+    place = folder / program
+    if found := shutil.which(str(place.resolve())) or ("/" not in program and shutil.which(program)):
+        if text := executable_problem(Path(found)):
+            return [Problem("command", f"{program} {text}")]
+        return read_parameters(Law, limits_in(parameters))[1]
+    if place.is_file():
+        return [Problem("command", f"{program} cannot be executed; chmod +x it, or name its interpreter first")]
+    return [Problem("command", f"there is no program {program}, neither beside the scenario nor on the PATH")]
+
+
+def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
+    from agents.carriers.fmu import load_problem
+    from agents.carriers.fmu_interface import fmu_problems
+
+    path = Path(choice.folder) / choice.fmu
+    found = [Problem(*problem) for problem in fmu_problems(path, parameters)]
+    return found or [Problem("fmu", text) for text in [load_problem(path)] if text]

@@ -1,0 +1,260 @@
+"""The keys of a scenario that name something plugged in: its laws, graphs, metrics, claims, faults, and its benchmark.
+
+Such a key is a text, or a table with `use` (a law also with `command` or `fmu`), `folder` and parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from msgspec.structs import replace
+
+from agents.agent_config import Gains, GraphRule, LawChoice
+from agents.carriers.law_check import PAPER, law_problems
+from agents.carriers.law_registry import KEYS, LAWS
+from agents.graphs import GRAPHS, make_graph, neighbours_by
+from netem.models.own_fault import FAULTS
+from netem.schema.netem import Netem
+from plant.equipment import Feeder, InverterRow
+from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
+from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
+from scenarios.schema.participants import with_agent
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel
+from wire.module_folder import folder_of
+from wire.path_text import is_no_path
+from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
+from wire.registry import PluginError, Registry
+from wire.table_reading import read_table
+
+OUR_GRAPHS = get_args(GraphRule)
+"""Rules of gridpeers, which need no module."""
+
+
+def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
+    """Return the law of a case: its own, or the scenario's.
+
+    Examples
+    --------
+    >>> from scenarios.schema import load_scenario
+    >>> law_of(load_scenario("islanding")[0], "IV").use
+    'consensus'
+    """
+    table = table_of(scenario.cases[case].law or scenario.law)
+    choice, _ = read_table(LawChoice, {key: value for key, value in table.items() if key in KEYS})
+    return replace(choice, parameters={key: value for key, value in table.items() if key not in KEYS})
+
+
+def graph_of(case: Case) -> tuple[str, Plugin | None]:
+    """Return the name of a case's rule, and the rule if it is one's own.
+
+    Examples
+    --------
+    >>> graph_of(Case(secondary="all", graph="ring"))
+    ('ring', None)
+    """
+    plugin = plugin_of(case.graph)
+    return (plugin.use, None) if plugin.use in OUR_GRAPHS else (plugin.name, plugin)
+
+
+def metrics_of(scenario: ScenarioModel) -> list[tuple[str, Plugin]]:
+    """Return a scenario's own metrics: the name of each in tables, and the metric."""
+    found = []
+    for key in scenario.metrics:
+        table = table_of(key)
+        label = str(table.pop("name", ""))
+        plugin = plugin_of(table)
+        found.append((name_of(plugin, label), plugin))
+    return found
+
+
+def claims_of(scenario: ScenarioModel) -> list[Plugin]:
+    """Return a scenario's own claims."""
+    return [plugin_of(key) for key in scenario.claims]
+
+
+def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
+    """Return the scenario as any process can follow it: with the folder of everything that stands beside its file."""
+    cases = {
+        name: replace(
+            case,
+            graph=placed(case.graph, GRAPHS, folder),
+            law=placed(case.law, LAWS, folder),
+            netem=_placed_faults(case.netem, folder),
+        )
+        for name, case in scenario.cases.items()
+    }
+    return replace(
+        scenario,
+        paper=placed(scenario.paper, BENCHMARKS, folder),
+        law=placed(scenario.law, LAWS, folder),
+        metrics=tuple(placed(_labelled(key), METRICS, folder) for key in scenario.metrics),
+        claims=tuple(placed(key, CLAIMS, folder) for key in scenario.claims),
+        netem=_placed_faults(scenario.netem, folder),
+        cases=cases,
+    )
+
+
+def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
+    """Return a key with the folder of its module, program or FMU, and a decorator's name as `module:Name`.
+
+    Examples
+    --------
+    >>> placed("ring", GRAPHS, Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, GRAPHS, Path("/here"))
+    ('ring', {'use': 'mine:Star', 'hub': 'inv1', 'folder': '/here'})
+    """
+    table = table_of(key)
+    use, given = registry.reference(str(table.get("use", ""))), table.get("folder", "")
+    local = ":" in use or "command" in table or "fmu" in table
+    if not local or not isinstance(given, str) or is_no_path(given):
+        return key
+    place = str((folder / given).resolve())
+    return table | ({"use": use, "folder": folder_of(use, place)} if ":" in use else {"folder": place})
+
+
+def _placed_faults(netem: Netem, folder: Path) -> Netem:
+    links = []
+    for fault in netem.links:
+        keys = ({**dict(it.parameters), "use": it.use, "folder": it.folder} for it in fault.own)
+        links.append(replace(fault, own=tuple(plugin_of(placed(key, FAULTS, folder)) for key in keys)))
+    return replace(netem, links=tuple(links))
+
+
+def _labelled(key: PluginKey) -> PluginKey:
+    """Return a metric with a name in tables: one of a decorator's name keeps that name."""
+    table = table_of(key)
+    use = str(table.get("use", ""))
+    return table | {"name": use} if METRICS.reference(use) != use and "name" not in table and good_name(use) else key
+
+
+def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
+    """Note a benchmark that is not there.
+
+    One that is known by name is not imported before a run is judged: to read a scenario takes no numpy.
+    """
+    key = scenario.paper
+    if not problems.touch("paper") and key and not (isinstance(key, str) and key in BENCHMARKS.names):
+        _check("paper", key, BENCHMARKS, problems)
+
+
+def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
+    """Note metrics and claims that there are not, and metrics of one name."""
+    names: list[str] = []
+    for i, key in enumerate(scenario.metrics):
+        path, table = f"metrics[{i}]", table_of(key)
+        label = table.pop("name", "")
+        if not isinstance(label, str) or (label and not good_name(label)):
+            problems.add(f"{path}.name", "a name in tables is up to 41 letters, digits and _, the unit last: f_min_Hz")
+            continue
+        plugin = _check(path, key if isinstance(key, str) else table, METRICS, problems)
+        if plugin is None:
+            continue
+        name = name_of(plugin, label)
+        if name in ALWAYS and plugin.use != name:
+            problems.add(
+                path, f'every run has a metric "{name}" already; give this one a name: {{ name = "my_{name}" }}'
+            )
+        elif name in names:
+            problems.add(path, f'there is a metric "{name}" in this list already; give one of them another name')
+        names.append(name)
+    for i, key in enumerate(scenario.claims):
+        _check(f"claims[{i}]", key, CLAIMS, problems)
+
+
+def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
+    """Note laws that cannot run, and gains and weights of another law than the case has."""
+    _check_law("law", scenario.law, problems)
+    for name, case in scenario.cases.items():
+        path = f"case.{name}.law"
+        if case.law != "":  # an empty table is no law, and not the scenario's either
+            _check_law(path, case.law, problems)
+        if problems.touch(path, "law"):
+            continue
+        law = law_of(scenario, name)
+        if law.name != PAPER and case.gains not in (scenario.gains, Gains()):
+            text = f'[gains] are those of the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
+            problems.add(f"case.{name}.gains", text)
+        if law.name != PAPER and case.handling.weights != "paper":
+            text = f'weights other than "paper" are the law "{PAPER}"\'s, and this case has {law.name}; leave them out'
+            problems.add(f"case.{name}.handling.weights", text)
+
+
+def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+    """Note rules that there are not, and that fail on a roster which the scenario will have."""
+    for name, case in scenario.cases.items():
+        path = f"case.{name}.graph"
+        if problems.touch(path):
+            continue
+        plugin = _check(path, case.graph, GRAPHS, problems)
+        if plugin is None or plugin.use in OUR_GRAPHS or feeder is None:
+            continue
+        try:
+            rule = make_graph(plugin)
+            for roster in _rosters(scenario, feeder, name):
+                neighbours_by(rule, roster, plugin.name, strict=True)
+        except ValueError as error:  # a `GraphError`, or a `PluginError` of one that cannot be called
+            problems.add(path, str(error))
+
+
+def check_portable(scenario: ScenarioModel, *, measures: bool = False) -> list[str]:
+    """Return a sentence for everything in a scenario's cases that no other process could import.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        Checked.
+    measures : bool, optional
+        Whether other processes measure, too, as those of a sweep do; those of a run do not.
+    """
+    found = []
+    for name, case in scenario.cases.items():
+        used: list[tuple[Registry[Any], str]] = [
+            (LAWS, law_of(scenario, name).use),
+            (GRAPHS, plugin_of(case.graph).use),
+        ]
+        used += [(FAULTS, it.use) for fault in (*scenario.netem.links, *case.netem.links) for it in fault.own]
+        used += [(METRICS, metric.use) for _, metric in metrics_of(scenario) if measures]
+        for registry, use in used:
+            try:
+                registry.portable(use)
+            except PluginError as error:
+                found.append(f"case {name}: {error}")
+    return list(dict.fromkeys(found))
+
+
+def _check_law(path: str, key: PluginKey, problems: Problems) -> None:
+    if not problems.touch(path):
+        for place, text in law_problems(table_of(key)):
+            problems.add(f"{path}.{place}" if place and isinstance(key, Mapping) else path, text)
+
+
+def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problems) -> Plugin | None:
+    """Note what is wrong with a key and with what it names; return the plugin if nothing is."""
+    table = table_of(key)
+    found: list[tuple[str, str]] = []
+    for name in ("use", "folder"):
+        if not isinstance(table.get(name, ""), str):
+            found.append((name, "must be a text in quotes"))
+        elif is_no_path(table.get(name, "")):
+            found.append((name, "can be no name of a module or folder"))
+    if not found and not table.get("use"):
+        found.append(("", f'names no {registry.kind}; write e.g. {{ use = "mine:Name" }}'))
+    found = found or [(name, text) for name, value in table.items() if (text := scalar_objection(value))]
+    plugin = None if found else plugin_of(table)
+    for name, text in found or plugin_problems(registry, plugin_of(table)):
+        problems.add(f"{path}.{name}" if name and isinstance(key, Mapping) else path, text)
+        plugin = None
+    return plugin
+
+
+def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dict[str, InverterRow]]:
+    """Yield the nameplates of those that take part at the start, and after each event at which agents leave or join."""
+    rows = with_agent(scenario, feeder, case)
+    present = {row.name for row in rows if not row.spare}
+    yield {row.name: row for row in rows if row.name in present}
+    for event in scenario.events:
+        if event.leave or event.join:
+            present = (present - set(event.leave)) | set(event.join)
+            yield {row.name: row for row in rows if row.name in present}
