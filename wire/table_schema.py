@@ -64,10 +64,13 @@ class OtherKeys:
         Whether a key is one of them.
     read : Callable[[str, Any, list[Problem]], tuple]
         From a key and its value to elements of the tuple, problems noted.
+    write : Callable[[Any], tuple[str, Any]]
+        From an element of the tuple to its key and value.
     """
 
     accepts: Callable[[str], bool]
     read: Callable[[str, Any, list[Problem]], tuple[Any, ...]]
+    write: Callable[[Any], tuple[str, Any]]
 
 
 @dataclass(frozen=True)

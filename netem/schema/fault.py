@@ -67,6 +67,11 @@ def _read_own(name: str, raw: Any, found: list[Problem]) -> tuple[Plugin, ...]:
     return () if wrong else (plugin_of({**table, "use": name}),)
 
 
+def _written_own(plugin: Plugin) -> tuple[str, dict[str, Any]]:
+    """Return the key and the table of a fault of the user's own."""
+    return plugin.use, dict(plugin.parameters) | ({"folder": plugin.folder} if plugin.folder else {})
+
+
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What some links do for a time. A message is judged by the entries that hold at the time it was sent."""
 
@@ -94,7 +99,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Whether the link is down."""
     flap: Flap | None = None
     """Up and down in turn."""
-    own: Annotated[tuple[Plugin, ...], OtherKeys(_is_own, _read_own)] = ()
+    own: Annotated[tuple[Plugin, ...], OtherKeys(_is_own, _read_own, _written_own)] = ()
     """Faults of your own, each under its name: "mine:Jammer" = { share = 0.2 } (`gridpeers doc faults`)."""
 
     @property

@@ -1,8 +1,7 @@
-"""The faults of links and agents in a scenario: checked, and put together for one case."""
+"""Check the faults of links and agents in a scenario, and put together those of one case."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
@@ -17,18 +16,17 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
-from wire.table_schema import Problem
+from wire.table_schema import NO_KEY, Problem, fields_of
+
+LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
+"""Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""
 
 
 def netem_of(scenario: ScenarioModel, case: str) -> Netem:
     """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
-    common, own = scenario.netem, scenario.cases[case].netem
-    return Netem(
-        seed=scenario.seed,
-        links=(*common.links, *own.links),
-        partitions=(*common.partitions, *own.partitions),
-        nodes=(*common.nodes, *own.nodes),
-    )
+    tables = scenario.netem, scenario.cases[case].netem
+    entries = {list_.name: tuple(it for netem in tables for it in getattr(netem, list_.name)) for list_ in LISTS}
+    return Netem(seed=scenario.seed, **entries)
 
 
 def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
@@ -63,7 +61,7 @@ def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[fl
 
 def is_calm(netem: Netem) -> bool:
     """Return whether there is no entry at all."""
-    return not (netem.links or netem.partitions or netem.nodes)
+    return not any(getattr(netem, list_.name) for list_ in LISTS)
 
 
 def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> ScenarioModel:
@@ -71,7 +69,7 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
 
     def read(netem: Netem, path: str) -> Netem:
         netem, wrong = with_traces(netem, folder)
-        _add(wrong, path, problems)
+        problems.extend(wrong, path)
         return netem
 
     cases = {
@@ -84,7 +82,7 @@ def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> Sc
 def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
 
-    Without a feeder, which could not be read, nobody's name is known, and the rest is checked.
+    Without a feeder, which could not be read, no name is known, and the rest is checked.
     """
     rows = inverters_of(scenario, feeder) if feeder else ()
     names = tuple(row.name for row in rows) if feeder else None
@@ -96,16 +94,13 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
         nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
         return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
 
-    common = wrong_in(scenario.netem, problems.paths_below(""))
-    _add(common, "", problems)
+    problems.extend(wrong_in(scenario.netem, _noted("", problems)))
     for name, case in scenario.cases.items():
         path = f"case.{name}."
-        own = wrong_in(case.netem, problems.paths_below(path))
-        _add(own, path, problems)
-        if not (common or own or problems.paths_below("") or problems.paths_below(path)) and not is_calm(case.netem):
-            where = _paths_in(scenario.netem, path)
+        problems.extend(wrong_in(case.netem, _noted(path, problems)), path)
+        if not (_noted("", problems) or _noted(path, problems) or is_calm(case.netem)):
             for problem in wrong_in(netem_of(scenario, name), set()):
-                problems.add(where(problem.path), problem.text)
+                problems.add(_place(problem.path, scenario.netem, path), problem.text)
 
 
 def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
@@ -121,19 +116,15 @@ def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
     return found
 
 
-def _add(wrong: list[Problem], path: str, problems: Problems) -> None:
-    for problem in wrong:
-        problems.add(path + problem.path, problem.text)
+def _noted(prefix: str, problems: Problems) -> set[str]:
+    """Return the keys of entries with a problem, seen from a table."""
+    entries = tuple(f"{prefix}{list_.key}[" for list_ in LISTS)
+    return {path.removeprefix(prefix) for path in problems.paths if path.startswith(entries)}
 
 
-def _paths_in(common: Netem, case: str) -> Callable[[str], str]:
-    """Return a function from the path of an entry among all of a case to where it is written."""
-    before = {"link": len(common.links), "partition": len(common.partitions), "node": len(common.nodes)}
-
-    def where(path: str) -> str:
-        kind, _, rest = path.partition("[")
-        index, _, rest = rest.partition("]")
-        place = int(index) - before[kind]
-        return f"{case}{kind}[{place}]{rest}" if place >= 0 else path
-
-    return where
+def _place(path: str, common: Netem, case: str) -> str:
+    """Return where an entry is written that stands at a path among all entries of a case."""
+    kind, _, rest = path.partition("[")
+    index, _, rest = rest.partition("]")
+    before = next(len(getattr(common, list_.name)) for list_ in LISTS if list_.key == kind)
+    return f"{case}{kind}[{int(index) - before}]{rest}" if int(index) >= before else path

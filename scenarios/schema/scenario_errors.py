@@ -10,6 +10,7 @@ import msgspec
 
 from wire.printable import printable
 from wire.table_reading import read_table
+from wire.table_schema import Problem
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -66,6 +67,11 @@ class Problems:
         where = f"{self.file}:{line}" if line else self.file
         self._found.append((line, f"{where}: {path}: {text}" if path else f"{where}: {text}"))
 
+    def extend(self, found: Iterable[Problem], prefix: str = "") -> None:
+        """Note problems of a table, whose keys stand behind a prefix."""
+        for path, text in found:
+            self.add(prefix + path, text)
+
     def add_plain(self, text: str) -> None:
         """Note a problem that says itself where it is, as a feeder's do."""
         self._found.append((0, text))
@@ -78,16 +84,15 @@ class Problems:
         """Whether a problem was noted anywhere in a table."""
         return any(noted.startswith(f"{path}.") for noted in self._paths)
 
-    def paths_below(self, prefix: str) -> set[str]:
-        """Return the keys of entries `[[link]]`, `[[partition]]`, `[[node]]` with a problem, seen from a table."""
-        entries = tuple(f"{prefix}{entry}[" for entry in ("link", "partition", "node"))
-        return {path.removeprefix(prefix) for path in self._paths if path.startswith(entries)}
+    @property
+    def paths(self) -> frozenset[str]:
+        """Every key with a problem."""
+        return frozenset(self._paths)
 
     def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
         """Return a file's tables as a struct, of use only while nothing is noted."""
         table, problems = read_table(struct, data)
-        for problem in problems:
-            self.add(*problem)
+        self.extend(problems)
         return table
 
     @property

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
-from netem.schema.netem import Netem
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from wire.table_schema import INHERITED, fields_of
+from wire.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
 
 def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
@@ -26,9 +25,11 @@ def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
     as_run : Mapping[str, Any]
         Driver, versions and the like.
     """
+    keys, tables = _lines(scenario, "", scenario)
     lines = [
         "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
-        *_table(scenario, "", scenario),
+        *keys,
+        *tables,
         "",
         f"[{AS_RUN}]",
         *(f"{key} = {_value(value)}" for key, value in as_run.items()),
@@ -36,36 +37,42 @@ def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(struct: msgspec.Struct, path: str, common: ScenarioModel) -> Iterator[str]:
-    """Keys of one table, then the tables below it, as TOML wants them ordered; no case repeats a common table."""
-    below: list[str] = []
+def _lines(
+    struct: msgspec.Struct, path: str, common: ScenarioModel, *, entry: bool = False
+) -> tuple[list[str], list[str]]:
+    """Return the keys of a table, and the tables below it, as TOML wants them ordered; no case repeats a common table.
+
+    Tables below an entry of a list are written on its lines.
+    """
+    keys: list[str] = []
+    tables: list[str] = []
     for field in fields_of(type(struct)):
-        value, key = getattr(struct, field.name), field.key
-        where = f"{path}.{_key(key)}" if path else _key(key)
-        if INHERITED in field.marks and value == getattr(common, field.name):
+        value, where = getattr(struct, field.name), f"{path}.{_key(field.key)}" if path else _key(field.key)
+        default = struct.__struct_config__.omit_defaults and not field.required and value == field.default
+        common_too = INHERITED in field.marks and value == getattr(common, field.name)
+        if value is None or default or common_too or NO_KEY in field.marks:
             continue
-        if isinstance(value, Netem):
-            for entries, items in msgspec.to_builtins(value).items():
-                for item in items if isinstance(items, tuple | list) else ():
-                    below += ["", f"[[{path}.{entries}]]" if path else f"[[{entries}]]"]
-                    own = {one["use"]: dict(one.get("parameters", ())) | _folder(one) for one in item.pop("own", ())}
-                    below += [f"{_key(name)} = {_inline(given)}" for name, given in (item | own).items()]
-            continue
-        if isinstance(value, msgspec.Struct):
-            below += ["", f"[{where}]", *_table(value, where, common)]
+        if others := field.mark(OtherKeys):
+            keys += [f"{_key(key)} = {_inline(given)}" for key, given in map(others.write, value)]
+        elif INLINE in field.marks:
+            inner, below = _lines(value, path, common)
+            keys, tables = keys + inner, tables + below
+        elif isinstance(value, msgspec.Struct) and not entry:
+            tables += _table(f"[{where}]", value, where, common)
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
             for item in value:
-                below += ["", f"[[{where}]]", *_table(item, where, common)]
+                tables += ["", f"[[{where}]]", *_lines(item, where, common, entry=True)[0]]
         elif isinstance(value, dict) and any(isinstance(item, msgspec.Struct) for item in value.values()):
             for name, item in value.items():
-                below += ["", f"[{where}.{_key(name)}]", *_table(item, f"{where}.{_key(name)}", common)]
-        elif value is not None and (value or not isinstance(value, tuple | dict)):
-            yield f"{key} = {_inline(value)}"
-    yield from below
+                tables += _table(f"[{where}.{_key(name)}]", item, f"{where}.{_key(name)}", common)
+        elif value or not isinstance(value, tuple | dict):
+            keys.append(f"{field.key} = {_inline(msgspec.to_builtins(value))}")
+    return keys, tables
 
 
-def _folder(plugin: dict[str, Any]) -> dict[str, str]:
-    return {"folder": plugin["folder"]} if plugin.get("folder") else {}
+def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel) -> list[str]:
+    keys, tables = _lines(struct, path, common)
+    return ["", header, *keys, *tables]
 
 
 def _key(name: str) -> str:
