@@ -21,7 +21,6 @@ from gridpeers.theory import (
     inverter_group_of,
     load_steps,
     predicted_times,
-    sensitivity,
     var_delay_limit,
     var_growth,
     var_response,
@@ -123,7 +122,7 @@ def late() -> None:
 
 def limits() -> None:
     """Longest delays (s), in discrete time (by the continuous law)."""
-    answers = sensitivity(calm(), feeder_of(scenario().spec))
+    response = var_response(calm(), feeder_of(scenario().spec))
     print("links | both alike (continuous) | f or P_set late (continuous) | V, Q or V_set late")
     for title in LIMITS:
         one = inverters(title)
@@ -132,7 +131,7 @@ def limits() -> None:
             f"{delay_limit(one, kind):.2f} ({delay_limit_closed(one, kind):.3f})"
             for kind in ("disagreement", "local loop")
         ]
-        print(f"{title:20}", " | ".join([*limits_s, f"{var_delay_limit(one, answers):.2f}"]))
+        print(f"{title:20}", " | ".join([*limits_s, f"{var_delay_limit(one, response):.2f}"]))
 
 
 def vars_() -> None:

@@ -15,8 +15,7 @@ from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
-from scenarios.predict.var_response import VarResponse, var_growth, var_response
-from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
+from scenarios.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response
 from scenarios.schema import Case, ScenarioModel
 from scenarios.schema.configs import as_in
 
@@ -27,7 +26,6 @@ __all__ = [
     "LoadStep",
     "Loop",
     "ScenarioModel",
-    "Sensitivity",
     "Ticks",
     "Times",
     "VarResponse",
@@ -37,7 +35,6 @@ __all__ = [
     "inverter_group_of",
     "load_steps",
     "predicted_times",
-    "sensitivity",
     "sharing_index",
     "var_delay_limit",
     "var_growth",

@@ -18,7 +18,7 @@ from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from scenarios.predict.load_steps import IslandStep, LoadError, load_steps
 from scenarios.predict.prediction_table import case_text
 from scenarios.predict.times import predicted_times
-from scenarios.predict.vars import Sensitivity, sensitivity
+from scenarios.predict.var_response import VarResponse, var_response
 from scenarios.run import BrokenRunError
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
@@ -66,7 +66,7 @@ def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> 
         )
     try:
         steps = load_steps(spec, feeder)
-        plant = sensitivity(spec, feeder) if voltage else None
+        plant = var_response(spec, feeder) if voltage else None
     except LoadError as error:
         raise BrokenRunError(f"{spec.name}: {error}") from error
     found = {}
@@ -92,7 +92,7 @@ class Prediction:
         The inverters at the start, and who listens to whom.
     islands : list of (IslandStep, InverterGroup)
         Islands after each event.
-    plant : Sensitivity or None
+    plant : VarResponse or None
         How voltage and vars answer; None leaves them out.
     """
 
@@ -101,7 +101,7 @@ class Prediction:
         title: str,
         fleet: InverterGroup,
         islands: list[tuple[IslandStep, InverterGroup]],
-        plant: Sensitivity | None,
+        plant: VarResponse | None,
     ) -> None:
         self.title = title
         """Scenario and case."""

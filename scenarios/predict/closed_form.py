@@ -103,6 +103,11 @@ def settling(rate: float) -> float:
     return math.inf if rate <= ZERO else SETTLING / rate
 
 
+def settling_in_ticks(spectral_radius: float, T_c: float) -> float:
+    """Return the time (s) in which a mode in discrete time falls to 2 %; infinite when it does not fall."""
+    return settling(-math.log(spectral_radius) / T_c) if spectral_radius > 0.0 else 0.0
+
+
 def modes(fleet: InverterGroup) -> Modes:
     """Return the modes of a fleet's secondary law by the continuous equations.
 

@@ -14,14 +14,14 @@ from scenarios.predict.closed_form import (
     equivalent_delay,
     groups,
     modes,
-    settling,
+    settling_in_ticks,
 )
 from scenarios.predict.delay_limits import delay_limit
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop
 from scenarios.predict.load_steps import IslandStep
 from scenarios.predict.times import Times, predicted_times
-from scenarios.predict.vars import Sensitivity, var_delay_limit, var_modes
+from scenarios.predict.var_response import VarResponse, var_delay_limit, var_spectral_radius
 
 WIDTH = 100
 """Columns."""
@@ -31,7 +31,7 @@ TextRow = tuple[str, str, str, str]
 
 
 def case_text(
-    title: str, fleet: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: Sensitivity | None
+    title: str, fleet: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: VarResponse | None
 ) -> str:
     """Return everything that is predicted of one case.
 
@@ -43,7 +43,7 @@ def case_text(
         Everybody on the network at the start.
     steps : sequence of (IslandStep, InverterGroup)
         Islands after each event, and the inverters in them.
-    plant : Sensitivity, optional
+    plant : VarResponse, optional
         For voltage and vars.
     """
     if not fleet.acts.any():
@@ -77,7 +77,7 @@ def _words(fleet: InverterGroup, found: Modes) -> str:
 
 def _rows(fleet: InverterGroup, found: Modes) -> list[TextRow]:
     loop = Loop(fleet=fleet)
-    slowest = settling(-math.log(loop.spectral_radius) / fleet.T_c) if loop.stable else math.inf
+    slowest = settling_in_ticks(loop.spectral_radius, fleet.T_c) if loop.stable else math.inf
     kinds: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
     limits = {kind: delay_limit(fleet, kind) for kind in kinds}
     closed = {kind: delay_limit_closed(fleet, kind) for kind in kinds}
@@ -136,16 +136,17 @@ def _sentence(times: Times) -> str:
     return f"not restored: {times.note}"
 
 
-def _vars(fleet: InverterGroup, plant: Sensitivity | None) -> list[str]:
+def _vars(fleet: InverterGroup, plant: VarResponse | None) -> list[str]:
     if plant is None:
         return ["  Voltage and vars: left out by --no-vars."]
     if not all(name in plant.names for name in fleet.names):
         return ["  Voltage and vars: not predicted with spare inverters."]
-    found, limit = var_modes(fleet, plant), var_delay_limit(fleet, plant)
-    if found.spectral_radius >= 1.0:
-        text = f"unstable on a plant without lags, spectral radius {found.spectral_radius:.4f}"
+    radius, limit = var_spectral_radius(fleet, plant), var_delay_limit(fleet, plant)
+    if radius >= 1.0:
+        text = f"unstable on a plant without lags, spectral radius {radius:.4f}"
     else:
-        text = f"slowest mode to 2 % in {found.settling_s:.2f} s; stable up to {_limit(limit)} of delay of measurement "
+        slowest = settling_in_ticks(radius, fleet.T_c)
+        text = f"slowest mode to 2 % in {slowest:.2f} s; stable up to {_limit(limit)} of delay of measurement "
         text += "or set-point (on a plant without lags; right to about one control period)"
         text = text.replace("up to any of delay", "with any delay up to 1 s")
     return _wrapped(f"Voltage and vars: {text}.", "  ")

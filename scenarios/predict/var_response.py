@@ -1,12 +1,26 @@
-r"""Voltage and vars with the plant's own lags: its answer to a step of each V_set, and whether the law grows on it.
+r"""Voltage and vars: the law (14), (15) on the plant's own response to V_set, with delays in ticks.
 
-`vars` takes the plant as at rest at once, which is right for limits of the local loop (0.06 to 0.1 s) and wrong for
-late links: there what decides are a few tenths of a second that the GFM's voltage controllers and the GFL's volt-var
-take. So here the answer of q and v to V_set is the plant's own, tick by tick for 2 s, and the law
+The plant on droop alone is measured once: q and v of every inverter, tick by tick for 2 s, after a step of each V_set.
+With the factors a_i, b_i of `agents.laws.consensus.V_factors` two questions are asked of it.
+
+**Modes**, as if the plant were at rest at once (`var_spectral_radius`, `var_delay_limit`). With q = S V_set and
+v = H V_set at the end of the response the law is
+
+.. math:: V(k) = V(k-1) - a \big(m_q S\, V(k-1-l) - D^{-1} A\, m_q S\, V(k-2-l)\big) - b H\, V(k-1-l)
+
+where l is the delay of the local loop (measurement or set-point): a neighbour's var is always one period older than the
+own, as it is measured at its sender's tick. The beta part is a consensus on m_q q through S;
+alpha couples it to the voltages of the GFM. Right for limits of the local loop (0.06 to 0.1 s).
+
+**Growth** with the plant's lags (`var_growth`). Over late links the few tenths of a second decide that the GFM's
+voltage controllers and the GFL's volt-var take. So the law
 
 .. math:: V(k) = V(k-1) - a \big(z(k) - D^{-1} A\, z(k-1-n)\big) - b\, v(k), \quad z = m_q q
 
-is followed from a random start; what is left after a while is its slowest mode, and its rate is told.
+with n ticks of link delay is followed from a random start on the plant's tick-by-tick response; the last seconds show
+its slowest mode.
+
+MQSI over time is not predicted.
 """
 
 from __future__ import annotations
@@ -17,18 +31,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agents.laws.consensus import V_factors
+from plant.build import build_plant
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
-from plant.feeder import raise_for_trip
+from plant.feeder import Plant, raise_for_trip
 from scenarios.predict.inverter_group import InverterGroup
+from scenarios.predict.linear_model import AT_REST
 from scenarios.predict.load_steps import LoadError
-from scenarios.predict.vars import STEP, factors, plant_in_first_window
 from scenarios.results.history import Floats
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 
+STEP = 0.002
+"""By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""
+
 LENGTH = 2.0
-"""How long an answer is followed (s). What is left then is one in ten of the slowest inverter's, and slow."""
+"""How long a response is followed (s). What is left then is one in ten of the slowest inverter's, and slow."""
 
 FOLLOWED = 20.0
 """How long the law is followed (s); its rate is that of the last half."""
@@ -45,9 +64,32 @@ class VarResponse:
     v: Floats
     """pu per pu, shape (K, N, N)."""
 
+    @property
+    def S(self) -> Floats:
+        """Dq / dV_set (pu per pu), N x N, with the plant at rest."""
+        return np.asarray(self.q.sum(axis=0))
+
+    @property
+    def H(self) -> Floats:
+        """Dv / dV_set (pu per pu), N x N, with the plant at rest."""
+        return np.asarray(self.v.sum(axis=0))
+
+    def columns_of(self, fleet: InverterGroup) -> list[int]:
+        """Return the places of a fleet's inverters in rows and columns.
+
+        Raises
+        ------
+        ValueError
+            If an inverter is not among them.
+        """
+        unknown = [name for name in fleet.names if name not in self.names]
+        if unknown:
+            raise ValueError(f"no response of {', '.join(unknown)}; there are {', '.join(self.names)}")
+        return [self.names.index(name) for name in fleet.names]
+
 
 def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
-    """Return the answers of the plant on droop alone, as it is at the end of the first event's window.
+    """Return the response of the plant on droop alone, as it is at the end of the first event's window.
 
     Raises
     ------
@@ -55,35 +97,113 @@ def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
         If the plant has no solution there.
     """
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
+    end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
     names, count = tuple(row.name for row in feeder.inverters), round(LENGTH / config.T_c)
-    scale = {row.name: (row.P_rated, row.V_nom) for row in feeder.inverters}
-    steps = np.zeros((count + 1, 2, len(names), len(names)))
+    scale = np.array([[row.P_rated, row.V_nom] for row in feeder.inverters])
+    steps = np.zeros((count + 1, len(names), 2, len(names)))
     try:
-        plant = plant_in_first_window(scenario, config)
+        plant = build_plant(config)
+        _advance(plant, math.floor(end / config.T_c + 1e-9) - plant.tick)
         for column, name in enumerate(names):
             for sign in (1.0, -1.0):
                 moved = copy.deepcopy(plant)
                 here = moved.measure()[name]
-                moved.hold(name, here.P_set, here.V_set + sign * STEP * scale[name][1])
+                moved.hold(name, here.P_set, here.V_set + sign * STEP * scale[column, 1])
                 for k in range(1, count + 1):
-                    moved.advance()
+                    _advance(moved, 1)
                     read = moved.measure()
-                    told = [[read[of].Q / scale[of][0], read[of].V / scale[of][1]] for of in names]
-                    steps[k, :, :, column] += sign * np.array(told).T / (2.0 * STEP)
-                raise_for_trip(moved.take_events())
+                    outputs = np.array([[read[of].Q, read[of].V] for of in names]) / scale
+                    steps[k, :, :, column] += sign * outputs / (2.0 * STEP)
     except PlantError as error:
         raise LoadError(f"on droop alone: {error}") from error
     pulses = np.diff(steps, axis=0)
-    return VarResponse(names=names, q=pulses[:, 0], v=pulses[:, 1])
+    return VarResponse(names=names, q=pulses[:, :, 0], v=pulses[:, :, 1])
 
 
-def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
-    """Rate (1/s) at which the law for voltage and vars grows, negative where it decays, over links that are late.
+def _advance(plant: Plant, ticks: int) -> None:
+    for _ in range(ticks):
+        plant.advance()
+    raise_for_trip(plant.take_events())
+
+
+def var_spectral_radius(fleet: InverterGroup, plant: VarResponse, *, local: int = 0) -> float:
+    """Return the largest magnitude of an eigenvalue (1) of the law for voltage and vars; below 1 it is stable.
+
+    Eigenvalues of set-points that the law never moves are left out.
 
     Parameters
     ----------
     fleet : InverterGroup
-        Its inverters must be among those of the answers.
+        Its inverters must be among those of the response.
+    plant : VarResponse
+        From `var_response`.
+    local : int, optional
+        Delay of measurement or set-point (control periods).
+
+    Raises
+    ------
+    ValueError
+        If an inverter is not among them.
+
+    Examples
+    --------
+    Two terminals whose vars answer to the difference of their set-points:
+
+    >>> pair = InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
+    >>> S, H = np.array([[5.0, -5.0], [-5.0, 5.0]]), np.full((2, 2), 0.5)
+    >>> plant = VarResponse(names=("a", "b"), q=S[None], v=H[None])
+    >>> var_spectral_radius(pair, plant) < 1.0 < var_spectral_radius(pair, plant, local=50)
+    True
+    """
+    at, free = plant.columns_of(fleet), np.ix_(fleet.acts, fleet.acts)
+    S, H = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)]
+    a, b = _factors(fleet)
+    z = fleet.m_q[:, None] * S
+    own = (a[:, None] * z + b[:, None] * H)[free]
+    others = (a[:, None] * _mean_of_neighbours(fleet) @ z)[free]
+    n, depth = len(own), local + 2
+    blocks = np.zeros((depth, n, n))
+    blocks[0] += np.eye(n)
+    blocks[local] -= own
+    blocks[local + 1] += others
+    past = np.eye(n * depth, k=-n)  # V(k-1), V(k-2), ... of those that run the law
+    past[:n] = np.hstack(list(blocks))
+    values = np.linalg.eigvals(past)
+    unmoved = int((np.linalg.svd(own - others, compute_uv=False) < AT_REST).sum())
+    return float(np.abs(values[np.argsort(np.abs(values - 1.0))][unmoved:]).max(initial=0.0))
+
+
+def var_delay_limit(fleet: InverterGroup, plant: VarResponse, *, longest_s: float = 1.0) -> float:
+    """Return the longest delay (s) of measurements or set-points up to which the law for voltage and vars is stable.
+
+    A multiple of T_c; infinite if none up to `longest_s` makes it unstable, not a number if it is unstable without.
+    """
+    for n in range(round(longest_s / fleet.T_c) + 1):
+        if var_spectral_radius(fleet, plant, local=n) >= 1.0 - 1e-12:
+            return (n - 1) * fleet.T_c if n else math.nan
+    return math.inf
+
+
+def _factors(fleet: InverterGroup) -> tuple[Floats, Floats]:
+    """Return the factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
+    gains, T, each = fleet.gains, fleet.T_c, zip(fleet.GFM, fleet.leads, fleet.degree.tolist(), strict=True)
+    weights = [(gains.alpha * leads, gains.beta_GFM if GFM else gains.beta_GFL, d) for GFM, leads, d in each]
+    a, b = np.array([V_factors(alpha, beta, d, k_q=gains.k_q, T=T) for alpha, beta, d in weights]).T
+    return a, b
+
+
+def _mean_of_neighbours(fleet: InverterGroup) -> Floats:
+    """Return D^-1 A of those that run the law."""
+    return np.asarray(fleet.heard / np.maximum(fleet.degree, 1.0)[:, None])
+
+
+def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
+    """Return the rate (1/s) at which the law for voltage and vars grows over late links; negative where it decays.
+
+    Parameters
+    ----------
+    fleet : InverterGroup
+        Its inverters must be among those of the response.
     plant : VarResponse
         From `var_response`.
     link_delay_s : float, optional
@@ -92,7 +212,7 @@ def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float 
     Raises
     ------
     ValueError
-        If an inverter is not among the answers.
+        If an inverter is not among them.
 
     Examples
     --------
@@ -104,18 +224,15 @@ def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float 
     >>> var_growth(pair, VarResponse(names=("a", "b"), q=at_once, v=0.1 * np.abs(at_once))) < 0.0
     True
     """
-    unknown = [name for name in fleet.names if name not in plant.names]
-    if unknown:
-        raise ValueError(f"no answer of {', '.join(unknown)}; there are {', '.join(plant.names)}")
-    at = [plant.names.index(name) for name in fleet.names]
+    at = plant.columns_of(fleet)
     n, K, T = fleet.n, len(plant.q), fleet.T_c
     late = max(0, math.ceil(link_delay_s / T - 1e-9) - 1)  # a state takes one period in any case
     z_of, v_of = (
         np.moveaxis(x[:, at][:, :, at] * by, 0, 1).reshape(n, K * n)
         for x, by in ((plant.q, fleet.m_q[None, :, None]), (plant.v, 1.0))
     )
-    a, b = (np.where(fleet.acts, factor, 0.0) for factor in factors(fleet))
-    mean = fleet.heard / np.maximum(fleet.degree, 1.0)[:, None]
+    a, b = (np.where(fleet.acts, factor, 0.0) for factor in _factors(fleet))
+    mean = _mean_of_neighbours(fleet)
     ticks = round(FOLLOWED / T)
     V, z = np.zeros((K + ticks + 1, n)), np.zeros((K + ticks + 1, n))
     V[K] = np.random.default_rng(1).normal(size=n)

@@ -28,13 +28,11 @@ from gridpeers.theory import (
     InverterGroup,
     LoadStep,
     ScenarioModel,
-    Sensitivity,
     VarResponse,
     feeder_of,
     first_window,
     inverter_group_of,
     load_steps,
-    sensitivity,
     var_response,
     without_faults,
 )
@@ -185,13 +183,8 @@ class SweepData:
         return step.load
 
     @cached_property
-    def answers(self) -> Sensitivity:
-        """How voltages and vars answer to V_set."""
-        return sensitivity(self.calm, self.feeder)
-
-    @cached_property
     def response(self) -> VarResponse:
-        """The same with the plant's lags."""
+        """How voltages and vars respond to V_set."""
         return var_response(self.calm, self.feeder)
 
     def fleet(self, case: str) -> InverterGroup:

@@ -91,7 +91,7 @@ def _limits(swept: SweepData) -> dict[tuple[str, bool, str], float]:
         found["f_swing_Hz", False, case] = delay_limit(fleet, "neighbours", longest_s=1.0)
         found["f_swing_Hz", True, case] = delay_limit(fleet, "local loop", longest_s=1.0)
         found["V_swing_pu", False, case] = _var_link_limit(swept, case)
-        found["V_swing_pu", True, case] = var_delay_limit(fleet, swept.answers)
+        found["V_swing_pu", True, case] = var_delay_limit(fleet, swept.response)
     return found
 
 

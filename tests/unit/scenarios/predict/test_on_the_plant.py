@@ -9,7 +9,7 @@ import gridpeers as gp
 from scenarios.predict.delay_limits import delay_limit
 from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, predicted_times
-from scenarios.predict.vars import Sensitivity, sensitivity, var_delay_limit
+from scenarios.predict.var_response import VarResponse, var_delay_limit, var_response
 from scenarios.schema import load_scenario
 from tests.unit.scenarios.predict.predicted_graphs import fleet, on_the_plant, scenario_of
 
@@ -26,9 +26,9 @@ def event() -> LoadStep:
 
 
 @pytest.fixture(scope="module")
-def answers() -> Sensitivity:
+def answers() -> VarResponse:
     """How vars and voltages answer to V_set on the islanded feeder."""
-    return sensitivity(*load_scenario("islanding"))
+    return var_response(*load_scenario("islanding"))
 
 
 def test_the_load_of_islanding_is_found_on_droop_alone(event: LoadStep) -> None:
@@ -90,7 +90,7 @@ def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
 
 
 @pytest.mark.parametrize("graph", ["full", "path"])
-def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: Sensitivity) -> None:
+def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: VarResponse) -> None:
     """The voltage stays calm a period below the predicted limit of the var law and swings two periods above it."""
     limit = round(var_delay_limit(fleet(graph), answers) / T_C)
     calm = on_the_plant(graph, setpoint=limit - 1, end_s=9.0)
@@ -101,7 +101,7 @@ def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: Sen
     assert wild.V[-50:].max() - wild.V[-50:].min() > 0.01
 
 
-def test_a_sensitivity_is_a_law_of_the_network(answers: Sensitivity) -> None:
+def test_a_sensitivity_is_a_law_of_the_network(answers: VarResponse) -> None:
     """Own vars rise with the own V_set, all others' fall, and every voltage follows every V_set."""
     own = np.eye(len(answers.names), dtype=bool)
 
