@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 
-from rich.console import Console
-from rich.markup import escape
+from rich.console import Console, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from scenarios.results.evaluation.benchmark_registry import DIGITS, NO_BENCHMARK, UNITS, Benchmark, Quantity, heading
 from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.findings import SHARED, Findings, label
 from scenarios.results.metrics import Steady
 from scenarios.results.steadiness import STEADY
+
+_WIDE = 10_000
+"""Characters of a line that nobody's table or sentence reaches: text in a file is not wrapped."""
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 
@@ -67,47 +71,50 @@ def grids(report: RunReport) -> tuple[Grid, ...]:
 
 def plain(report: RunReport) -> str:
     """Return the text of a report for files, pipes and logs."""
-    blocks = [_plain_grid(grid) for grid in grids(report)]
-    if report.verdicts:
-        width = max(len(verdict.claim.text) for verdict in report.verdicts)
-        lines = []
-        for verdict in report.verdicts:
-            lines.append(f"{verdict.status:7}  {verdict.claim.text:{width}}  {verdict.found}")
-            lines += [f"{'':7}  {verdict.claim.known_miss}"] if verdict.status == "MISS" else []
-        blocks.append("\n".join([*lines, *_summary(report)]))
-    blocks += [f"NOTE  {note}" for note in _all_notes(report)]
-    blocks += [f"Results: {report.folder}"] if report.folder else []
-    return "\n\n".join(blocks) + "\n"
+    text = StringIO()
+    _print(report, Console(file=text, width=_WIDE, color_system=None))
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
 
 
 def show(report: RunReport, console: Console) -> None:
-    """Print a report, with colours and rules on a terminal."""
-    if not console.is_terminal:
+    """Print a report, with colours on a terminal."""
+    if console.is_terminal:
+        _print(report, console)
+    else:
         console.print(plain(report), end="", markup=False, highlight=False, soft_wrap=True)
-        return
-    for grid in grids(report):
-        table = Table(title=grid.title, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
-        for number, column in enumerate(grid.header):
-            table.add_column(escape(column), justify="left" if number == 0 else "right", vertical="bottom")
-        for row in grid.rows:
-            table.add_row(*(f"[red]{escape(cell)}[/red]" if cell.endswith("!") else escape(cell) for cell in row))
-        console.print(table)
-        if grid.legend:
-            console.print(grid.legend, style="dim", highlight=False)
-        console.print()
-    width = max((len(verdict.claim.text) for verdict in report.verdicts), default=0)
-    for verdict in report.verdicts:
-        colour = _COLOURS[verdict.status]
-        text, found = escape(f"{verdict.claim.text:{width}}"), escape(verdict.found)
-        console.print(f"[{colour}]{verdict.status:7}[/{colour}]  {text}  [dim]{found}[/dim]", highlight=False)
-        if verdict.status == "MISS":
-            console.print(f"{'':7}  [dim]{escape(verdict.claim.known_miss)}[/dim]", highlight=False)
+
+
+def _print(report: RunReport, console: Console) -> None:
+    """Print the blocks of a report, with a blank line between them."""
+    blocks = [[*_rendered(grid)] for grid in grids(report)]
     if report.verdicts:
-        console.print(escape("\n".join(_summary(report))), "\n", highlight=False)
-    for note in _all_notes(report):
-        console.print(f"[yellow]NOTE[/yellow]  {escape(note)}", highlight=False)
-    if report.folder:
-        console.print(f"Results: [bold]{escape(report.folder)}[/bold]", highlight=False)
+        width = max(len(verdict.claim.text) for verdict in report.verdicts)
+        lines: list[RenderableType] = []
+        for verdict in report.verdicts:
+            status = (f"{verdict.status:7}", _COLOURS[verdict.status])
+            lines.append(Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim")))
+            if verdict.status == "MISS":
+                lines.append(Text(f"{'':7}  {verdict.claim.known_miss}", style="dim"))
+        blocks.append([*lines, _count(report.verdicts), *report.benchmark.lines(report.found)])
+    blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in _all_notes(report)]
+    blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
+    for number, block in enumerate(blocks):
+        if number:
+            console.print()
+        for line in block:
+            console.print(line, markup=False, highlight=False, soft_wrap=not isinstance(line, Table))
+
+
+def _rendered(grid: Grid) -> Iterator[RenderableType]:
+    yield Text(grid.title, style="bold")
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for number, column in enumerate(grid.header):
+        table.add_column(Text(column), justify="left" if number == 0 else "right", vertical="bottom")
+    for row in grid.rows:
+        table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
+    yield table
+    if grid.legend:
+        yield Text(grid.legend, style="dim")
 
 
 def _all_notes(report: RunReport) -> list[str]:
@@ -229,25 +236,6 @@ def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
                         f"case {case}, {event}{where}: {label(name, report.found.f_nom)} {values.reasons[name]}{last}"
                     )
     return lines
-
-
-def _plain_grid(grid: Grid) -> str:
-    upper, lower = zip(*((["", *heading.split("\n")])[-2:] for heading in grid.header), strict=True)
-    table = [upper, lower, *grid.rows]
-    widths = [max(len(row[i]) for row in table) for i in range(len(grid.header))]
-    lines = [grid.title]
-    for row in table:
-        cells = (
-            cell.ljust(width) if i == 0 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join([*lines, *([grid.legend] if grid.legend else [])])
-
-
-def _summary(report: RunReport) -> list[str]:
-    """Return how many claims hold, and how near the paper's tables are."""
-    return [_count(report.verdicts), *report.benchmark.lines(report.found)]
 
 
 def _count(verdicts: Sequence[Verdict]) -> str:
