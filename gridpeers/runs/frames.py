@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -67,12 +66,6 @@ def events_frame(file: Path) -> pd.DataFrame:
 def links_frame(file: Path) -> pd.DataFrame:
     """Return the fate of every message on emulated links, from links.csv; without the file there are no rows."""
     return _from_csv(file, {"seq": int, "t_s": float, "delay_s": _float_or_nan}, COLUMNS)
-
-
-def read_metrics(folder: Path) -> dict[str, Any]:
-    """Return what metrics.json of a run folder holds."""
-    found: dict[str, Any] = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    return found
 
 
 def _from_csv(

@@ -1,20 +1,18 @@
-"""What a run came to: its tables and figures, read from its folder."""
+"""The results of a run: tables, figures and verdicts, read from its folder."""
 
 from __future__ import annotations
 
 import hashlib
-import re
-import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import pandas as pd
 
 from gridpeers.runs import frames
-from gridpeers.runs.run_folder import RunFolder, empty_folder
+from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
@@ -25,41 +23,20 @@ from scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
 from scenarios.results.plots.drawing import Drawing, drawing_of
-from scenarios.results.run_files import FolderError, refusal, shown, write_whole
 from scenarios.schema import scenario_model as model
 from scenarios.schema.plugin_keys import claims_of
 from wire.messages import PlantEvent
-from wire.printable import printable
 from wire.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-T = TypeVar("T")
 
-
-class Results(Mapping[str, "Result"]):
-    """Results of several cases of one run, by case.
-
-    It is made by `Scenario.run()` and by `gridpeers.read`.
-    """
+class _FromFolder:
+    """The part of a result that one case and all cases of a run share."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         self._folder, self._spec, self._feeder = folder, spec, feeder
-        self.numbers = frames.read_metrics(folder.path)
-        """What metrics.json holds."""
-        self._results = {case: Result(self, case) for case in spec.cases}
-
-    def __getitem__(self, case: str) -> Result:
-        if case not in self._results:
-            raise KeyError(f'no case "{case}"; {suggestion(str(case), self._results, "cases")}')
-        return self._results[case]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._results)
-
-    def __len__(self) -> int:
-        return len(self._results)
 
     @property
     def spec(self) -> model.ScenarioModel:
@@ -72,14 +49,42 @@ class Results(Mapping[str, "Result"]):
         return self._folder.path
 
     @property
+    def numbers(self) -> dict[str, Any]:
+        """The content of metrics.json."""
+        return self._folder.numbers
+
+    @property
     def driver(self) -> str:
-        """What ran it: "inprocess", "processes", or "by hand"."""
+        """Driver of the run: "inprocess", "processes", or "by hand"."""
         return str(self.numbers["driver"])
 
     @property
     def report(self) -> str:
-        """What the command `gridpeers run` prints at the end; it names the folder if that stays."""
-        return _read(self.folder / "report.txt", lambda file: file.read_text(encoding="utf-8"))
+        """Text that `gridpeers run` prints at the end, of all cases; it names the folder if that stays."""
+        return self._folder.report
+
+
+class Results(_FromFolder, Mapping[str, "Result"]):
+    """Results of several cases of one run, by case.
+
+    `Scenario.run()` and `gridpeers.read` make it.
+    """
+
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
+        super().__init__(folder, spec, feeder)
+        self._cases = self.numbers["cases"]
+        self._results = {case: Result(folder, spec, feeder, self, case) for case in spec.cases}
+
+    def __getitem__(self, case: str) -> Result:
+        if case not in self._results:
+            raise KeyError(f'no case "{case}"; {suggestion(str(case), self._results, "cases")}')
+        return self._results[case]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._results)
+
+    def __len__(self) -> int:
+        return len(self._results)
 
     @property
     def metrics(self) -> pd.DataFrame:
@@ -100,7 +105,7 @@ class Results(Mapping[str, "Result"]):
         ----------
         figure : str
             Name of a figure of the run folder: "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage",
-            "power_GFM", "power_GFL", and those that belong to what happens in this scenario.
+            "power_GFM", "power_GFL", and those that belong to the events of this scenario.
 
         Raises
         ------
@@ -129,20 +134,11 @@ class Results(Mapping[str, "Result"]):
         """
         from scenarios.results.plots.run_figures import draw_all
 
-        folder = empty_folder(folder)
-        try:
-            shutil.copytree(self.folder, folder, dirs_exist_ok=True)
-            text = re.sub(r"\nResults: [^\n]*/\n\Z", "", self.report)
-            write_whole(folder / "report.txt", f"{text}\nResults: {shown(folder)}/\n")
-            if not (folder / "plots").exists():
-                draw_all(self.drawing(self._results), folder / "plots")
-        except OSError as error:
-            raise FolderError(refusal(folder, error)) from error
-        return folder
+        return self._folder.save(folder, lambda plots: draw_all(self.drawing(self._results), plots))
 
     @cached_property
     def findings(self) -> Findings:
-        """What was measured, as claims judge it (`gridpeers.benchmarks`); of a run that followed its scenario.
+        """The measures, as claims judge them (`gridpeers.benchmarks`); of a run that followed its scenario.
 
         Raises
         ------
@@ -156,7 +152,7 @@ class Results(Mapping[str, "Result"]):
             came = windows(as_they_came(self._spec, _plant_events(result)), self._spec.time.end_s)
             saved = {
                 label: of["messages_saved"]
-                for label, of in frames.windows_of(self.numbers["cases"][case]).items()
+                for label, of in frames.windows_of(self._cases[case]).items()
                 if of.get("messages_saved")
             }
             cases[case] = CaseRecord(history=result.record, windows=came, messages_saved=saved)
@@ -185,37 +181,23 @@ class Results(Mapping[str, "Result"]):
         return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"
 
 
-class Result:
-    """What one case came to.
+class Result(_FromFolder):
+    """Result of one case.
 
-    It is made by `Scenario.run(case)` and by `gridpeers.read`. Its tables are read from the run folder when they are
-    first asked for.
+    `Scenario.run(case)` and `gridpeers.read` make it. Its tables are read from the run folder when they are first asked
+    for.
     """
 
-    def __init__(self, run: Results, case: str) -> None:
+    def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder, run: Results, case: str) -> None:
+        super().__init__(folder, spec, feeder)
         self._run = run
         self.case = case
         """Name of the case."""
 
-    @property
-    def spec(self) -> model.ScenarioModel:
-        """The scenario as it was run."""
-        return self._run.spec
-
-    @property
-    def folder(self) -> Path:
-        """Folder with the files of the run (docs/results.md)."""
-        return self._run.folder
-
-    @property
-    def driver(self) -> str:
-        """What ran it: "inprocess", "processes", or "by hand"."""
-        return self._run.driver
-
     @cached_property
     def record(self) -> History:
         """The recorded rows as numpy arrays, by quantity."""
-        return _read(self.folder / self.case / "history.csv", read_history)
+        return self._folder.read(f"{self.case}/history.csv", read_history)
 
     @cached_property
     def history(self) -> pd.DataFrame:
@@ -238,17 +220,17 @@ class Result:
     @cached_property
     def events(self) -> pd.DataFrame:
         """What happened in the plant and to the agents: time t (s), kind, subject, text."""
-        return _read(self.folder / self.case / "events.csv", frames.events_frame)
+        return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
 
     @cached_property
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
-        return _read(self.folder / self.case / "links.csv", frames.links_frame)
+        return self._folder.read(f"{self.case}/links.csv", frames.links_frame)
 
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the bytes of the history: equal runs have equal ones."""
-        return hashlib.sha256(_read(self.folder / self.case / "history.csv", Path.read_bytes)).hexdigest()
+        return hashlib.sha256(self._folder.read(f"{self.case}/history.csv", Path.read_bytes)).hexdigest()
 
     @property
     def links_sha256(self) -> str:
@@ -264,11 +246,6 @@ class Result:
     def verdicts(self) -> tuple[Verdict, ...]:
         """Claims of the scenario's benchmark, judged, of all cases of the run; see `Results.verdicts`."""
         return self._run.verdicts
-
-    @property
-    def report(self) -> str:
-        """What the command `gridpeers run` prints at the end, of all cases of the run."""
-        return self._run.report
 
     def plot(self, figure: str = "overview") -> Figure:
         """Draw the case.
@@ -295,26 +272,11 @@ class Result:
 
     @property
     def _whole(self) -> dict[str, Any]:
-        """What metrics.json holds of the case."""
-        return self._run.numbers["cases"][self.case]  # type: ignore[no-any-return]
+        """The content of metrics.json on the case."""
+        return self.numbers["cases"][self.case]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
-
-
-def _read(file: Path, reader: Callable[[Path], T]) -> T:
-    """Read a file of a run, which somebody may have removed or changed since.
-
-    Raises
-    ------
-    FolderError
-        If it cannot be read.
-    """
-    try:
-        return reader(file)
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        raise FolderError(f"{file}: cannot be read: {printable(why, 200)}; run the scenario again") from error
 
 
 def _plant_events(result: Result) -> list[PlantEvent]:

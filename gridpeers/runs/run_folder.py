@@ -1,15 +1,22 @@
-"""The folder of a run, which goes with its results if nobody has asked to keep it."""
+"""The folder of a run as Python reads it; a temporary one goes with its results if nobody has asked to keep it."""
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import weakref
+from collections.abc import Callable
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from scenarios.results.run_files import FolderError, refusal
+from scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
 from wire.path_text import is_no_path
+from wire.printable import printable
+
+T = TypeVar("T")
 
 
 class RunFolder:
@@ -32,6 +39,51 @@ class RunFolder:
         if self._removal is not None:
             self._removal.detach()
 
+    def read(self, name: str, reader: Callable[[Path], T]) -> T:
+        """Read a file of the run, which somebody may have removed or changed since.
+
+        Raises
+        ------
+        FolderError
+            If it cannot be read.
+        """
+        file = self.path / name
+        try:
+            return reader(file)
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or str(error)
+            raise FolderError(f"{file}: cannot be read: {printable(why, 200)}; run the scenario again") from error
+
+    @cached_property
+    def numbers(self) -> dict[str, Any]:
+        """The content of metrics.json."""
+        numbers: dict[str, Any] = json.loads((self.path / "metrics.json").read_text(encoding="utf-8"))
+        return numbers
+
+    @property
+    def report(self) -> str:
+        """The content of report.txt."""
+        return self.read("report.txt", lambda file: file.read_text(encoding="utf-8"))
+
+    def save(self, folder: str | Path, draw: Callable[[Path], object]) -> Path:
+        """Copy it into a new or empty folder, and draw the figures there if it has none; return that folder.
+
+        Raises
+        ------
+        FolderError
+            If there is something in the folder, or it cannot be written.
+        """
+        new = new_home(folder)
+        try:
+            shutil.copytree(self.path, new, dirs_exist_ok=True)
+            text = re.sub(r"\nResults: [^\n]*/\n\Z", "", self.report)
+            write_whole(new / "report.txt", f"{text}\nResults: {shown(new)}/\n")
+            if not (new / "plots").exists():
+                draw(new / "plots")
+        except OSError as error:
+            raise FolderError(refusal(new, error)) from error
+        return new
+
 
 def as_folder(it: Any) -> Path:
     """Return the path of a folder that somebody has named.
@@ -46,20 +98,12 @@ def as_folder(it: Any) -> Path:
     return Path(it)
 
 
-def empty_folder(it: str | Path) -> Path:
-    """Make a folder for results.
+def new_home(it: str | Path) -> Path:
+    """Make a folder for results, and return its absolute path: the reader of the results may change directories.
 
     Raises
     ------
     FolderError
-        If there is something in it, or it cannot be made.
+        If it is no path, there is something in it, or it cannot be made.
     """
-    folder = as_folder(it)
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            kind = "is not empty" if folder.is_dir() else "is a file"
-            raise FolderError(f"{folder}: this {kind}; give a new or an empty folder")
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FolderError(refusal(folder, error)) from error
-    return folder.absolute()  # whoever reads the results may have gone elsewhere meanwhile
+    return empty_folder(as_folder(it)).absolute()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Result, Results
-from gridpeers.runs.run_folder import RunFolder, as_folder, empty_folder
+from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from plant.tables import read_feeder
 from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
@@ -61,7 +61,7 @@ def run(
             text = f"there is nowhere for temporary files: {error.strerror}; say folder=..., or set TMPDIR"
             raise FolderError(text) from error
     else:
-        home = RunFolder(empty_folder(folder))
+        home = RunFolder(new_home(folder))
     request = Request(
         scenario=spec,
         feeder=scenario.feeder,

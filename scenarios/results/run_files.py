@@ -1,4 +1,4 @@
-"""The run folder: where it is, that it is empty, what state the run in it is in."""
+"""The run folder: its place, that it is empty, and the state of its run."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ RUNS = Path("runs")
 
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""What a system says that takes no more bytes, whatever is done to the file."""
+"""Errors of a system that takes no more bytes, whatever is done to the file."""
 
 _GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)
-"""What it says of a folder that was removed, or closed to us, while it was written to."""
+"""Errors of a folder that was removed, or closed to us, while it was written to."""
 
 
 class FolderError(ValueError):
@@ -29,7 +29,7 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     Parameters
     ----------
     out : Path or None
-        What the user asked for; None makes `runs/<scenario>/<time>`, and `runs/<scenario>/latest` point to it.
+        The user's choice; None makes `runs/<scenario>/<time>`, and `runs/<scenario>/latest` point to it.
     scenario : str
         Name of the scenario.
     now : datetime
@@ -40,20 +40,31 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     FolderError
         If the folder has something in it, is a file, or cannot be made. Nothing is written then.
     """
-    folder = out if out is not None else _free(RUNS / scenario, now)
-    try:
-        if folder.exists() and not folder.is_dir():
-            raise FolderError(f"--out {folder}: this is a file; give a new or an empty folder")
-        if folder.is_dir() and any(folder.iterdir()):
-            raise FolderError(f"--out {folder}: the folder is not empty; give a new or an empty one")
-        folder.mkdir(parents=True, exist_ok=True)
-        set_status(folder, "running")
-    except OSError as error:
-        raise FolderError(
-            f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
-        ) from None
+    folder = empty_folder(out if out is not None else _free(RUNS / scenario, now), "--out", "running")
     if out is None:
         _point_latest(folder)
+    return folder
+
+
+def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
+    """Make a folder for results with a status, and return it; the option that names it is part of the errors.
+
+    Raises
+    ------
+    FolderError
+        If there is something in it, it is a file, or it cannot be made or written.
+    """
+    where, other = f"{option} {folder}".strip(), f"give another folder by {option}" if option else "give another folder"
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise FolderError(f"{where}: this is a file; give a new or an empty folder")
+        if folder.is_dir() and any(folder.iterdir()):
+            raise FolderError(f"{where}: the folder is not empty; give a new or an empty one")
+        folder.mkdir(parents=True, exist_ok=True)
+        if status:
+            set_status(folder, status)
+    except OSError as error:
+        raise FolderError(f"{folder}: cannot be made or written: {error.strerror}; {other}") from None
     return folder
 
 
@@ -79,7 +90,7 @@ def no_room(error: BaseException) -> bool:
 
 
 def refusal(folder: Path, error: OSError) -> str:
-    """Return what of a folder could not be written, and why.
+    """Return the file of a folder that could not be written, and the reason.
 
     Examples
     --------
