@@ -1,8 +1,8 @@
-"""Which GFL settings settle on this feeder, for few and many GFL per GFM: the reason for the plant's defaults.
+"""GFL settings that settle on this feeder, for few and many GFL per GFM: the reason for the plant's defaults.
 
 Each row islands the feeder at 0.1 s with some inverters removed and prints the largest peak-to-peak of any inverter's
 power in the windows 0.5-1 s, 2-2.5 s and 5.5-6 s. A settled plant has zeros in the last; "no solution" means that the
-network could not carry what the inverters did. Protection is off, as it would trip the inverters that swing.
+network could not carry the inverters' powers. Protection is off, as it would trip the inverters that swing.
 
     .venv/bin/python bench/damping.py
 """

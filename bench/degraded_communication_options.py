@@ -1,4 +1,4 @@
-"""The tables of docs/handling.md: what each option of `[handling]` costs without faults, and what it gains with them.
+"""The tables of docs/handling.md: the cost of each option of `[handling]` without faults, and its gain with them.
 
 .venv/bin/python bench/degraded_communication_options.py              # all, some 4 minutes on two cores
 .venv/bin/python bench/degraded_communication_options.py saturation   # or parts: sound, graphs, faults, cut, saturation
@@ -41,7 +41,7 @@ FAULTS = {
     "0.5 s late": ({"delay": 0.5}, ("full",)),
     "90 % lost": ({"loss": 0.9}, ("full", "reduced", "path")),
 }
-"""What all links do, and on which graphs."""
+"""Fault of all links, and the graphs."""
 
 
 @gp.metric("t_Q_s")

@@ -1,4 +1,4 @@
-"""What emulated links cost: a lock-step run in one process with them against the same run without.
+"""The cost of emulated links: a lock-step run in one process with them against the same run without.
 
 In one process there is no transport, so that netem's part is as large as it can be. Times are processor time.
 

@@ -74,9 +74,9 @@ class Peer:
                     if payload == b"1":
                         complete.add(who)
 
-    def wait(self, wanted: dict[str, int]) -> None:
+    def wait(self, counts: dict[str, int]) -> None:
         """Return when so many messages have come on each key; sleep until as many are there as are missing."""
-        while missing := sum(max(0, count - self.seen[key]) for key, count in wanted.items()):
+        while missing := sum(max(0, count - self.seen[key]) for key, count in counts.items()):
             for _, key, _, _ in self.session.inbox.take(missing, 30.0):
                 self.seen[key] += 1
 

@@ -1,4 +1,4 @@
-"""How alpha and beta of the reduced communication graph were found: a grid, and the best point by a rule told before.
+"""The search for alpha and beta of the reduced communication graph: a grid, and the best point by a rule set before.
 
 The paper re-tunes alpha and beta for its reduced graph and prints neither. Here each point of a grid is run on the
 islanding of `scenarios/catalogue/reduced-communication.toml` with the clustered graph, and judged by what Table IV

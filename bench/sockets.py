@@ -1,4 +1,4 @@
-"""What 2 % loss on the wire becomes: delay on TCP, loss on UDP. A figure for docs/netem.md, and its numbers.
+"""2 % loss on the wire is delay on TCP and loss on UDP. A figure for docs/netem.md, and its numbers.
 
 Two Zenoh sessions over TCP and two over UDP, a message of 100 bytes each per control period, at the same times: on a
 loopback that loses nothing, on one where the kernel loses 2 % of the packets (in a network namespace, by `tc`), and
@@ -47,7 +47,7 @@ MessageTimes = list[float]
 def lose(loss: float) -> None:
     """Have the kernel drop a share of the packets that arrive at this namespace's loopback, by a BPF filter.
 
-    A filter, as not every kernel has the queueing discipline netem; on arrival, as TCP is told of a packet that is
+    A filter, as not every kernel has the queueing discipline netem; on arrival, as TCP learns of a packet that is
     dropped on its way out. The program loads a random number of 32 bits, and drops the packet if it is below a bound.
     """
     program = f"4,32 0 0 4294963256,53 1 0 {round(loss * 2**32)},6 0 0 2,6 0 0 0"
@@ -95,7 +95,7 @@ def by_relay(loss: float, count: int, seed: int) -> list[MessageTimes]:
 
 
 def describe(label: str, times: MessageTimes) -> str:
-    """Return one line of numbers: the lost are not among those whose times are told."""
+    """Return one line of numbers; the times are those of the messages that came."""
     came = np.array([time for time in times if time < LOST]) * 1e3
     p50, p90, p99 = np.percentile(came, [50, 90, 99])
     lost = len(times) - len(came)
@@ -106,7 +106,7 @@ def describe(label: str, times: MessageTimes) -> str:
 
 
 def draw(results: dict[str, list[MessageTimes]], path: Path) -> None:
-    """Share of messages that are not there yet, over the time since they were sent."""
+    """Draw the share of messages that are not there yet, over the time since they were sent."""
     page: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False}
     with mpl.rc_context(page):
         figure = Figure(figsize=(8.0, 3.4), layout="constrained")

@@ -1,4 +1,4 @@
-"""How fast one case of the islanding experiment runs, and where the time goes.
+"""The speed of one case of the islanding experiment, and the parts of its time.
 
 Three runs of the same 350 ticks in one go, so that ratios hold whatever else the machine does: all in one process, with
 processes over Zenoh, and bare Zenoh with empty messages, the floor under any lock-step (`bench/floor.py`).

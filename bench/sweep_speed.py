@@ -1,4 +1,4 @@
-"""How many runs a second a sweep does on all cores, against a plain loop over some of the same runs.
+"""Runs per second of a sweep on all cores, against a plain loop over some of the same runs.
 
 The loop is what anybody would write: change the scenario, run it, measure it, one after the other, a new plant each
 time. The sweep reuses plants. Half of the loop runs before the sweep and half after it, so that the ratio holds

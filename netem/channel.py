@@ -1,7 +1,7 @@
 """One directed link: from a message's number, time and size to its fate. Pure.
 
-What is done, in this order: **cut, partition, flap** (dropped, or kept until the link is up), **loss**, faults of
-somebody's own in the order of their names, **rate** (a queue, tail drop), **slots**, **delay**, order (FIFO),
+Faults act in this order: **cut, partition, flap** (dropped, or kept until the link is up), **loss**, user-defined
+faults in the order of their names, **rate** (a queue, tail drop), **slots**, **delay**, order (FIFO),
 **duplicate**, **corrupt**. So a lost message takes no room in the queue. Which entries hold is decided by the time at
 which the message was sent.
 """
@@ -27,13 +27,13 @@ FOREVER = math.inf
 
 
 class Fate(NamedTuple):
-    """What becomes of a message."""
+    """The fate of a message."""
 
     deliveries: tuple[tuple[float, int | None], ...] = ()
     """Of each copy the delay (s since it was sent; infinite while a cut without an end keeps it) and the bit that is
     flipped, None if none is."""
     reason: str = ""
-    """Why it was dropped: "cut", "partition", "flap", "loss", "fault" (somebody's own) or "queue"; empty if
+    """Why it was dropped: "cut", "partition", "flap", "loss", "fault" (user-defined) or "queue"; empty if
     it was not."""
     held_until: float = NEVER
     """Until when (s of run time) a cut keeps it, infinite for a cut without an end; minus infinity if none does."""
@@ -80,7 +80,7 @@ class Channel:
         self._samplers: dict[Span, Callable[..., Any]] = {}
         self._from, self._to = math.inf, -math.inf
         self.failures: list[str] = []
-        """Sentences on faults of somebody's own that failed."""
+        """Sentences on user-defined faults that failed."""
         self.checksum = False
         """Whether the link finds flipped bits by itself, at the time of the message judged last."""
 
@@ -90,7 +90,7 @@ class Channel:
         return not self.schedule.spans
 
     def reschedule(self, schedule: FaultSchedule, *, rewind: bool) -> None:
-        """Take another schedule, for messages not judged yet.
+        """Use another schedule for the messages that follow.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Channel:
             The new one.
         rewind : bool
             Whether messages that a cut of the old schedule keeps will be judged again, in order and before any other:
-            what is remembered of them is forgotten.
+            their effect on queue and order is undone.
         """
         self.schedule = schedule
         self._from, self._to = math.inf, -math.inf
@@ -106,14 +106,14 @@ class Channel:
             (self._busy_until, self._last), self._before_hold = self._before_hold, None
 
     def judge(self, seq: int, t: float, size: int) -> Fate:
-        """Fate of a message.
+        """Return the fate of a message.
 
         Parameters
         ----------
         seq : int
             Its number, by which it finds its random numbers.
         t : float
-            When it was sent (s of run time), by which it finds what is scheduled.
+            When it was sent (s of run time), which decides the faults that act on it.
         size : int
             Its length (bytes).
         """
@@ -164,7 +164,7 @@ class Channel:
         return (first, (delay + self._extra_delay, None if bit is None else bit(seq, 1, size)))
 
     def _enter(self, t: float) -> None:
-        """Make ready what holds at time t, until something else does."""
+        """Prepare the faults that act at time t, until the next change."""
         self._from, self._to, active = self.schedule.at(t)
         self._gated = any(kind in active for kind in GATES)
         if not self._gated:
@@ -181,7 +181,7 @@ class Channel:
         self._extra_delay = models["duplicate"].extra_delay_s if "duplicate" in models else 0.0
 
     def _sampler(self, active: dict[str, Span], kind: str) -> Callable[..., Any] | None:
-        """What draws for a kind now; made once a span, so that chains go on from where they are."""
+        """Return the sampler of a kind now; made once a span, so that chains go on from where they are."""
         span = active.get(kind)
         if span is None:
             return None
@@ -190,7 +190,7 @@ class Channel:
         return self._samplers[span]
 
     def _own_judge(self, span: Span) -> Judge:
-        """How a fault of somebody's own judges; one object a span, like the samplers."""
+        """Return the judge of a user-defined fault; one object a span, like the samplers."""
         if span not in self._samplers:
             stream = Stream(self._seed, *self.link, span.kind)
             self._samplers[span] = judge_of(span.model, *self.link, stream, self.failures.append)

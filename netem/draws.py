@@ -3,7 +3,7 @@ r"""Random numbers that are looked up, not drawn: a function of seed, link, purp
 .. math:: u = \left(\lfloor h / 2^{12} \rfloor + \tfrac12\right) 2^{-52}, \qquad
           h = \mathrm{BLAKE2b}_{64}(\text{seed}, \text{src}, \text{dst}, \text{purpose}; \text{seq}, \text{index})
 
-So nothing that happens to one message, on one link, for one purpose shifts a number of another: adding an agent, a
+So no message, link or purpose shifts a number of another: adding an agent, a
 fault or a cut changes no other fate, and a message has the same fate in simulated and in wall-clock time, seen by
 whatever process, in whatever order. A generator with a state, such as `random.Random`, would have to draw equally often
 whatever is configured; a counter need not (Salmon et al.).
@@ -34,7 +34,7 @@ class Stream:
     src, dst : str
         The link.
     purpose : str
-        Kind of the fault that asks, e.g. "loss". What two faults of one kind ask at one index is the same number.
+        Kind of the fault, e.g. "loss". Two faults of one kind get the same number at one index.
 
     Examples
     --------
@@ -53,15 +53,15 @@ class Stream:
         self._state = blake2b(b"".join(len(part).to_bytes(4, "little") + part for part in parts), digest_size=8)
 
     def uniform(self, seq: int, index: int = 0) -> float:
-        """Number in the open interval (0, 1), on a grid of 2^-52."""
+        """Return a number in the open interval (0, 1), on a grid of 2^-52."""
         state = self._state.copy()
         state.update(_ROW(seq, index))
         return ((int.from_bytes(state.digest(), "little") >> 12) + 0.5) * 2.0**-52
 
     def normal(self, seq: int, index: int = 0) -> float:
-        """Standard normal number, by the inverse of its distribution function."""
+        """Return a standard normal number, by the inverse of its distribution function."""
         return _STANDARD.inv_cdf(self.uniform(seq, index))
 
     def below(self, bound: int, seq: int, index: int = 0) -> int:
-        """Whole number from 0 to bound - 1; bound at least 1 and far below 2^52."""
+        """Return a whole number from 0 to bound - 1; bound at least 1 and far below 2^52."""
         return int(self.uniform(seq, index) * bound)

@@ -1,4 +1,4 @@
-"""All faults of one link in the order of their precedence, and what holds at a time."""
+"""The faults of one link over time, in the order of their precedence."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class FaultSchedule:
     ----------
     spans : Iterable[Span]
         Faults, those of a scenario first. Where two of one kind hold at once, the later one in this order counts; in
-        a scenario that is a problem, but what somebody does live takes precedence over the scenario while it lasts.
+        a scenario that is a problem, but a live command takes precedence over the scenario while it lasts.
     """
 
     def __init__(self, spans: Iterable[Span]) -> None:
         self.spans = tuple(span for span in spans if span.to_s > span.from_s)
 
     def at(self, t: float) -> Segment:
-        """What holds at time t (s)."""
+        """Return the entries that hold at time t (s)."""
         now = t + INSTANT
         bounds = [bound for span in self.spans for bound in (span.from_s, span.to_s)]
         return Segment(
@@ -52,10 +52,10 @@ class FaultSchedule:
         )
 
     def passes(self, t: float) -> tuple[float, str]:
-        """When a message of time t (s) gets past cuts, and "", or why it does not.
+        """Return when a message of time t (s) gets past cuts, and "", or why it does not.
 
         The time is infinite for a message kept by a cut without an end. A kept message is let go when nothing keeps
-        it any more, and meets whatever holds then; it is lost when a cut that loses begins meanwhile.
+        it any more, and meets the faults of that time; it is lost when a cut that loses begins meanwhile.
         """
         while True:
             down = [
@@ -80,11 +80,11 @@ class FaultSchedule:
             t = until
 
     def with_spans(self, spans: Iterable[Span]) -> FaultSchedule:
-        """The schedule with more entries, which take precedence."""
+        """Return the schedule with more entries, which take precedence."""
         return FaultSchedule((*self.spans, *spans))
 
     def healed(self, t: float, kinds: Collection[str] | None = None) -> FaultSchedule:
-        """The schedule without what holds at time t (s), from then on; what is to begin later stays.
+        """Return the schedule without the entries that hold at time t (s), from then on; later ones stay.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class FaultSchedule:
         )
 
     def flat(self) -> tuple[Span, ...]:
-        """The same without precedence: of each kind, spans that do not overlap, in the order of kind and time."""
+        """Return the same without precedence: spans that do not overlap within a kind, by kind and time."""
         found: list[Span] = []
         for kind in sorted({span.kind for span in self.spans}):
             own = [span for span in self.spans if span.kind == kind]

@@ -1,4 +1,4 @@
-"""What became of the messages of one link: counts that close, and the verdicts with their hash."""
+"""The verdicts on the messages of one link, with their counts, which close, and their hash."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ Outcome = float | str | tuple[tuple[float, Count | None], ...]
 
 
 class LinkTrace(msgspec.Struct, frozen=True, array_like=True):
-    """Verdicts of one link, in the order in which they fell.
+    """Verdicts on the messages of one link, in their order.
 
     A message that was judged anew, because the cut that kept it was healed early, has a second row, which counts.
     """
 
     src: Name
-    """Who sent."""
+    """Sender."""
     dst: Name
-    """Who received."""
+    """Receiver."""
     seq: tuple[Count, ...]
     """Numbers of the messages."""
     t: tuple[Time, ...]
     """When each was sent (s of run time)."""
     outcome: tuple[Outcome, ...]
-    """What became of each."""
+    """Outcome of each."""
 
     def __post_init__(self) -> None:
         if not len(self.seq) == len(self.t) == len(self.outcome):
@@ -41,7 +41,7 @@ class LinkTrace(msgspec.Struct, frozen=True, array_like=True):
 
 
 class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
-    """How many messages of one link fared how: sent + duplicated = delivered + dropped + in_flight."""
+    """Counts of the messages of one link: sent + duplicated = delivered + dropped + in_flight."""
 
     sent: Count
     """Messages that were judged here."""
@@ -58,12 +58,12 @@ class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def closes(self) -> bool:
-        """Whether nothing is unaccounted for."""
+        """Whether every message is accounted for."""
         return self.sent + self.duplicated == self.delivered + sum(self.dropped.values()) + self.in_flight
 
 
 class Ledger:
-    """Book of one link.
+    """The verdicts and counts of one link.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Ledger:
         self._sha = sha256()
 
     def note(self, seq: int, t: float, fate: Fate) -> None:
-        """Write a verdict down."""
+        """Add a verdict."""
         deliveries = fate.deliveries
         outcome: Outcome
         if not deliveries:
@@ -98,7 +98,7 @@ class Ledger:
             self._fold()
 
     def counts(self, in_flight: int) -> LinkCounts:
-        """The counts, with what somebody counted in flight."""
+        """Return the counts; the caller has counted the messages in flight."""
         return LinkCounts(
             sent=self.sent,
             duplicated=self.duplicated,
@@ -109,7 +109,7 @@ class Ledger:
         )
 
     def take(self, src: str, dst: str) -> LinkTrace | None:
-        """Verdicts since last taken, None if there were none."""
+        """Return the verdicts since the last call, None if there are none."""
         self._fold()
         rows, self._kept = self._kept, []
         if not rows:
@@ -118,12 +118,12 @@ class Ledger:
         return LinkTrace(src, dst, seq, t, outcome)
 
     def digest(self) -> bytes:
-        """Hash of all verdicts so far, whenever they were taken; empty if there were none."""
+        """Return the hash of all verdicts so far; empty if there are none."""
         self._fold()
         return self._sha.digest() if self._sha.digest() != _NOTHING else b""
 
     def _fold(self) -> None:
-        """Hash what is new, row by row, so that it does not matter when."""
+        """Hash the new verdicts row by row, so that the times of these calls do not matter."""
         self._sha.update(b"".join(map(_encode, self._new)))
         if self._keep:
             self._kept += self._new
@@ -131,7 +131,7 @@ class Ledger:
 
 
 def combined(digests: Mapping[str, str] | Iterable[tuple[str, str]]) -> str:
-    """One hash (hex) of several parts' hashes, whatever their order: of the receivers of a run, by their names.
+    """Return one hash (hex) of the hashes of a run's receivers, by their names, in any order.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""All links into one receiver: what is offered is judged, kept as long as it must, and handed out when it is due. Pure.
+"""All links into one receiver: messages are judged, delayed, and handed out when they are due. Pure.
 
 A driver calls `offer` for each message that has come and `due` when the time is; both take times as arguments (s of run
 time). `until` says when the next message is due, so that a wall-clock driver can sleep until then.
@@ -25,14 +25,14 @@ from wire.links import Arrival
 from wire.messages import AnyMessage
 
 MOST_FAILURES = 8
-"""Faults of somebody's own that failed and are told of in one report, which must not become too long."""
+"""User-defined faults that failed and are named in one report, which must not become too long."""
 
 NANO = 1e9
 """Arrivals are ordered by whole nanoseconds: so t_k + d and t_j meet where their decimals do, whatever binary does."""
 
 
 class _Special(NamedTuple):
-    """What few messages on their way have."""
+    """Data that few messages on their way have."""
 
     copy: int
     bit: int | None
@@ -70,9 +70,9 @@ class Receiver:
     name : str
         The receiver: an inverter, or the plant.
     netem : Netem
-        What the run's links do.
+        Faults of the run's links.
     microgrids : Mapping[str, str]
-        Microgrid of every inverter that is known, in the order of their table; see `meet` for others.
+        Microgrid of every known inverter, in the order of their table; see `meet` for others.
     keep_trace : bool
         Whether verdicts are kept for `take_trace`; their hash is in any case.
 
@@ -96,21 +96,21 @@ class Receiver:
         self._number = 0
 
     def meet(self, src: str, microgrid: str) -> None:
-        """Learn in which microgrid somebody stands, of whom nothing was offered yet."""
+        """Learn the microgrid of a sender before its first message."""
         self._microgrids.setdefault(src, microgrid)
 
     def touched(self, src: str) -> bool:
-        """Whether a fault may ever act on the link from somebody: if not, its messages need not come here at all."""
+        """Return whether a fault may ever act on the link from a sender; if not, its messages need not come here."""
         inbound = self._links.get(src) or self._link(src)
         return not inbound.is_clear
 
     def holding(self, src: str, t: float) -> dict[str, Span]:
-        """What the link from somebody does to messages sent at t (s of run time), by kind."""
+        """Return the faults that act on messages that a sender sends at t (s of run time), by kind."""
         channel = self._link(src).channel
         return {} if channel.is_clear else channel.schedule.at(t).active
 
     def was_impaired(self, src: str, t: float) -> bool:
-        """Whether the link from somebody has had a fault by t (s of run time), one that holds now included."""
+        """Return whether the link from a sender has had a fault by t (s of run time), the present one included."""
         return any(span.from_s <= t + INSTANT for span in self._link(src).channel.schedule.spans)
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
@@ -119,13 +119,13 @@ class Receiver:
         Parameters
         ----------
         src : str
-            Who sent it.
+            Its sender.
         seq : int
             Its number: it finds its random numbers by it.
         t : float
-            When it was sent (s of run time): what is scheduled counts then.
+            When it was sent (s of run time), which decides the faults that act on it.
         at : float
-            When it is here without faults (s of run time, on the receiver's clock); t in simulated time.
+            When it arrives without faults (s of run time, on the receiver's clock); t in simulated time.
         payload : bytes
             The message as it came.
         message : AnyMessage, optional
@@ -139,7 +139,7 @@ class Receiver:
             self._judge(inbound, src, seq, t, at, (payload, message))
 
     def due(self, now: float) -> list[Arrival]:
-        """What has arrived by `now` (s of run time), in the order of arrival; at one time, of number and sender."""
+        """Return the messages that have arrived by `now` (s of run time), by arrival, then number and sender."""
         heap = self._heap
         if not heap:
             return []
@@ -170,12 +170,12 @@ class Receiver:
         Returns
         -------
         tuple[str, ...]
-            Senders whose links to this receiver it concerns, of those heard so far.
+            Senders so far whose links to this receiver it changes.
         """
         return self._apply(msgspec.structs.replace(fault, from_s=max(t, fault.from_s)), t)
 
     def heal(self, on: str, t: float, kinds: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """End what holds on links at time t (s), or only some kinds of it; kept messages go on then.
+        """End the faults of links at time t (s), or some kinds of them; kept messages go on then.
 
         Returns
         -------
@@ -200,7 +200,7 @@ class Receiver:
         return tuple(concerned)
 
     def _take_kept(self, src: str, t: float) -> list[tuple[int, _Content, _Special]]:
-        """Take back, to be judged anew, what a cut keeps beyond t: number, message and times."""
+        """Take back the messages that a cut keeps beyond t, to be judged anew: number, message and times."""
         found = []
         for waiting in (self._heap, self._kept):
             for entry in sorted(waiting):
@@ -216,25 +216,25 @@ class Receiver:
             self._links[src].story = self._links[src].due = NEVER
         return sorted(found, key=lambda entry: entry[2].t)
 
-    # ---------------------------------------------------------------- what was
+    # ---------------------------------------------------------------- for reports
 
     @property
     def dropped(self) -> int:
-        """Messages that were not delivered and never will be, of all senders."""
+        """Number of messages of all senders that are lost."""
         return sum(sum(inbound.ledger.dropped.values()) for inbound in self._links.values())
 
     def counts(self) -> dict[str, LinkCounts]:
-        """How the messages of each sender fared."""
+        """Return the counts of each sender's messages."""
         flying = [entry[2] for entry in (*self._heap, *self._kept)]
         return {src: inbound.ledger.counts(flying.count(src)) for src, inbound in sorted(self._links.items())}
 
     def take_trace(self) -> tuple[LinkTrace, ...]:
-        """Verdicts since last taken, by sender; links that no fault ever touched have none."""
+        """Return the verdicts since the last call, by sender; links without a fault have none."""
         found = (inbound.ledger.take(src, self.name) for src, inbound in sorted(self._links.items()))
         return tuple(trace for trace in found if trace is not None)
 
     def take_failures(self) -> tuple[str, ...]:
-        """Sentences since last taken on faults of somebody's own that failed."""
+        """Return sentences since the last call on user-defined faults that failed."""
         found = [text for _, inbound in sorted(self._links.items()) for text in inbound.channel.failures]
         for inbound in self._links.values():
             inbound.channel.failures.clear()
@@ -282,8 +282,8 @@ class Receiver:
     ) -> None:
         """Keep a copy until it is due.
 
-        What netem leaves in order stays so: the way to this process, which a wall-clock `at` holds, never makes one
-        message overtake another.
+        Messages that the faults leave in order stay so: the way to this process, part of a wall-clock `at`, never
+        makes one message overtake another.
         """
         self._number += 1
         if delay == FOREVER:

@@ -6,7 +6,7 @@ has the generating function
 .. math:: E[z^K] = v\, A(z)^n\, 1
 
 which is evaluated at the M-th roots of unity and turned back by an FFT. That gives P(K = k mod M), which is the law
-itself where M is more than the range that K can be found in.
+itself where M is more than the range of K.
 
 The normal approximation is no substitute: with p = 0.0005 and r = 0.25 (`lte`) 450 messages see one burst in four runs
 or five, and a single burst of ten messages is eleven standard deviations off.
@@ -41,7 +41,7 @@ _WIDTHS = 40.0
 
 
 class Counter(NamedTuple):
-    """What is counted along a loss model's chain. State of the counter: chain's state and what was seen of the last."""
+    """A count along a loss model's chain. State of the counter: the chain's state and the fate of the last message."""
 
     hidden: Array
     """Transitions of the model's chain, states x states."""
@@ -57,16 +57,16 @@ class Counter(NamedTuple):
 
 
 def losses(model: LossModel) -> Counter:
-    """Count the messages that are lost."""
+    """Return the counter of lost messages."""
     P, pi, loss = _chain(model)
     lost, kept = np.diag(loss), np.diag(1.0 - loss)
     return Counter(P, pi, np.stack([kept, lost]), np.stack([P @ kept, P @ lost]), np.eye(len(pi)))
 
 
 def bursts(model: LossModel, *, single: bool) -> Counter:
-    """Count the bursts of losses of which the beginning was seen; if `single`, those of one message, seen whole.
+    """Return the counter of bursts whose beginning was seen; if `single`, of those of one message, seen whole.
 
-    What was seen last: 0 a message that came, 1 the first of a burst, 2 a later one, or one that a run begins with.
+    Fate of the last message: 0 it came, 1 it was the first of a burst, 2 a later one, or one that a run begins with.
     """
     P, pi, loss = _chain(model)
     lost, kept, nothing = np.diag(loss), np.diag(1.0 - loss), np.zeros_like(P)
@@ -95,7 +95,7 @@ def _chain(model: LossModel) -> tuple[Array, Array, Array]:
 
 
 def _reachable(counter: Counter) -> Counter:
-    """The counter without states that nothing ever comes to."""
+    """Return the counter without the states that are never reached."""
     into = counter.enter.sum(axis=(0, 1)) + counter.step.sum(axis=(0, 1))
     there = np.flatnonzero(into > 0.0)
     return counter._replace(
@@ -104,7 +104,7 @@ def _reachable(counter: Counter) -> Counter:
 
 
 def blocks(seq: npt.NDArray[np.int64]) -> tuple[Block, ...]:
-    """Numbers of messages, ascending, as runs without a gap, none across a start of the chain."""
+    """Return numbers of messages, ascending, as runs without a gap, none across a start of the chain."""
     found: list[Block] = []
     runs: list[Run] = []
     block, after = -1, 0
@@ -121,7 +121,7 @@ def blocks(seq: npt.NDArray[np.int64]) -> tuple[Block, ...]:
 
 @lru_cache(maxsize=256)
 def law(counted: str, model: LossModel, parts: tuple[Block, ...]) -> tuple[int, Array]:
-    """Exact law of a count over some messages.
+    """Return the exact law of a count over some messages.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def law(counted: str, model: LossModel, parts: tuple[Block, ...]) -> tuple[int, 
     Returns
     -------
     tuple[int, Array]
-        A number, and the probabilities of it and of those that follow. What is left out is less than 1e-12.
+        A number, and the probabilities of it and of those that follow. The rest sums to less than 1e-12.
     """
     counter = COUNTED[counted](model)
     n = sum(length for block in parts for _, length in block)
@@ -150,7 +150,7 @@ def law(counted: str, model: LossModel, parts: tuple[Block, ...]) -> tuple[int, 
 
 
 def tail(found: int, first: int, probabilities: Array) -> float:
-    """Probability of a count as far out as this one: twice that of the smaller side, so never too small."""
+    """Return the probability of a count as far out as this one: twice the smaller side, so never too small."""
     at = found - first
     if not 0 <= at < len(probabilities):
         return 0.0
@@ -158,12 +158,12 @@ def tail(found: int, first: int, probabilities: Array) -> float:
 
 
 def mean(first: int, probabilities: Array) -> float:
-    """Mean of a law."""
+    """Return the mean of a law."""
     return float((first + np.arange(len(probabilities))) @ probabilities)
 
 
 def _window(counter: Counter, times: dict[Block, int], n: int) -> tuple[int, int]:
-    """First count that the law is given for, and how many: all, or those within `_WIDTHS` of the mean."""
+    """Return the first count of the law and their number: all, or those within `_WIDTHS` of the mean."""
     angle = 0.1 / n
     (near_one,) = np.log(_generating(counter, times, np.exp(1j * np.array([angle]))))
     centre, deviation = near_one.imag / angle, np.sqrt(max(-2.0 * near_one.real, 0.0)) / angle
@@ -176,7 +176,7 @@ def _window(counter: Counter, times: dict[Block, int], n: int) -> tuple[int, int
 
 
 def _generating(counter: Counter, times: dict[Block, int], z: Complex) -> Complex:
-    """E[z^K], at several z."""
+    """Return E[z^K] at several z."""
     at = z[:, None, None]
     enter = counter.enter[0] + at * counter.enter[1]
     powers = [counter.step[0] + at * counter.step[1]]
@@ -201,4 +201,4 @@ COUNTED: dict[str, Callable[[LossModel], Counter]] = {
     "bursts": lambda model: bursts(model, single=False),
     "single": lambda model: bursts(model, single=True),
 }
-"""What can be counted: messages lost, bursts of which the beginning was seen, bursts of one message, seen whole."""
+"""Counts: messages lost, bursts whose beginning was seen, bursts of one message, seen whole."""

@@ -100,7 +100,7 @@ def verify(
 
 
 def _warning(row: LinkTest) -> str:
-    """Say what a test that failed means."""
+    """Return a sentence on a test that failed."""
     if row.configured == AS_IT_SAYS:
         return (
             f"{row.src} -> {row.dst}: {row.what}, asked again, says {row.realised} messages: judge may depend on the "
@@ -115,7 +115,7 @@ def _warning(row: LinkTest) -> str:
 def _findings(
     traces: tuple[LinkTrace, ...], span: Span, others: Sequence[Span], link: Link, seed: int
 ) -> list[Finding]:
-    """Tests of one entry of one link."""
+    """Return the tests of one entry of one link."""
     if span.kind in ("rate", "slots"):
         return []
     sent = sent_messages(traces, span)
@@ -146,7 +146,7 @@ def _findings(
 
 
 def _masks(other: Span, span: Span) -> bool:
-    """Whether another entry adds to the delays of this one."""
+    """Return whether another entry adds to the delays of this one."""
     own = isinstance(other.model, Plugin)
     if (other.kind not in MASKS and not own) or not _overlap(other, span):
         return False
@@ -154,12 +154,12 @@ def _masks(other: Span, span: Span) -> bool:
 
 
 def _overlap(one: Span, other: Span) -> bool:
-    """Whether two entries hold at the same time."""
+    """Return whether two entries hold at the same time."""
     return one.from_s < other.to_s and other.from_s < one.to_s
 
 
 def _holm(rows: Sequence[LinkTest]) -> list[LinkTest]:
-    """Which tests fail when all together may fail by chance with probability `LEVEL`."""
+    """Mark the tests that fail, where any may fail by chance with probability `LEVEL`."""
     tested = sorted((i for i, row in enumerate(rows) if row.p is not None), key=lambda i: rows[i].p or 0.0)
     judged = list(rows)
     failing = True

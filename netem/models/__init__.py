@@ -1,7 +1,7 @@
-"""The faults: frozen structs with units in their keys, and what each does to a message, pure. A file for each family.
+"""The faults: frozen structs with units in their keys, and their effect on a message. Pure; a file for each family.
 
-A model says what may be written (annotations, `relations`), its law, and how it is drawn (`sampler`, from a `Stream`).
-What a random model draws is a function of the message's number alone; see `netem.draws`.
+A model has the ranges of its keys (annotations, `relations`), its law, and its draws (`sampler`, from a `Stream`).
+The draws of a random model depend on the message's number alone; see `netem.draws`.
 """
 
 INSTANT = 1e-9

@@ -1,4 +1,4 @@
-"""States that depend on the one before, and yet are a function of the message number alone."""
+"""A Markov chain whose state is nevertheless a function of the message number alone."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ S = TypeVar("S")
 
 RESTART = 4096
 """A chain starts anew from its stationary law at every multiple of this number. So a receiver that joins late, or
-missed numbers, comes to the same state as one that saw all, after at most this many steps (some 3 ms); and one
-dependence in 4096 is cut, which no test of a run can see."""
+missed numbers, reaches the same state as one that saw all, after at most this many steps (some 3 ms); one dependence
+in 4096 is cut, which no test of a run can see."""
 
 
 class Chain(Generic[S]):
@@ -38,7 +38,7 @@ class Chain(Generic[S]):
         self._state = first(0)
 
     def at(self, seq: int) -> S:
-        """State at message `seq`, catching up over numbers never asked for."""
+        """Return the state at message `seq`."""
         start = seq - seq % RESTART
         if not start <= self._seq <= seq:
             self._seq, self._state = start, self._first(start)

@@ -24,7 +24,7 @@ class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How much later the copy arrives (s)."""
 
     def sampler(self, stream: Stream) -> Callable[[int], bool]:
-        """From a message number to whether there is a copy."""
+        """Return, by message number, whether there is a copy."""
         uniform, p = stream.uniform, self.p
         return lambda seq: uniform(seq) < p
 
@@ -39,7 +39,7 @@ class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     False: the copy is handed on, and the receiver finds it by the message's own CRC-32: a reject, of kind "corrupt"."""
 
     def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
-        """From message number, copy and size (bytes) to the bit that is flipped, None if none is."""
+        """Return the bit that is flipped by message number, copy and size (bytes), None if none is."""
         uniform, below, p = stream.uniform, stream.below, self.p
 
         def bit(seq: int, copy: int, size: int) -> int | None:
@@ -52,7 +52,7 @@ class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 def flip(payload: bytes, bit: int) -> bytes:
-    """The payload with one bit flipped; bit 0 is the lowest of the first byte.
+    """Return the payload with one bit flipped; bit 0 is the lowest of the first byte.
 
     Examples
     --------

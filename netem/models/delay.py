@@ -37,35 +37,35 @@ STANDARD = NormalDist()
 """The standard normal law."""
 
 MOST_SHOWN = 5
-"""So many wrong delays of a trace are named; a file in milliseconds has thousands."""
+"""Wrong delays of a trace that are named; a file in milliseconds has thousands."""
 
 Sampler = Callable[[int], float]
 """From a message number to its delay (s)."""
 
 
 class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
-    """What every delay has."""
+    """Base of all delays."""
 
     fifo: bool = False
     """Whether messages keep their order: one that would overtake arrives together with the one before it."""
 
     def sampler(self, stream: Stream) -> Sampler:
-        """How the delays (s) of one link are drawn."""
+        """Return the delays (s) of one link by message number."""
         raise NotImplementedError
 
 
 class RandomDelay(DelayModel, frozen=True, kw_only=True):
-    """What every delay from a law has."""
+    """Base of all random delays."""
 
     correlation: Annotated[float, Plausible("a correlation", 0.0, 0.999999, hint=in_percent)] = 0.0
     """phi of the AR(1) process behind the draws, from 0 (independent) to below 1."""
 
     def quantile(self, u: float) -> float:
-        """Delay (s) that a share u of all messages do not exceed, 0 < u < 1."""
+        """Return the delay (s) that a share u of all messages do not exceed, 0 < u < 1."""
         raise NotImplementedError
 
     def cdf(self, delay_s: float) -> float:
-        """Share of messages whose delay does not exceed `delay_s`: the inverse of `quantile`."""
+        """Return the share of messages whose delay does not exceed `delay_s`: the inverse of `quantile`."""
         raise NotImplementedError
 
     def sampler(self, stream: Stream) -> Sampler:
@@ -102,15 +102,15 @@ class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
     """Longest delay (s)."""
 
     def quantile(self, u: float) -> float:
-        """Delay (s) at share u."""
+        """Return the delay (s) at share u."""
         return self.low_s + u * (self.high_s - self.low_s)
 
     def cdf(self, delay_s: float) -> float:
-        """Share up to a delay (s)."""
+        """Return the share up to a delay (s)."""
         return min(max((delay_s - self.low_s) / (self.high_s - self.low_s), 0.0), 1.0)
 
     def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
+        """Return contradictions between its values."""
         found = []
         if self.low_s >= self.high_s:
             text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
@@ -132,13 +132,13 @@ class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):
     """sigma (s), standard deviation before the truncation: the jitter."""
 
     def quantile(self, u: float) -> float:
-        """Delay (s) at share u."""
+        """Return the delay (s) at share u."""
         below = STANDARD.cdf(-self.mean_s / self.std_s)
         # from the upper side, where 1 - c is exact: c + u (1 - c) would round to 1 for u next to 1
         return max(self.mean_s - self.std_s * STANDARD.inv_cdf((1.0 - u) * (1.0 - below)), 0.0)
 
     def cdf(self, delay_s: float) -> float:
-        """Share up to a delay (s)."""
+        """Return the share up to a delay (s)."""
         above = STANDARD.cdf(self.mean_s / self.std_s)
         return 1.0 - STANDARD.cdf((self.mean_s - delay_s) / self.std_s) / above if delay_s > 0.0 else 0.0
 
@@ -157,11 +157,11 @@ class Lognormal(RandomDelay, frozen=True, kw_only=True, tag="lognormal"):
     """d_0 (s): delay that every message has, e.g. propagation."""
 
     def quantile(self, u: float) -> float:
-        """Delay (s) at share u."""
+        """Return the delay (s) at share u."""
         return self.offset_s + self.median_s * math.exp(self.sigma * STANDARD.inv_cdf(u))
 
     def cdf(self, delay_s: float) -> float:
-        """Share up to a delay (s)."""
+        """Return the share up to a delay (s)."""
         above = delay_s - self.offset_s
         return STANDARD.cdf(math.log(above / self.median_s) / self.sigma) if above > 0.0 else 0.0
 
@@ -182,11 +182,11 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
     """a: the smaller, the heavier the tail; 3 is a usual choice."""
 
     def quantile(self, u: float) -> float:
-        """Delay (s) at share u."""
+        """Return the delay (s) at share u."""
         return self.minimum_s * float((1.0 - u) ** (-1.0 / self.shape))
 
     def cdf(self, delay_s: float) -> float:
-        """Share up to a delay (s)."""
+        """Return the share up to a delay (s)."""
         return 1.0 - float((self.minimum_s / delay_s) ** self.shape) if delay_s > self.minimum_s else 0.0
 
 
@@ -210,7 +210,7 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
         return lambda seq: delays[(seq + start) % len(delays)]
 
     def start(self, stream: Stream) -> int:
-        """Index of the delay that message 0 has."""
+        """Return the index of the delay of message 0."""
         return stream.below(len(self.delays_s), 0) if self.spread else 0
 
     def relations(self) -> list[Problem]:

@@ -20,7 +20,7 @@ class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """False: messages are lost, reason "cut". True: they are kept, and all go on when the cut ends."""
 
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
-        """Until when the link is down at t (s of run time), None if it is up."""
+        """Return until when the link is down at t (s of run time), None if it is up."""
         return to_s if from_s <= t < to_s else None
 
 
@@ -35,7 +35,7 @@ class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
 
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
-        """Until when the link is down at t (s of run time), None if it is up."""
+        """Return until when the link is down at t (s of run time), None if it is up."""
         if not from_s <= t < to_s:
             return None
         period = self.up_s + self.down_s

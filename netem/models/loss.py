@@ -25,7 +25,7 @@ _STATE, _LOSS = 0, 1
 
 
 class LossModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
-    """What every loss has."""
+    """Base of all losses."""
 
     @property
     def transitions(self) -> tuple[tuple[float, ...], ...]:
@@ -48,7 +48,7 @@ class LossModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return sum(pi * lost for pi, lost in zip(self.stationary, self.loss_in_state, strict=True))
 
     def sampler(self, stream: Stream) -> Lost:
-        """How the losses of one link are drawn: one number moves the chain, another decides."""
+        """Return the losses of one link by message number: one draw moves the chain, another decides."""
         uniform, loss = stream.uniform, self.loss_in_state
         first = tuple(accumulate(self.stationary))
         rows = tuple(tuple(accumulate(row)) for row in self.transitions)
@@ -65,7 +65,7 @@ class LossModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def _chosen(cumulated: tuple[float, ...], u: float) -> int:
-    """State whose share of (0, 1) holds u; the last one also takes what rounding leaves over."""
+    """Return the state whose share of (0, 1) contains u; the last one takes the rest that rounding leaves."""
     for state, bound in enumerate(cumulated[:-1]):
         if u < bound:
             return state
@@ -139,7 +139,7 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
         return (self.loss_good, self.loss_bad)
 
     def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
+        """Return contradictions between its values."""
         found = []
         if self.loss_good > self.loss_bad:
             text = f"{self.loss_good:g} is above loss_bad = {self.loss_bad:g}; swap them: the bad state loses more"
@@ -197,7 +197,7 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
         return (0.0, 0.0, 1.0, 1.0)
 
     def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
+        """Return contradictions between its values."""
         found = []
         for first, second in (("p13", "p14"), ("p31", "p32")):
             both = getattr(self, first) + getattr(self, second)

@@ -27,7 +27,7 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Most bytes that may wait, the message being sent included; an idle line takes any message."""
 
     def through(self, ready: float, busy_until: float, size: int) -> float | None:
-        """When the message's last byte is sent (s, as the others), None if the queue is full.
+        """Return when the message's last byte is sent (s, as the others), None if the queue is full.
 
         Examples
         --------
@@ -45,7 +45,7 @@ class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Slot n lasts from offset_s + n period_s for length_s; what comes outside waits for the next one.
+    """Slot n lasts from offset_s + n period_s for length_s; a message outside waits for the next one.
 
     Times are run time, so that links with different offsets share a medium. A slot has room for any number of messages;
     give a rate as well where it has not.
@@ -59,7 +59,7 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Length of a slot (s), up to period_s."""
 
     def opens(self, ready: float) -> float:
-        """When a message that is ready goes (s of run time).
+        """Return when a message that is ready goes (s of run time).
 
         Examples
         --------
@@ -73,7 +73,7 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return max(self.offset_s + (number + 1) * self.period_s, ready)
 
     def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
+        """Return contradictions between its values."""
         found = []
         for key in ("offset_s", "length_s"):
             value = getattr(self, key)

@@ -1,4 +1,4 @@
-"""A fault of somebody's own: its base class, the registry of faults, and how one is called.
+"""A user-defined fault: its base class, the registry of faults, and its judge.
 
     @gridpeers.link_fault("jammer")
     class Jammer(gridpeers.LinkFault):
@@ -29,16 +29,16 @@ LONGEST = 3600.0
 """Longest delay (s) that a fault may add."""
 
 DROPPED_BY_OWN = "fault"
-"""Reason, in links.csv, why a message was dropped by a fault of somebody's own."""
+"""Reason, in links.csv, of a message that a user-defined fault dropped."""
 
 
 class LinkMessage(NamedTuple):
-    """What a fault is told of a message."""
+    """The data of a message that a fault gets."""
 
     src: str
-    """Who sent it: an inverter, or "plant"."""
+    """Its sender: an inverter, or "plant"."""
     dst: str
-    """Who receives it."""
+    """Its receiver."""
     seq: int
     """Its number on this link, from 0; that of the tick."""
     t: float
@@ -69,10 +69,10 @@ class MessageDraws:
 
 
 class LinkFault:
-    """Base of all faults of somebody's own. Parameters are annotated attributes (`wire.table_schema`).
+    """Base of all user-defined faults. Parameters are annotated attributes (`wire.table_schema`).
 
-    There is one object per link and entry. What `judge` returns should depend on the message and the draws alone: a
-    receiver that joins late has not seen the messages before.
+    There is one object per link and entry. The result of `judge` should depend on the message and the draws alone:
+    a receiver that joins late has not seen the messages before.
 
     Raises
     ------
@@ -85,7 +85,7 @@ class LinkFault:
             setattr(self, name, value)
 
     def judge(self, message: LinkMessage, draws: MessageDraws) -> float | None:
-        """Return by how much a message is delayed (s, at least 0), None if it is lost.
+        """Return the added delay of a message (s, at least 0), None if it is lost.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ Judge = Callable[[int, float, int], float | None]
 
 
 def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[[str], None]) -> Judge:
-    """Return how a fault judges the messages of one link; one that fails does nothing from then on, and is told.
+    """Return the judge of a fault on one link; a fault that fails is reported and does nothing from then on.
 
     Parameters
     ----------

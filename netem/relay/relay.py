@@ -40,7 +40,7 @@ class Relay:
     connect : str
         The target, of the same transport. It need not be there yet.
     there, back : Faults, optional
-        What is done to the traffic towards the target, and from it.
+        Faults of the traffic towards the target, and from it.
     seed : int, optional
         Of the random numbers.
 
@@ -51,7 +51,7 @@ class Relay:
     RelayError
         If the two are of different transports, a host is unknown, or the relay cannot listen.
     FaultsError
-        If TCP is told to reorder.
+        If there is reordering on TCP.
     """
 
     def __init__(

@@ -138,7 +138,7 @@ class TcpRelay:
         return near
 
     def admit(self, end: _End) -> bool:
-        """Connect the far end of a new connection; return whether it is still wanted."""
+        """Connect the far end of a new connection; return whether the relay still runs."""
         if end.other.transport is None and self._server is not None:
             self._connections[end] = asyncio.get_running_loop().create_task(self._connect(end))
         return end in self._connections or end.other in self._connections

@@ -15,7 +15,7 @@ from netem.relay.line import Line
 from netem.relay.packets import Datagrams
 
 IDLE = 60.0
-"""Time (s) after which a silent sender is forgotten, once somebody new comes: NAT boxes keep UDP for as long."""
+"""Time (s) after which a silent sender is forgotten, once a new one comes: NAT boxes keep UDP for as long."""
 
 BUFFER = 4 << 20
 """Bytes asked for in the kernel, so that only the relay loses datagrams."""

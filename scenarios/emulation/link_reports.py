@@ -1,4 +1,4 @@
-"""What the links into one receiver report: verdicts and counts for the record, their status for clients."""
+"""Reports of the links into one receiver: verdicts and counts for the record, their status for clients."""
 
 from __future__ import annotations
 
