@@ -1,4 +1,4 @@
-"""What travels between the processes of a run: messages, keys, codec, session set-up.
+"""The communication of a run's processes: messages, keys, codec, nodes, and the driver with its Zenoh session.
 
-The lowest layer: it imports nothing of gridpeers. Everything but `wire.driver.session` is pure.
+This is the lowest layer: it imports nothing of gridpeers. Everything outside of `wire.driver` is pure.
 """

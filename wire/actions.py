@@ -1,4 +1,4 @@
-"""What a sans-IO core asks its driver to do. Drivers do it in the order given, and decide nothing."""
+"""Requests of a sans-IO core to its driver. A driver performs them in the given order, and decides nothing."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ class Publish(NamedTuple):
 
 
 class Fetch(NamedTuple):
-    """Ask the queryable of a key; what it answers comes in as a message on that key. No answer is no error."""
+    """Query a key; the answer arrives as a message on that key. A missing answer is no error."""
 
     key: str
 
 
 class Listen(NamedTuple):
-    """Subscribe to a key, from now on, before anything that is asked for later."""
+    """Subscribe to a key, before any later request."""
 
     key: str
 
 
 class Log(NamedTuple):
-    """Write a line to the log, for whoever watches the process."""
+    """Write a line to the log."""
 
     text: str
 

@@ -1,6 +1,6 @@
 """Types of the fields of messages, each with its bounds. Pure.
 
-Bounds are physical: as wide as anything that a plant, an inverter or a run can be, and no wider. They stand here alone;
+Bounds are physical: as wide as a plant, an inverter or a run can be, and no wider. This module alone defines them;
 the codec checks them while it decodes.
 """
 
@@ -14,16 +14,15 @@ from typing import Annotated, Any
 import msgspec
 
 LIMIT = 64_000
-"""Longest message in bytes: what Zenoh sends in one piece, and tenfold what any message but Telemetry needs."""
+"""Longest message in bytes: Zenoh sends it in one piece, and it is ten times any message but Telemetry."""
 
 NAME = r"[A-Za-z0-9_.-]{1,64}"
-"""What a name may consist of. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
+"""Allowed form of a name. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
 
 UNPRINTABLE = (
     "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
 )
-"""Characters that are not to be seen, or that change how others are: controls, line ends, directions of writing,
-tags."""
+"""Characters that are invisible, or change the look of others: controls, line ends, writing directions, tags."""
 
 _PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
 
@@ -34,23 +33,23 @@ NameOrNone = Annotated[str, msgspec.Meta(pattern=rf"^({NAME})?\Z")]
 """The same, or empty if there is none or it is not known."""
 
 QuickName = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^{NAME}\Z"})]
-"""A name that is checked together with all others of its message, by `__post_init__`: a pattern for each would cost
-several times what all else of decoding does, and states and measurements are decoded at every tick."""
+"""A name that `__post_init__` checks together with all others of its message: a pattern for each would cost
+several times the rest of decoding, and states and measurements are decoded at every tick."""
 
 QuickNameOrNone = Annotated[str, msgspec.Meta(max_length=64, extra={"pattern": rf"^({NAME})?\Z"})]
 """The same, or empty."""
 
 Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
-"""What people call something in their tables: up to 200 printable characters."""
+"""A label from a user's table: up to 200 printable characters."""
 
 Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
 """A sentence for people: up to 4000 printable characters on one line."""
 
 Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
-"""What somebody asked for: printable, and only as long as a message may be."""
+"""An answer to a request: printable, at most as long as a message."""
 
 Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
-"""Bytes that no core looks into."""
+"""Bytes that no core reads."""
 
 Tree = Annotated[dict[str, Any], msgspec.Meta(max_length=16)]
 """Maps, lists, texts, numbers, booleans and nil, such as a table of a scenario file; no core reads it, and `check_tree`
@@ -72,40 +71,40 @@ LATEST = 1e9
 """Largest `Time` (s)."""
 
 Time = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST)]
-"""s, of run time or of waiting: up to 30 years."""
+"""Run time or waiting time (s): up to 30 years."""
 
 Age = Annotated[float, msgspec.Meta(ge=-1.0, le=LATEST)]
-"""s; -1 if there is none."""
+"""Age (s); -1 if there is none."""
 
 Rating = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
-"""W: more than none, and at most a gigawatt."""
+"""Rating (W): positive, at most a gigawatt."""
 
 Power = Annotated[float, msgspec.Meta(ge=-1e11, le=1e11)]
-"""W or var: up to 100 times the largest rating, which is what an agent without limits ever sets."""
+"""Power (W or var): up to 100 times the largest rating, the widest bound of an agent's set-points."""
 
 NominalVoltage = Annotated[float, msgspec.Meta(gt=0.0, le=1e5)]
-"""V, line-to-neutral: at the terminals of an inverter, so at most 100 kV."""
+"""Nominal voltage (V, line-to-neutral) of an inverter's terminals: at most 100 kV."""
 
 Voltage = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
-"""V, line-to-neutral RMS: up to 10 times the highest nominal voltage."""
+"""Voltage (V, line-to-neutral RMS): up to 10 times the highest nominal voltage."""
 
 NominalFrequency = Annotated[float, msgspec.Meta(ge=1.0, le=1000.0)]
-"""Hz: 16.7, 50, 60 and 400 are in use."""
+"""Nominal frequency (Hz): 16.7, 50, 60 and 400 are in use."""
 
 Frequency = Annotated[float, msgspec.Meta(ge=0.0, le=2000.0)]
-"""Hz: from standstill to twice the highest nominal frequency."""
+"""Frequency (Hz): from standstill to twice the highest nominal frequency."""
 
 Droop = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
-"""pu per pu: some; at 1 full power would take the whole frequency, or voltage."""
+"""Droop (pu per pu), positive; at 1, full power would take the whole frequency, or voltage."""
 
 Cycles = Annotated[float, msgspec.Meta(ge=-2e12, le=2e12)]
-"""Cycles: the farthest frequency for the longest time."""
+"""Angle (cycles): the largest frequency error over the longest time."""
 
 MOST_SHARED = 16
-"""Values that a law may share beside its set-points."""
+"""Most values that a law may share beside its set-points."""
 
 SHARED_LIMIT = 1e12
-"""Largest of these, either way."""
+"""Largest absolute value of a shared number."""
 
 Shared = Annotated[
     dict[
@@ -114,7 +113,7 @@ Shared = Annotated[
     ],
     msgspec.Meta(max_length=MOST_SHARED),
 ]
-"""What a law shares, by names of its own choice."""
+"""Values that a law shares, by names of its own choice."""
 
 MOST = 1000
 """Most inverters in a run: one row of telemetry on more would not fit into a message."""
@@ -143,7 +142,7 @@ def is_name(text: str) -> bool:
 
 @lru_cache(maxsize=128)
 def check_names(*names: str) -> None:
-    """Check all names of a message at once; those of a sender are the same each time."""
+    """Raise ValueError for a bad name; cached, because a sender's names are the same each time."""
     if not all(map(is_name, names)):
         raise ValueError(f"a name is not 1 to 64 letters, digits, _, - or .: {', '.join(map(ascii, names))[:100]}")
 

@@ -1,13 +1,13 @@
-"""Ticks and the run's time: tick k is at t_k = k T_c."""
+"""Ticks and run time: tick k is at t_k = k T_c."""
 
 from __future__ import annotations
 
 
 def time_of(tick: int, T_c: float) -> float:
-    """Run time (s) of a tick.
+    """Return the run time (s) of a tick.
 
-    A product and never a running sum, so that every process finds the same bits for the same tick; rounded to the
-    nanosecond, as the plant's rows are.
+    It is a product and not a running sum, so every process computes the same bits for the same tick; it is rounded to
+    the nanosecond, like the plant's rows.
 
     Examples
     --------
@@ -18,7 +18,7 @@ def time_of(tick: int, T_c: float) -> float:
 
 
 def ticks_until(end: float, T_c: float) -> int:
-    """Number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c.
+    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c.
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""Messages to bytes and back, and the count of what was refused on the way.
+"""Messages to bytes and back, and the count of rejected messages.
 
-msgpack through msgspec, which checks types and bounds while it decodes, and the CRC-32 of that in the last four bytes:
-TCP's checksum of 16 bits lets an error through now and then, and a bit flipped within a number would decode as another
-number. So a message that comes out of `decode` is as it was sent, and within the bounds of `wire.bounds`. Whatever is
-not is a `RejectedError` of one of the kinds in `KINDS`: receivers count it and go on, as no message may stop an agent.
+A payload is msgpack, by msgspec, which checks types and bounds while it decodes, and its CRC-32 in the last four bytes:
+TCP's checksum of 16 bits misses an error now and then, and a flipped bit within a number would decode as another
+number. So a message from `decode` is as it was sent, and within `wire.bounds`. Any other payload raises a
+`RejectedError` of a kind in `KINDS`: receivers count it and continue, because no message may stop an agent.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ CRC = 4
 """Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first."""
 
 _SOUND = 0x2144DF1C
-"""CRC-32 of whatever ends in its own CRC-32: so one call checks a message, without taking it apart."""
+"""CRC-32 of any bytes that end in their own CRC-32: so one call checks a whole payload."""
 
 KINDS = {
     "oversized": "longer than a message may be",
-    "corrupt": "not as it was sent, or sent without a checksum: its CRC-32 is another",
+    "corrupt": "changed on its way, or sent without a checksum: its CRC-32 differs",
     "garbled": "not msgpack, or not the fields of its type",
-    "unknown": "of a type that nobody here knows",
+    "unknown": "of an unknown type",
     "not finite": "a number in it is NaN or infinite",
-    "implausible": "a value in it is beyond what can be, or contradicts another",
-    "foreign": "on a key of another run, or not sent by whom the key says",
-    "ghost": "from another life of its sender than the one that counts",
-    "stale": "about a tick or a roster that is over",
-    "unexpected": "well-formed, but not for here and now",
-    "failed": "an error of ours came up while it was handled, see its traceback",
+    "implausible": "a value in it is beyond its physical bounds, or contradicts another",
+    "foreign": "on a key of another run, or from another sender than the key names",
+    "ghost": "from another epoch than the sender's valid one",
+    "stale": "about a past tick or roster",
+    "unexpected": "well-formed, but not for this receiver at this time",
+    "failed": "it raised an error of ours, see the traceback",
 }
-"""The kinds of rejects and what each means."""
+"""The kinds of rejects and their meanings."""
 
 _encoder = msgspec.msgpack.Encoder()
 _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
 
 
 TRACED = 40
-"""Last lines of a traceback that are logged."""
+"""Number of a traceback's last lines in the log."""
 
 
 class RejectedError(Exception):
@@ -58,7 +58,7 @@ class RejectedError(Exception):
     kind : str
         One of `KINDS`.
     text : str
-        What is wrong with this one.
+        The problem of this message.
     """
 
     def __init__(self, kind: str, text: str) -> None:
@@ -68,13 +68,13 @@ class RejectedError(Exception):
 
 
 def encode(message: Message) -> bytes:
-    """Bytes of a message; the same message gives the same bytes in every process."""
+    """Return the bytes of a message; the same message gives the same bytes in every process."""
     body = _encoder.encode(message)
     return body + crc32(body).to_bytes(CRC, "little")
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Message of the bytes, whole and within its bounds, or `RejectedError`.
+    """Return the message of a payload, whole and within its bounds; raise RejectedError for any other payload.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def decode(payload: bytes) -> AnyMessage:
 
 
 _WRONG_TYPE = re.compile(r"^(Expected `[^`]*`, got |Object |Invalid |\w+ value out of range)")
-"""How msgspec begins where no value is wrong. Bounds, and what a message finds by itself, read otherwise."""
+"""Start of msgspec's message for a wrong type; for a bound, or a message's own check, it reads otherwise."""
 
 
 def _kind(text: str, payload: bytes) -> str:
@@ -105,12 +105,12 @@ def _kind(text: str, payload: bytes) -> str:
         return "garbled"
     try:
         return "implausible" if _is_finite(msgspec.msgpack.decode(payload[:-CRC])) else "not finite"
-    except (ValueError, TypeError, RecursionError):  # behind the value that is wrong there may be anything
+    except (ValueError, TypeError, RecursionError):  # anything may follow the wrong value
         return "implausible"
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether there is no NaN and no infinity among the numbers of a message."""
+    """Whether all numbers of a message are finite."""
     if isinstance(value, float):
         return isfinite(value)
     if isinstance(value, dict):
@@ -119,7 +119,7 @@ def _is_finite(value: Any) -> bool:
 
 
 class RejectedMessages:
-    """Counts dropped messages by kind and keeps one log line per kind.
+    """Count dropped messages by kind, and keep one log line per kind.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class RejectedMessages:
         self._lines: list[str] = []
 
     def add(self, kind: str, key: str, text: str, trace: str = "") -> None:
-        """Count one; the first of its kind is worth a line, and the traceback of an error of ours."""
+        """Count a message; write a line for the first of its kind, with the traceback of an error of ours."""
         assert kind in KINDS
         if not self.counts[kind]:
             line = (
@@ -144,7 +144,7 @@ class RejectedMessages:
         self.counts[kind] += 1
 
     def failed(self, key: str, error: Exception) -> None:
-        """Count a message on which an error of ours came up, which is being handled now."""
+        """Count a message that raised an error of ours; call it while handling that error."""
         self.add("failed", key, f"{type(error).__name__}: {error}", traceback.format_exc())
 
     @property
@@ -153,6 +153,6 @@ class RejectedMessages:
         return bool(self._lines)
 
     def take_lines(self) -> tuple[str, ...]:
-        """Log lines since last taken."""
+        """Take out the log lines since the last call."""
         lines, self._lines = tuple(self._lines), []
         return lines

@@ -1,7 +1,7 @@
-"""Every key expression of gridpeers, and who uses it.
+"""Every key expression of gridpeers, with its two ends.
 
 All keys of a run are below ``gridpeers/<run>/``. An *instance* is one process that claims a name: the id of its Zenoh
-session. It stands in the keys by which agents find each other, so that two processes of one name can be told apart.
+session. The keys by which agents find each other contain it, so that two processes of one name stay distinct.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import msgspec
 from wire.bounds import MOST_COUNT, is_name
 
 LATEST_ONLY = ("measurement", "state", "set_points", "status")
-"""Kinds of keys of which only the newest message matters: in wall-clock time it is rather dropped than waited for."""
+"""Kinds of keys of which only the newest message matters: in wall-clock time a sender drops it rather than wait."""
 
 
 ANY_ALIVE_PLANT = "gridpeers/*/alive/plant/*"
-"""Tokens of the plants of all runs: who is told a wrong run name is told the right ones."""
+"""Tokens of the plants of all runs, for an error message that lists the running ones."""
 
 
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
@@ -30,11 +30,11 @@ class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
     message: str
     """Type of the message, or "-" for a token."""
     sender: str
-    """Who publishes, answers or holds it."""
+    """The participant that publishes, answers or holds it."""
     listener: str
-    """Who subscribes, asks or watches."""
+    """The participants that subscribe, query or watch."""
     when: str
-    """When it is sent or held."""
+    """Time at which it is sent or held."""
 
 
 def check_name(what: str, name: str) -> None:
@@ -76,73 +76,73 @@ class Keys:
         self.any_alive = f"{self._root}/alive/**"
 
     def measurement(self, inverter: str) -> str:
-        """Sensor readings of an inverter, and the grant of a tick."""
+        """Return the key of an inverter's sensor readings, which grant a tick."""
         return f"{self._root}/measurement/{inverter}"
 
     def state(self, inverter: str) -> str:
-        """What the agent of an inverter decided."""
+        """Return the key of an agent's states."""
         return f"{self._root}/state/{inverter}"
 
     def set_points(self, inverter: str) -> str:
-        """What the agent of an inverter decided and does not tell its neighbours (wall-clock time)."""
+        """Return the key of an agent's states that are not for its neighbours (wall-clock time)."""
         return f"{self._root}/set_points/{inverter}"
 
     def ready(self, inverter: str) -> str:
-        """An agent hears its neighbours on a roster."""
+        """Return the key on which an agent says that it hears its neighbours."""
         return f"{self._root}/ready/{inverter}"
 
     def leave(self, inverter: str) -> str:
-        """The agent of an inverter leaves properly."""
+        """Return the key on which an agent says that it leaves properly."""
         return f"{self._root}/leave/{inverter}"
 
     def report(self, inverter: str) -> str:
-        """What the emulated links into an agent did."""
+        """Return the key of reports on the emulated links into an agent."""
         return f"{self._root}/report/{inverter}"
 
     def link_request(self, inverter: str) -> str:
-        """What emulated links into an agent shall do."""
+        """Return the key of commands to the emulated links into an agent."""
         return f"{self._root}/link_request/{inverter}"
 
     def link_acknowledgement(self, inverter: str) -> str:
-        """Orders that the links into an agent have taken."""
+        """Return the key of an agent's acknowledgements of link requests."""
         return f"{self._root}/link_acknowledgement/{inverter}"
 
     def status(self, inverter: str) -> str:
-        """How the agent of an inverter fares."""
+        """Return the key of an agent's status."""
         return f"{self._root}/status/{inverter}"
 
     def config(self, inverter: str) -> str:
-        """What the agent of an inverter is started with; answered on request."""
+        """Return the key of a queryable: the configuration of an agent."""
         return f"{self._root}/config/{inverter}"
 
     def answer(self, asker: str) -> str:
-        """What became of somebody's commands."""
+        """Return the key of the answers to a client's commands."""
         return f"{self._root}/answer/{asker}"
 
     def stop_request(self, inverter: str, instance: str) -> str:
-        """Word to one instance that it cannot take part."""
+        """Return the key of stop requests to one instance."""
         return f"{self._root}/stop_request/{inverter}/{instance}"
 
     def nameplate(self, inverter: str, instance: str) -> str:
-        """Who one instance is; answered on request."""
+        """Return the key of a queryable: the nameplate of one instance."""
         return f"{self._root}/nameplate/{inverter}/{instance}"
 
     def alive_plant(self, epoch: int | str) -> str:
-        """Token of a plant, in its epoch."""
+        """Return the key of a plant's token, which contains its epoch."""
         return f"{self._root}/alive/plant/{epoch}"
 
     def alive_agent(self, inverter: str, instance: str) -> str:
-        """Token of an agent."""
+        """Return the key of an agent's token."""
         return f"{self._root}/alive/agent/{inverter}/{instance}"
 
     def alive_recorder(self, recorder: str) -> str:
-        """Token of a recorder."""
+        """Return the key of a recorder's token."""
         return f"{self._root}/alive/recorder/{recorder}"
 
     def parts(self, key: str) -> tuple[str, ...]:
-        """Split a key of this run into what stands behind ``gridpeers/<run>/``; empty for any other key.
+        """Split a key of this run into its parts after ``gridpeers/<run>/``; empty for any other key.
 
-        So it is for a key with anything in it that is no name: anybody can hold a token, and call it what he likes.
+        It is also empty if a part is no name: anybody can hold a token of any text.
 
         Examples
         --------
@@ -155,7 +155,7 @@ class Keys:
 
 
 def epoch_of(part: str) -> int | None:
-    """The epoch that the last part of a plant's token says; None if it is no epoch that a message could have.
+    """Return the epoch in the last part of a plant's token; None if no message could have it.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def epoch_of(part: str) -> int | None:
 
 
 def run_of_plant(key: str) -> str:
-    """Name of the run whose plant has this token; empty for any other key.
+    """Return the name of the run whose plant has this token; empty for any other key.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(
             keys.alive_agent(agent, instance), "token", "-", "agent", "plant, other agents",
-            "as long as the agent's session lives; declared after its subscribers and its queryable",
+            "while the agent's session lives; declared after its subscribers and its queryable",
         ),
         row(
             keys.alive_recorder("NAME"), "token", "-", "recorder", "plant",
@@ -209,7 +209,7 @@ def describe() -> tuple[KeySpec, ...]:
         row(keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end"),
         row(
             keys.stop_request(agent, instance), "publication", "Stop", "plant", "the one instance",
-            "when its name is taken or is no inverter of the feeder; wall-clock: when somebody stops it",
+            "when its name is taken or is no inverter of the feeder; wall-clock: on `gridpeers stop`",
         ),
         row(
             keys.ready(agent), "publication", "Ready", "agent", "plant",
@@ -222,25 +222,25 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(
             keys.set_points(agent), "publication", "State", "agent", "plant",
-            "wall-clock: instead of state, at a tick at which the law does not tell the neighbours",
+            "wall-clock: instead of state, at a tick at which the law sends nothing to the neighbours",
         ),
         row(
             keys.telemetry, "publication", "Telemetry, LinkReport, LinkRequest", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
         ),
         row(
-            keys.report(agent), "publication", "LinkReport", "agent", "plant, who publishes it on telemetry",
+            keys.report(agent), "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
             "in a run with emulated links: every 100 ticks, and when it ends",
         ),
         row(
             keys.link_request(agent), "publication", "LinkRequest", "plant", "agent",
-            "wall-clock: when somebody gives a link command, and all of them to who comes later; again "
-            "every second, until it is answered",
+            "wall-clock: at each link command, and all of them to an agent that joins; again "
+            "every second, until it is acknowledged",
         ),
         row(
             keys.link_acknowledgement(agent), "publication", "LinkAcknowledgement", "agent",
-            "plant, who publishes it on the asker's key",
-            "wall-clock: one for every LinkRequest that came in its turn",
+            "plant, which publishes it on the client's key",
+            "wall-clock: one for every LinkRequest, in their order",
         ),
         row(
             keys.leave(agent), "publication", "Leave", "agent", "plant",

@@ -10,7 +10,7 @@ from wire.codec import RejectedError, RejectedMessages, decode
 from wire.messages import AnyMessage, Measurement, State
 
 REPORT_TICKS = 100
-"""Ticks between two reports of a receiver on what the links into it did."""
+"""Ticks between two reports of a receiver on the links into it."""
 
 
 class Arrival(NamedTuple):
@@ -27,7 +27,7 @@ class Arrival(NamedTuple):
 
 
 class CommandEffect(NamedTuple):
-    """What a command to links does."""
+    """Effect of a link command."""
 
     text: str
     """The command in words, in one line; a heal names the links that it heals."""
@@ -45,7 +45,7 @@ class Links(Protocol):
 
     @property
     def clear(self) -> Set[str]:
-        """Senders whose messages `offer` is known not to take; an attribute, as it is read for every message."""
+        """Senders whose messages `offer` never takes; an attribute, because every message reads it."""
         ...
 
     @property
@@ -61,14 +61,14 @@ class Links(Protocol):
         message : State or Measurement
             The message. Its number finds its random numbers; its time decides which faults act on it.
         payload : bytes
-            The same message as it came, whose size counts, and which a link may corrupt.
+            Bytes of the message; a link uses their size, and may corrupt them.
         at : float
-            Now: when the message arrives if the link does nothing.
+            Present time (s): the arrival time over a link without fault.
         """
         ...
 
     def due(self, now: float) -> Sequence[Arrival]:
-        """Take out what has arrived by now, in the order of arrival."""
+        """Take out the messages that have arrived by now, in the order of arrival."""
         ...
 
     def stalled(self, t: float) -> bool:
@@ -76,12 +76,12 @@ class Links(Protocol):
         ...
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
-        """Change what the links do to messages sent at t (s of run time) or later.
+        """Apply a link command to messages sent at t (s of run time) or later.
 
         Raises
         ------
         ValueError
-            If the tree is no command to links, or its values are wrong; nothing has changed then.
+            If the tree is no link command, or a value is wrong; then nothing has changed.
         """
         ...
 
@@ -98,7 +98,7 @@ class Links(Protocol):
         ...
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
-        """Take out, for the record, what the links did since the last report; the last report is never empty."""
+        """Take out the links' account since the last report, for the record; the last report is never empty."""
         ...
 
 
@@ -117,7 +117,7 @@ def is_usable(links: Links | None, message: State | Measurement, payload: bytes,
     at : float
         Now (s of run time, on the receiver's clock).
     who : Admission
-        The epochs and numbers of all senders.
+        Epochs and numbers of all senders.
     """
     if isinstance(message, State) and message.idle:
         return False
@@ -129,7 +129,7 @@ def is_usable(links: Links | None, message: State | Measurement, payload: bytes,
 def arrived(links: Links | None, now: float, rejects: RejectedMessages, admission: Admission) -> Iterator[AnyMessage]:
     """Yield the messages that the links have let through by now (s of run time) and that are of use.
 
-    A corrupted message is decoded again, which its CRC-32 does not survive: it is counted and dropped. A message that
+    A corrupted message is decoded again; its CRC-32 fails, so it is counted and dropped. A message that
     was overtaken on its way, or whose sender has gone, is only dropped: delays do that to sound messages.
     """
     if links is None:

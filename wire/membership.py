@@ -1,8 +1,8 @@
-"""Who takes part in a run: which process speaks for each name, and what it has said it is. Pure.
+"""The members of a run: the process that speaks for each name, its nameplate and its epoch. Pure.
 
-A process is known by its liveliness token, `alive/agent/<name>/<instance>`. Of two that claim one name the first
-counts, until its token is gone; in simulated time the plant's roster may name another one. Whoever sees a token asks
-that process for its nameplate, once, and learns from the answer in which epoch it speaks.
+A liveliness token, `alive/agent/<name>/<instance>`, identifies a process. Of two that claim one name the first
+counts, until its token is gone; in simulated time the plant's roster may select another one. A node that sees a token
+asks that process for its nameplate, once, and learns its epoch from the answer.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Membership:
     Parameters
     ----------
     admission : Admission
-        Is told in which epoch whoever counts for a name speaks.
+        Receives the epoch of each process that counts.
 
     Examples
     --------
@@ -36,28 +36,28 @@ class Membership:
     def __init__(self, admission: Admission) -> None:
         self._admission = admission
         self._instances: dict[str, list[str]] = {}
-        """Processes of each name whose tokens are there, the one that counts first."""
+        """Present processes of each name; the first one counts."""
         self._preferred: dict[str, str] = {}
-        """Of some names the process that counts whenever its token is there."""
+        """Processes that count whenever their tokens are there, by name."""
         self._dismissed: dict[str, str] = {}
-        """Processes that count no more, though their tokens are there."""
+        """Processes that count no more although their tokens are there, by name."""
         self._answers: dict[tuple[str, str], Nameplate] = {}
         """Nameplate of each process that has answered."""
         self.nameplates: dict[str, Nameplate] = {}
-        """Those of the processes that count."""
+        """Nameplates of the processes that count."""
 
     def appeared(self, name: str, instance: str) -> bool:
-        """Note a token; whether its process counts."""
+        """Note a token; return whether its process counts."""
         instances = self._instances.setdefault(name, [])
         if instance not in instances:
             instances.append(instance)
             self._put_first(name)
-            if instances[0] == instance != instances[-1]:  # it takes the place of another one
-                self._believe(name)
+            if instances[0] == instance != instances[-1]:  # it replaces another one
+                self._update(name)
         return instances[0] == instance
 
     def vanished(self, name: str, instance: str) -> bool:
-        """Note that a token is gone; whether its process counted."""
+        """Note that a token is gone; return whether its process counted."""
         counted = self.instance(name) == instance
         instances = self._instances.get(name, [])
         if instance in instances:
@@ -66,41 +66,41 @@ class Membership:
             self._instances.pop(name, None)
         self._answers.pop((name, instance), None)
         if counted or self._dismissed.get(name) == instance:
-            self._believe(name)
+            self._update(name)
         return counted
 
     def dismiss(self, name: str) -> None:
-        """Have the process of a name count no more; its epoch holds until its token is gone or another one is met."""
+        """Let the process of a name count no more; its epoch stays valid until its token is gone or replaced."""
         self._dismissed[name] = self._instances[name].pop(0)
         self.nameplates.pop(name, None)
 
     def prefer(self, name: str, instance: str) -> None:
-        """Have one process of a name count, as soon as its token is there."""
+        """Let one process of a name count as soon as its token is there."""
         self._preferred[name] = instance
         self._put_first(name)
-        self._believe(name)
+        self._update(name)
 
     def instance(self, name: str) -> str:
-        """Process that counts for a name; empty if there is none."""
+        """Return the process that counts for a name; empty if there is none."""
         return next(iter(self._instances.get(name, ())), "")
 
     def meet(self, instance: str, nameplate: Nameplate) -> bool:
-        """Take the answer of a process; whether it is the first one of a process that counts.
+        """Take the answer of a process; return whether it is the first answer of a process that counts.
 
         Raises
         ------
         RejectedError
-            If the token of this process is not there, or it has said something else before.
+            If the process has no token, or its nameplate has changed.
         """
         name = nameplate.sender
         if instance not in self._instances.get(name, ()):
             raise RejectedError("ghost", f"the nameplate of {name}, whose token is gone")
         known = self._answers.setdefault((name, instance), nameplate)
         if known != nameplate:
-            raise RejectedError("implausible", f"{name} is not what it was; a nameplate never changes")
+            raise RejectedError("implausible", f"{name} has another nameplate than before; a nameplate never changes")
         if name in self.nameplates or instance != self.instance(name):
             return False
-        self._believe(name)
+        self._update(name)
         return True
 
     @property
@@ -110,7 +110,7 @@ class Membership:
         return (process for process in every if process not in self._answers)
 
     def clear(self) -> None:
-        """Forget everybody."""
+        """Forget all members."""
         for name in self.nameplates:
             self._admission.release(name)
         for known in (self._instances, self._preferred, self._dismissed, self._answers, self.nameplates):
@@ -122,8 +122,8 @@ class Membership:
             instances.remove(preferred)
             instances.insert(0, preferred)
 
-    def _believe(self, name: str) -> None:
-        """Bring nameplate and epoch of a name up to date with the process that counts for it."""
+    def _update(self, name: str) -> None:
+        """Set nameplate and epoch of a name to those of the process that counts."""
         self._dismissed.pop(name, None)
         nameplate = self._answers.get((name, self.instance(name)))
         if nameplate is None:

@@ -1,10 +1,10 @@
 """The messages of a run. Frozen, validated, SI units on the wire.
 
-The type of a field is its bounds (`wire.bounds`), and what a message says twice must agree (`__post_init__`). So
-whatever has been decoded is safe to compute with, to print and to put into a key.
+The type of a field contains its bounds (`wire.bounds`), and fields of one message must agree (`__post_init__`). So
+a decoded message is safe to compute with, to print and to put into a key.
 
-Every message carries its sender (`sender`), the epoch of that sender (`epoch`: the life of one process; see
-`wire.admission`), a number (`seq`) and the run's time (`t`, s). In messages of the tick loop `seq` is the tick k and
+Every message has its sender (`sender`), the sender's epoch (`epoch`, which identifies one process; see
+`wire.admission`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick k and
 `t` is k T_c.
 """
 
@@ -49,21 +49,21 @@ PLANT = "plant"
 """Name under which the plant process sends."""
 
 OFF = "off"
-"""In place of an island's name: the inverter is off the network, or in an island that nothing feeds."""
+"""In place of an island's name: the inverter is off the network, or in a de-energised island."""
 
 
 def _once(what: str, names: tuple[str, ...]) -> None:
     if len(set(names)) != len(names):
-        raise ValueError(f"{what}: a name stands there twice")
+        raise ValueError(f"{what}: a name is in it twice")
 
 
 class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What every message has."""
+    """Fields of every message."""
 
     sender: QuickName
-    """Name of the inverter whose agent sent it, or `PLANT`."""
+    """Name of the sending agent's inverter, or `PLANT`."""
     epoch: Count
-    """Epoch of the sender: the life of one process. Two are equal or not; which is greater says nothing."""
+    """Epoch of the sender, which identifies one process; epochs are compared only for equality."""
     seq: Count
     """Tick number k in the tick loop, roster number while a roster is prepared."""
     t: Time
@@ -74,12 +74,12 @@ class Message(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True,
 
 
 class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What an agent tells of itself once; the communication graph's rule is applied to these."""
+    """An agent's description of its inverter, fixed for an epoch; the rule of the communication graph applies to it."""
 
     kind: Literal["GFM", "GFL"]
     """Grid-forming (a leader of the consensus) or grid-following (a follower)."""
     microgrid: Label
-    """Name of the microgrid the inverter stands in."""
+    """Name of the inverter's microgrid."""
     P_rated: Rating
     """Rated real power s_i (W), base of every per-unit power of this inverter."""
     V_nom: NominalVoltage
@@ -93,10 +93,10 @@ class Nameplate(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
 
 class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What an inverter's sensors read at tick k, and the grant to compute tick k (plant -> agent)."""
+    """Sensor readings of an inverter at tick k, and the grant to compute tick k (plant -> agent)."""
 
     to: QuickName
-    """Inverter this measurement belongs to."""
+    """Inverter of this measurement."""
     P: Power
     """Real power out of the inverter (W, three phases)."""
     Q: Power
@@ -106,15 +106,15 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     f: Frequency
     """Frequency (Hz): of the internal voltage of a GFM, of the PLL of a GFL."""
     P_set: Power
-    """Real-power set-point the plant holds now (W)."""
+    """Real-power set-point that the plant holds now (W)."""
     V_set: Voltage
-    """Voltage set-point the plant holds now (V)."""
+    """Voltage set-point that the plant holds now (V)."""
     grid_connected: bool
     """Whether a closed path leads to the substation: secondary control is then on hold."""
     island: QuickNameOrNone
     """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
     roster: QuickNames
-    """Agents of this tick, in the order of the inverters. In wall-clock time those that the plant has heard of late."""
+    """Agents of this tick, in the order of the inverters. In wall-clock time the agents that the plant hears."""
 
     def __post_init__(self) -> None:
         check_names(self.sender, self.to, self.island or self.to, *self.roster)
@@ -122,16 +122,16 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
 
 
 class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):
-    """The integral of an inverter's frequency: two that differ ever more are not in step."""
+    """Integral of an inverter's frequency error: two angles that drift apart prove two islands."""
 
     cycles: Cycles
-    """int (f - f_nom) dt."""
+    """int (f - f_nom) dt (cycles)."""
     since: Time
-    """Run time whence it counts (s): it begins anew where measurements are missing."""
+    """Run time (s) from which it counts; it restarts where measurements are missing."""
 
 
 class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """What an agent decided at tick k: its set-points, heard by its neighbours and by the plant."""
+    """An agent's decision at tick k: its set-points (agent -> plant and neighbours)."""
 
     P_set: Power
     """Real-power set-point (W)."""
@@ -140,34 +140,35 @@ class State(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=
     Q: Power
     """Reactive power measured at tick k (var)."""
     island: QuickNameOrNone = ""
-    """Island the inverter stood in at that measurement: who stands in another one leaves this state out of its sums.
+    """Island of the inverter at that measurement: agents in another island leave this state out of their sums.
     Empty if it is not known."""
     angle: Angle | None = None
-    """Where the inverter's angle stood at that measurement; sent only where islands are told apart by it."""
+    """Angle of the inverter at that measurement; only where agents tell islands apart by it."""
     idle: bool = False
-    """Whether the agent stands still: paused, or without a measurement. In wall-clock time it then says nothing; in
-    simulated time the tick waits for this state, which nobody uses."""
+    """Whether the agent is idle: paused, or without a measurement. In wall-clock time it then sends nothing; in
+    simulated time the tick waits for this state, which no neighbour uses."""
     shared: Shared = {}
-    """What the law of the agent shares beside its set-points."""
+    """Further values that the agent's law shares."""
     quiet: bool = False
-    """Whether the law does not tell the neighbours: they keep what they heard last, the plant takes the set-points. In
-    wall-clock time such a state goes to the plant alone, under a key of its own; in simulated time it keeps time."""
+    """Whether the law sends nothing to the neighbours: they keep its last state, the plant takes the set-points. In
+    wall-clock time such a state goes to the plant alone, under a key of its own; in simulated time it only grants the
+    next tick."""
     skipped: Count = 0
-    """Quiet states since the last that was not: no neighbour has missed those numbers. In wall-clock time only."""
+    """Quiet states since the last other one: no neighbour has missed those numbers. In wall-clock time only."""
     fault: Text = ""
-    """What the law of the agent did that it must not; from then on the agent stands still."""
+    """Failure of the agent's law; from then on the agent is idle."""
 
     def __post_init__(self) -> None:
         check_names(self.sender, self.island or self.sender)
 
 
 class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """The plant asks every agent of a roster to be ready to hear its neighbours (plant -> agents)."""
+    """Request to every agent of a roster to get ready to hear its neighbours (plant -> agents)."""
 
     roster: Names
     """Agents that will take part from the next tick on, in the order of the inverters."""
     instances: Names
-    """Of each agent on the roster the instance that is meant: two processes may claim one name."""
+    """Instance of each agent on the roster: two processes may claim one name."""
 
     def __post_init__(self) -> None:
         check_names(self.sender)
@@ -177,43 +178,43 @@ class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
 
 
 class Waiting(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """The plant is there, but not yet at t = 0; now and then until it is (plant -> agents, wall-clock time)."""
+    """Sign of life of a plant that has not reached t = 0 (plant -> agents, wall-clock time)."""
 
     waits_for: Names
-    """Agents that have not come."""
+    """Missing agents."""
 
 
 class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """An agent hears all its in-neighbours of roster number `seq` (agent -> plant)."""
+    """Notice that an agent hears all its in-neighbours of roster number `seq` (agent -> plant)."""
 
 
 class Stop(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """The run is over and agents close; or, sent to one agent, it cannot take part or shall leave (plant -> agents)."""
+    """End of the run, for all agents; to one agent: a refusal, or a request to leave (plant -> agents)."""
 
     reason: Text
-    """Why, for the log: "end of the scenario", or what went wrong."""
+    """Reason, for the log: "end of the scenario", or the failure."""
     refused: bool = False
-    """Whether the agent never took part, as another has its name or no inverter has."""
+    """Whether the agent never took part, because its name is taken or no inverter has it."""
 
 
 class Leave(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """An agent leaves properly: the plant takes its inverter off the network (agent -> plant, wall-clock time)."""
+    """Notice of a proper leave: the plant takes the inverter off the network (agent -> plant, wall-clock time)."""
 
 
 class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What the emulated links into one receiver did of late (agent -> plant -> recorders)."""
+    """Account of the emulated links into one receiver since its last report (agent -> plant -> recorders)."""
 
     data: Data
-    """A part of the receiver's book, for the record; no core looks into it."""
+    """A part of the account, for the record; no core reads it."""
     instance: NameOrNone = ""
-    """Which process of the sender's: it is told that its last part has come."""
+    """Instance of the sender, which gets an acknowledgement of its last part."""
     final: bool = False
-    """Whether this is the last part: the sender closes once it is told."""
+    """Whether this is the last part: the sender closes once it is acknowledged."""
 
     def __post_init__(self) -> None:
         check_names(self.sender)
         if self.final and not self.instance:
-            raise ValueError("instance: the last part must say whom to tell that it has come")
+            raise ValueError("instance: the last part must name the instance that gets its acknowledgement")
 
 
 class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -230,14 +231,14 @@ class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
 
 
 class LinkAcknowledgement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """Links have taken the command of number `seq`, or report their status (agent -> plant -> command line)."""
+    """Acknowledgement of link request `seq`, or the links' status (agent -> plant -> command line)."""
 
     ok: bool
-    """Whether it was done."""
+    """Whether the links have applied it."""
     text: Text
-    """The links that it changed, or why it was not done."""
+    """The links that it changed, or the reason of a rejection."""
     reply_to: Name
-    """That of the `LinkRequest`."""
+    """`reply_to` of the `LinkRequest`."""
     data: Data = b""
     """The status of the links, to number 0; no core reads it."""
 
@@ -246,8 +247,8 @@ class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     """A command that a person gives the plant (command line -> plant, wall-clock time)."""
 
     verb: Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links", "telemetry"]
-    """Open or close a switch; close it if its sides are in step; have an agent leave; end the run; answer with its
-    status; give emulated links a command; ask all of them for their status; publish telemetry again that a recorder has
+    """Open or close a switch; close it if its sides are in step; let an agent leave; end the run; answer with its
+    status; send emulated links a command; ask all of them for their status; publish telemetry again that a recorder has
     missed."""
     argument: Text = ""
     """Name of the switch or of the agent; number of the first Telemetry needed; empty for the others."""
@@ -265,44 +266,44 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
     """The result of a command; `seq` is the command's (plant -> command line)."""
 
     ok: bool
-    """Whether it was done."""
+    """Whether the plant carried it out."""
     text: Reply
     """One sentence for a person; the answers to "status", "link", "links" are one JSON object each, that to "telemetry"
     is the number of the first Telemetry that comes again."""
 
 
 class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """How an agent fares (agent -> who watches, wall-clock time); `t` is its last measurement's."""
+    """Status of an agent (agent -> watchers, wall-clock time); `t` is its last measurement's."""
 
     phase: Literal["seeking", "waiting", "running"]
-    """No plant is there; the plant is there but no fresh measurement; ticking."""
+    """No plant found; plant found, but no fresh measurement; ticking."""
     waits_for: Text
-    """What it waits for, for a person; empty while it runs."""
+    """What the agent waits for, for a person; empty while it runs."""
     island: NameOrNone
-    """Island it stands in: "grid", the first inverter in it, or empty if that is not known."""
+    """Its island: "grid", the first inverter in it, or empty if that is not known."""
     neighbours: Names
-    """Whom the run's rule tells it to listen to among those present."""
+    """Its in-neighbours by the run's rule, among the present agents."""
     ages: Annotated[tuple[Age, ...], msgspec.Meta(max_length=MOST)]
-    """Of each neighbour the age of its last state (s of run time, on the own clock); -1 if none was heard."""
+    """Age of each neighbour's last state (s of run time, on the own clock); -1 if none was heard."""
     used: Names
-    """The neighbours in its sums now: heard, present, young enough and in the same island."""
+    """Neighbours in its sums now: heard, present, young enough and in the same island."""
     received: Count
-    """Messages that came in and were used, since its start."""
+    """Messages received and used, since its start."""
     sent: Count
     """States sent since its start."""
     rejected: Count
     """Messages dropped since its start."""
     lost: Count
-    """Messages that never came for use, since its start: by gaps in the numbers of who sent them, and by what emulated
-    links dropped; not what a cut still keeps."""
+    """Messages lost since its start: gaps in the senders' numbers, and drops of emulated links; not those that a cut
+    still holds."""
     ticks: Count
     """Ticks done since its start."""
     missed: Count
-    """Ticks skipped since its start, as their time was over."""
+    """Ticks skipped since its start, because their time was over."""
     lateness: Time
     """Longest delay of a tick behind its time since the last status (s of wall time)."""
     impaired: Names = ()
-    """Senders between whom and this agent an emulated fault holds now."""
+    """Senders whose links to this agent have an emulated fault now."""
 
     def __post_init__(self) -> None:
         check_names(self.sender)
@@ -312,12 +313,12 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
 
 
 class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Something that happened in the plant or to the roster, for `events.csv`."""
+    """An event of the plant or of the roster, for `events.csv`."""
 
     t: Time
     """Run time (s)."""
     kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "law", "warning"]
-    """What sort of event."""
+    """Kind of the event."""
     subject: Label
     """The switch, island or agent concerned."""
     text: Text
@@ -325,7 +326,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How well the plant keeps real time: delays of its steps behind their due times, in s of wall time."""
+    """Delays of the plant's steps behind their due times (s of wall time)."""
 
     steps: Count
     """Steps since the start."""
@@ -340,23 +341,23 @@ class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     worst: Time
     """Longest delay (s)."""
     slipped: Time
-    """By how much the schedule was put off in all, as it could not be caught up with (s)."""
+    """Total time (s) by which the schedule was postponed, because it could not be caught up with."""
 
 
 VALUES = 6
-"""Values of each inverter in a row of telemetry."""
+"""Number of values of each inverter in a row of telemetry."""
 
 
 class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """What the recorder writes: the plant's truth since the last telemetry (plant -> recorder)."""
+    """Rows and events of the plant since the last telemetry, for the record (plant -> recorder)."""
 
     inverters: Names
     """Names of the inverters, the order of the columns."""
     rows: Annotated[tuple[tuple[float, ...], ...], msgspec.Meta(max_length=2000)]
     """Rows [t (s), then for each inverter f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V)].
 
-    P_set and V_set are those that were in force in the step that ended at t. Of t apart, a number may be infinite or
-    none at all: the recorder is told the plant's truth.
+    P_set and V_set are those in force in the step that ended at t. Every number but t may be infinite or NaN: the
+    record shows the plant as it is.
     """
     events: Annotated[tuple[PlantEvent, ...], msgspec.Meta(max_length=1000)]
     """Events since the last telemetry."""
@@ -367,16 +368,16 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     reproducible: bool
     """False once something unscripted (a dead agent) has entered the run; always false in wall-clock time."""
     pacing: Pacing | None = None
-    """How well the plant keeps real time; only in wall-clock time."""
+    """Delays of the plant's steps; only in wall-clock time."""
     awaited: Names = ()
-    """Agents that the scenario lets join now: whoever runs the scenario starts them. Told once."""
+    """Agents that join now by the scenario: the process that runs the scenario starts them. Sent once."""
     impaired: Names = ()
-    """Agents between whom and the plant an emulated fault holds now; only in wall-clock time."""
+    """Agents whose links to the plant have an emulated fault now; only in wall-clock time."""
     quiet: Annotated[tuple[tuple[Time, Count], ...], msgspec.Meta(max_length=2000)] = ()
-    """Run time (s), and how many states of that tick the neighbours were not told of, as the laws had it."""
+    """Run time (s) of each tick, and its number of quiet states."""
     others: Count = 0
-    """Messages of other types on this key since the Telemetry before; only in wall-clock time. So a recorder knows
-    whether it has got them all."""
+    """Messages of other types on this key since the last Telemetry; only in wall-clock time. So a recorder knows
+    whether it has received them all."""
 
     def __post_init__(self) -> None:
         check_names(self.sender)
@@ -409,10 +410,10 @@ AnyMessage = (
     | AgentStatus
     | Telemetry
 )
-"""Everything that can arrive."""
+"""Every type of message."""
 
 MESSAGES = (
     Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, LinkRequest, LinkAcknowledgement,
     Command, Answer, AgentStatus, Telemetry,
 )  # fmt: skip
-"""The types of `AnyMessage`, for documentation that is made from the code."""
+"""The types of `AnyMessage`, for documentation made from the code."""

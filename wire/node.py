@@ -1,19 +1,19 @@
-"""A node: what takes part in a run, on either side and under either kind of time. Messages in, actions out. Pure.
+"""A node: one participant of a run, on either side and under either kind of time. Messages in, actions out. Pure.
 
 A node is sans-IO. A driver (`wire.driver.drive` over Zenoh, `scenarios.drivers.inprocess` on a bus) owns it in one
 thread and does
 
-    node.appeared(key, now) | node.vanished(key, now)       a liveliness token came or went
-    node.received(key, payload, now)                        a message, or the answer to a `Fetch`
-    node.work(now)                                          at most one piece of work, if all is here for it
-    for action in node.take_actions(): ...                  do it, in this order
+    node.appeared(key, now) | node.vanished(key, now)       for a liveliness token that appears or vanishes
+    node.received(key, payload, now)                        for a message, or the answer to a `Fetch`
+    node.work(now)                                          for at most one piece of work, if it is ready
+    for action in node.take_actions(): ...                  to perform the actions, in this order
     node.expire(now)                                        when `node.deadline` has passed
 
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
-Every message takes one way: it is decoded, which bounds all that is in it; its sender and epoch are checked
-(`wire.admission`), and its type; then the handler of its route gets it. Whatever is wrong with a message, or goes wrong
-while it is handled, costs that message alone.
+Every message takes one way. `received` decodes it, which checks its bounds; it checks sender and epoch
+(`wire.admission`), and the type; then the handler of the message's route gets it. A wrong message, or an error while it
+is handled, costs that message alone.
 """
 
 from __future__ import annotations
@@ -32,34 +32,34 @@ from wire.membership import Membership
 from wire.messages import AnyMessage, LinkReport, Message, Nameplate
 
 Handler = Callable[[Any, bytes, float], None]
-"""Takes a message of one of its route's types, its bytes, and the time; RejectedError if it is not for here and now."""
+"""Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
 
 CLOCK_ALONE = 1 << 30
-"""Messages needed by a node that its clock wakes: they wait for its next tick; only tokens and words wake it before."""
+"""`messages_needed` of a node that its clock wakes: messages wait for its next tick, only tokens and words wake it."""
 
 ANYBODY = ""
-"""Sender of a route on which whoever is there may speak."""
+"""Sender of a route that every participant may use."""
 
 
 class Route(NamedTuple):
-    """What may come on a key."""
+    """Sender, types and handler of the messages on a key."""
 
     sender: str
-    """Who speaks there."""
+    """The only valid sender, or `ANYBODY`."""
     types: tuple[type[Message], ...]
     """Types of its messages."""
     handle: Handler
     early: bool = False
-    """Whether it may come before its sender is known, as a nameplate does: its handler looks to it."""
+    """Whether a message may arrive before its sender's epoch is known, as a nameplate does: its handler checks it."""
 
 
 class Node:
-    """What an agent, the plant and a recorder have in common.
+    """The common part of an agent, the plant and a recorder.
 
     Parameters
     ----------
     name : str
-        Who it is.
+        Name under which it sends.
     run : str
         Name of the run.
     rate : float, optional
@@ -81,18 +81,18 @@ class Node:
         raise NotImplementedError
 
     def take_actions(self) -> list[Action | Log]:
-        """What is to be done now, in this order."""
+        """Take out the actions to perform now, in this order."""
         actions, self._actions = self._actions, []
         return actions
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message; what cannot be used is counted and dropped. What comes after the end is for nobody."""
+        """Take a message; count and drop it if it cannot be used. After the end, ignore it."""
         if self.finished:
             return
         try:
             route = self.routes.get(key)
             if route is None:
-                raise RejectedError("foreign", "nothing was asked for on this key")
+                raise RejectedError("foreign", "this node has no subscription or query on this key")
             message = decode(payload)
             self._admit(route, message, now)
             if not isinstance(message, route.types):
@@ -103,7 +103,7 @@ class Node:
         except RejectedError as rejected:
             self.rejects.add(rejected.kind, key, rejected.text)
         except Exception as error:
-            # The last line of defence: an error of ours, which some message has found, is that message's end alone.
+            # The last line of defence: an error of ours rejects the message that raised it, and nothing else.
             self.rejects.failed(key, error)
 
     @property
@@ -114,7 +114,7 @@ class Node:
     # ---------------------------------------------------------------- nameplates
 
     def _ask(self, name: str, instance: str) -> None:
-        """Ask a process who it is."""
+        """Ask a process for its nameplate."""
         key = self.keys.nameplate(name, instance)
         self.routes[key] = Route(name, (Nameplate,), partial(self._on_nameplate, instance), early=True)
         self._actions.append(Fetch(key))
@@ -124,17 +124,17 @@ class Node:
             self._met(nameplate, now)
 
     def _met(self, nameplate: Nameplate, now: float) -> None:
-        """Note who somebody is who counts from now on."""
+        """Note the nameplate of an agent that counts from now on."""
 
     def _forget_process(self, name: str, instance: str) -> bool:
-        """Note that the token of a process is gone; whether it counted."""
+        """Note that the token of a process is gone; return whether the process counted."""
         self.routes.pop(self.keys.nameplate(name, instance), None)
         return self.members.vanished(name, instance)
 
     # ---------------------------------------------------------------- checks
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        """Make sure that a message is of whom its key says, and of the one that lives."""
+        """Raise RejectedError unless a message is from its key's sender, in that sender's epoch."""
         if route.sender == ANYBODY:
             return
         if message.sender != route.sender:
@@ -144,10 +144,10 @@ class Node:
             self.admission.check(message)
 
     def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
-        """Note a message that came under another's key."""
+        """Note a message under another sender's key."""
 
     def _used(self, message: AnyMessage, now: float) -> None:
-        """Note a message that was of use."""
+        """Note a message that was used."""
 
     def _publish(self, key: str, payload: bytes) -> None:
         self._actions.append(Publish(key, payload))
@@ -155,7 +155,7 @@ class Node:
     def _publish_link_reports(
         self, key: str, links: Links | None, epoch: int, *, t: float = 0.0, instance: str = "", last: bool = False
     ) -> None:
-        """Publish what the emulated links into this node did since the last report."""
+        """Publish the account of the emulated links into this node since the last report."""
         parts = () if links is None else links.report(last=last)
         for data in parts:
             final = last and bool(instance) and data is parts[-1]
@@ -163,5 +163,5 @@ class Node:
             self._publish(key, encode(report))
 
     def _say(self, text: str) -> None:
-        """Have a line logged."""
+        """Log a line."""
         self._actions.append(Log(f"{self._name}: {text}"))

@@ -1,4 +1,4 @@
-"""Which plant an agent or a recorder believes, of those that claim to be the plant of its run. Pure."""
+"""Select the plant that an agent or a recorder follows, among those that claim to be its run's. Pure."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from wire.node import Node, Route
 
 
 class PlantFollower(Node):
-    """Follows the plant that speaks first of those whose tokens are there, until its token is gone.
+    """Follow the present plant that sends first, until its token is gone.
 
     Parameters
     ----------
     name : str
-        Who it is.
+        Name under which it sends.
     run : str
         Name of the run.
     rate : float, optional
@@ -25,17 +25,17 @@ class PlantFollower(Node):
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         super().__init__(name, run, rate)
         self._plants: set[int] = set()
-        """Epochs of the plants whose tokens are there."""
+        """Epochs of the present plants."""
 
     def _plant_appeared(self, part: str) -> bool:
-        """Note the token of a plant by its last part; False if no plant could hold such a one."""
+        """Note a plant's token by its last part; return False if that is no epoch."""
         epoch = epoch_of(part)
         if epoch is not None:
             self._plants.add(epoch)
         return epoch is not None
 
     def _plant_vanished(self, part: str) -> bool:
-        """Note that the token of a plant is gone; whether the endpoint is without a plant now."""
+        """Note that a plant's token is gone; return whether this node has no plant now."""
         if (epoch := epoch_of(part)) not in self._plants:
             return False
         self._plants.discard(epoch)
@@ -45,7 +45,7 @@ class PlantFollower(Node):
         return followed == epoch or not self._plants
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        """Follow a plant that is there, if none is followed yet, and check the message."""
+        """Check a message; first follow its plant if this node follows none."""
         epoch = message.epoch
         if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
             self.admission.bind(PLANT, epoch)
@@ -53,4 +53,4 @@ class PlantFollower(Node):
         super()._admit(route, message, now)
 
     def _follow(self, epoch: int) -> None:
-        """Note that the plant of this epoch is followed from now on."""
+        """Note the epoch of the plant that this node follows from now on."""

@@ -1,4 +1,4 @@
-"""Text that is safe on a terminal and in a log: one line of characters that can be seen. Pure."""
+"""Text that is safe on a terminal and in a log: one line of visible characters. Pure."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
 
 
 def printable(text: str, limit: int = 4000) -> str:
-    r"""Text with what cannot be printed spelt out, cut to a length.
+    r"""Return a text with its unprintable characters spelt out, cut to a length.
 
-    Whoever sends a text that an error or a file has made passes it through this: one with a control character in it is
-    refused by all who receive it.
+    Pass every text from an error or a file through this before you send it: receivers reject a text with a control
+    character.
 
     Examples
     --------
@@ -22,5 +22,5 @@ def printable(text: str, limit: int = 4000) -> str:
     >>> printable("abcdef", 5)
     'ab...'
     """
-    text = _UNPRINTABLE.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+    text = _UNPRINTABLE.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,32 +1,32 @@
-"""How often a line that comes again and again is said, and how many were left out. Time is an argument (s)."""
+"""Limit how often a repeated line is logged, and count the omitted ones. Time is an argument (s)."""
 
 from __future__ import annotations
 
 import re
 
 BURST = 20
-"""Lines of one kind that may come at once, as of all agents that join."""
+"""Lines of one kind that may come at once, such as those of all joining agents."""
 
 INTERVAL = 10.0
-"""Time (s) after which one more may come."""
+"""Time (s) after which one more line may come."""
 
 _KINDS = 200
-"""Kinds that are told apart; all further ones count as one."""
+"""Number of distinct kinds; all further lines count as one kind."""
 
 _NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 
 
 class RateLimit:
-    """Lets the first lines of a kind through, then one in a while that tells how many were left out.
+    """Pass the first lines of a kind, then one at each interval with the number of omitted ones.
 
-    Lines are of one kind if they differ in numbers only.
+    Lines that differ only in numbers are of one kind.
 
     Parameters
     ----------
     burst : int, optional
         Lines of a kind that may come at once.
     interval : float, optional
-        Time (s) after which one more may.
+        Time (s) after which one more line may come.
 
     Examples
     --------
@@ -42,12 +42,12 @@ class RateLimit:
     def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:
         self._burst, self._interval = burst, interval
         self._allowed: dict[str, tuple[float, float]] = {}
-        """Of each kind how many lines may come now, and when that was so (s)."""
+        """Number of lines of each kind that may come, and the time (s) of that number."""
         self._left: dict[str, tuple[int, str]] = {}
-        """Of each kind how many were left out since the last that was said, and the latest of them."""
+        """Number of omitted lines of each kind since the last one passed, and the latest of them."""
 
     def admit(self, text: str, now: float) -> str | None:
-        """Say a line now (s): as it is, with a word on those left out before it, or not at all."""
+        """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""
         kind = _NUMBER.sub("0", text)
         if kind not in self._allowed and len(self._allowed) >= _KINDS:
             kind = ""
@@ -62,6 +62,6 @@ class RateLimit:
         return f"{text} ({left} more of this kind left out)" if left else text
 
     def left_out(self) -> list[str]:
-        """Take out what is yet to be told of lines that were left out, e.g. at the end."""
+        """Take out one line per kind on its omitted lines, e.g. at the end."""
         left, self._left = self._left, {}
         return [f"{count} more of this kind left out, the last: {text}" for count, text in left.values()]

@@ -1,4 +1,4 @@
-"""The tick policy of simulated time: go on when all that a tick needs is here, or say who is missing. Pure."""
+"""The tick policy of simulated time: continue when all messages of a tick are here, or name the missing ones. Pure."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 
 class Awaited(NamedTuple):
-    """One message that is waited for."""
+    """One message that a node waits for."""
 
-    what: str
+    message: str
     """E.g. "State(41)"."""
-    who: str
-    """Who should send it."""
+    sender: str
+    """Name of its sender."""
 
 
 class TickBarrier:
-    """What is awaited of whom, until when, and the last sign of life of everybody.
+    """The awaited messages, their deadline, and the last sign of life of every sender.
 
     Parameters
     ----------
-    who : str
-        Who waits.
+    name : str
+        Name of the waiting node.
     timeout : float
         Longest wait without progress (s on the driver's clock).
 
@@ -36,47 +36,48 @@ class TickBarrier:
     'plant: no State(41) from inv3 within 10 s; last heard of inv3: tick 40, 10.0 s ago'
     """
 
-    def __init__(self, who: str, timeout: float) -> None:
-        self._who, self._timeout = who, timeout
+    def __init__(self, name: str, timeout: float) -> None:
+        self._name, self._timeout = name, timeout
         self._awaited: dict[str, str] = {}
-        """What each of those should send who have not yet."""
+        """Missing message of each sender."""
         self._last: dict[str, tuple[int, float]] = {}
+        """Number and time (s) of each sender's last message."""
         self.deadline: float | None = None
-        """When the present wait is over (s); None if it has no end."""
+        """End of the present wait (s); None if it has none."""
 
     @property
     def is_open(self) -> bool:
-        """Whether nothing is missing any more."""
+        """Whether no message is missing."""
         return not self._awaited
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages that are missing; at least one."""
+        """Number of missing messages; at least one."""
         return max(1, len(self._awaited))
 
     def wait_for(self, awaited: Mapping[str, str], now: float) -> None:
-        """Begin a new wait: for what each of these should send."""
+        """Start a new wait for a message of each of these senders."""
         self._awaited = dict(awaited)
         self.renew(now)
 
     def awaits(self, name: str) -> bool:
-        """Whether something is awaited from somebody."""
+        """Whether a message of this sender is missing."""
         return name in self._awaited
 
     def came(self, name: str) -> None:
-        """Note that somebody has sent what was awaited, or never will."""
+        """Note that a sender has sent its message, or never will."""
         self._awaited.pop(name, None)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """What is awaited, of whom."""
-        return tuple(Awaited(what, who) for who, what in self._awaited.items())
+        """Return the missing messages with their senders."""
+        return tuple(Awaited(message, sender) for sender, message in self._awaited.items())
 
     def heard(self, name: str, seq: int, now: float) -> None:
         """Note a sign of life: a message numbered `seq`."""
         self._last[name] = (seq, now)
 
     def renew(self, now: float) -> None:
-        """Note progress: the deadline counts from now."""
+        """Note progress: the deadline restarts from now."""
         self.deadline = now + self._timeout
 
     def rest(self) -> None:
@@ -84,13 +85,13 @@ class TickBarrier:
         self.deadline = None
 
     def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
-        """One sentence for the end of the deadline: who is missing, its last tick and its last sign of life."""
+        """Return the error of a passed deadline: each missing sender with its last tick and last sign of life."""
         parts = []
-        for what, who in missing:
-            if who in self._last:
-                tick, at = self._last[who]
-                sign = f"last heard of {who}: tick {tick}, {now - at:.1f} s ago"
+        for message, sender in missing:
+            if sender in self._last:
+                tick, at = self._last[sender]
+                sign = f"last heard of {sender}: tick {tick}, {now - at:.1f} s ago"
             else:
-                sign = f"nothing was ever heard from {who}"
-            parts.append(f"no {what} from {who} within {self._timeout:g} s; {sign}")
-        return f"{self._who}: " + ". ".join(parts)
+                sign = f"nothing was ever heard from {sender}"
+            parts.append(f"no {message} from {sender} within {self._timeout:g} s; {sign}")
+        return f"{self._name}: " + ". ".join(parts)

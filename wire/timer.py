@@ -1,10 +1,10 @@
-"""A drift-free schedule: due times are start + n period, whatever happened in between. Time is an argument (s)."""
+"""A drift-free schedule: due times are always start + n period. Time is an argument (s)."""
 
 from __future__ import annotations
 
 
 class Timer:
-    """Due times of something that is done once in a period.
+    """Due times of a periodic task.
 
     Parameters
     ----------
@@ -15,7 +15,7 @@ class Timer:
 
     Examples
     --------
-    Woken too late, it skips what cannot be made up for, and keeps its schedule:
+    When it wakes too late, it skips the past due times and keeps its schedule:
 
     >>> timer = Timer(0.5, now=10.0)
     >>> timer.take(10.0), timer.due
@@ -35,11 +35,11 @@ class Timer:
         return self._start + self._n * self.period
 
     def take(self, now: float) -> int:
-        """Note that the due thing is done now; number of due times that were skipped for it."""
+        """Note that the task is done now (s); return the number of skipped due times."""
         past = max(0, int((now - self.due) / self.period))
         self._n += past + 1
         return past
 
     def shift(self, by: float) -> None:
-        """Put all due times to come later by so much (s), or earlier."""
+        """Move all further due times by so much (s)."""
         self._start += by

@@ -1,1 +1,1 @@
-"""What moves bytes and time: one Zenoh session, one queue, one loop; how processes start, end and print."""
+"""The driver moves bytes and time: one Zenoh session, one queue, one loop; start, end and output of a process."""

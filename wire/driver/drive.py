@@ -14,7 +14,7 @@ from wire.driver.session import Session
 
 
 class Core(Protocol):
-    """What the driver needs of a node (`wire.node`)."""
+    """The part of a node (`wire.node`) that the driver uses."""
 
     rejects: RejectedMessages
 
@@ -40,20 +40,20 @@ class Core(Protocol):
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages without which it cannot go on before `until`."""
+        """Number of messages that it needs to continue before its deadline."""
         ...
 
     @property
     def deadline(self) -> float | None:
-        """When the deadline passes (s)."""
+        """Time of the deadline (s); None if there is none."""
         ...
 
     def start(self, now: float) -> None:
-        """Begin."""
+        """Start."""
         ...
 
     def take_actions(self) -> Sequence[Action | Log]:
-        """What is to be done."""
+        """Take out the actions to perform."""
         ...
 
     def appeared(self, key: str, now: float) -> None:
@@ -65,7 +65,7 @@ class Core(Protocol):
         ...
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message, which came at `now`; it may have waited for its owner since."""
+        """Take a message that arrived at `now` (s); it may have waited in the inbox since."""
         ...
 
     def work(self, now: float) -> bool:
@@ -78,14 +78,14 @@ class Core(Protocol):
 
 
 class StoppedError(BaseException):
-    """Another part of the process, or a signal, wants it to end.
+    """Request to end, from another part of the process or a signal.
 
-    No `Exception`: a signal comes at any moment, also while a message is handled, whose errors are the message's own.
+    It is no `Exception`: a signal may come while a node handles a message, and a node catches the errors of that.
     """
 
 
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
-    """Do what a core asks for, in its order."""
+    """Perform the actions of a core, in its order."""
     for action in actions:
         if isinstance(action, Publish):
             session.publish(action.key, action.payload)
@@ -98,10 +98,10 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
 
 
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
-    """Begin, declare what a core needs and serve it until it is over; the rest as of `serve`.
+    """Start a core, declare its keys and serve it until it has finished; parameters and errors are those of `serve`.
 
-    It begins first: one that begins again needs less than it did at the end of its last session. The token comes last
-    of all that is declared: who sees it may count on the rest.
+    The start comes first, because a restarted core needs fewer keys than at the end of its last session. The token is
+    declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
     for key in core.subscriptions:
@@ -112,21 +112,21 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 
 
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
-    """Serve a core that has begun until it is over.
+    """Serve a started core until it has finished.
 
     Parameters
     ----------
     core : Core
-        What decides.
+        Node that decides.
     session : Session
-        What carries; the caller has made it answer whatever the core must answer.
+        Session that carries its messages; the caller has declared the core's queryables.
     log : logging.Logger
-        Where rejects are told, one line per kind.
+        Log of the core's lines and of rejected messages, one line per kind.
 
     Raises
     ------
     StoppedError
-        If a word to stop comes into the inbox.
+        If another thread asks the process to stop.
     """
     take = session.take
     limit = limit_log(log)
@@ -140,8 +140,8 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
         if core.work(now):
             now = monotonic()
             continue
-        until = core.deadline
-        events = take(core.messages_needed, None if until is None else max(0.0, until - now))
+        deadline = core.deadline
+        events = take(core.messages_needed, None if deadline is None else max(0.0, deadline - now))
         now = monotonic()
         for kind, key, payload, at in events:
             if kind == "message":
@@ -152,8 +152,8 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
-        until = core.deadline  # what came in may have put it off
-        if until is not None and now >= until:  # also when the inbox never runs empty
+        deadline = core.deadline  # a message may have postponed it
+        if deadline is not None and now >= deadline:  # also when the inbox never runs empty
             core.expire(now)
         if core.rejects.has_lines:
             for line in core.rejects.take_lines():

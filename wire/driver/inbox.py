@@ -1,4 +1,4 @@
-"""What has come in and waits for the one thread that owns the core."""
+"""The queue of events for the one thread that owns the core."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from time import monotonic
 from typing import Literal
 
 Kind = Literal["message", "appeared", "vanished", "word"]
-"""A message or answer; a token that came or went; or a word from another thread of the own process."""
+"""A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
 
 Stamped = tuple[Kind, str, bytes, float]
-"""The same, and when it came (s, monotonic): it may have waited here for its owner."""
+"""The same with its time of arrival (s, monotonic): it may wait here for its owner."""
 
 
 class Inbox:
-    """Events from Zenoh's threads to the owner's.
+    """Queue events from Zenoh's threads to the owner's thread.
 
-    The owner says how many messages it needs before it can do anything, and is woken only then: in a full mesh of nine
-    that is one wake a tick instead of nine, half of the time of a tick. Whatever is not a message wakes it at once.
+    The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine
+    this is one wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
 
     Examples
     --------
@@ -36,7 +36,7 @@ class Inbox:
 
     def __init__(self) -> None:
         self._events: deque[Stamped] = deque()
-        self._wanted = 1
+        self._needed = 1
         self._urgent = False
         self._wake = allocate_lock()
         self._wake.acquire()
@@ -45,30 +45,30 @@ class Inbox:
         """Put an event in; from any thread, never blocking."""
         self._events.append((*event, monotonic()))
         if event[0] != "message":
-            self._urgent = True  # before the wake: one that comes while the owner computes is forgotten by `take`
-        if self._urgent or len(self._events) >= self._wanted:
+            self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
+        if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
 
-    def take(self, wanted: int, timeout: float | None) -> list[Stamped]:
+    def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take all events out.
 
         Parameters
         ----------
-        wanted : int
-            How many messages to wait for, unless something else comes.
+        needed : int
+            Number of messages to wait for; any other event ends the wait.
         timeout : float or None
-            Longest wait (s); None for no end.
+            Longest wait (s); None for no limit.
 
         Returns
         -------
         list[Stamped]
-            What is there, in order; perhaps fewer than wanted, or, now and then, nothing before the time is out.
+            The present events, in order; perhaps fewer than needed, or, rarely, none before the timeout.
         """
         events = self._events
-        self._wake.acquire(blocking=False)  # an old wake is of no interest
-        self._wanted = wanted
-        if len(events) < wanted and not self._urgent:
+        self._wake.acquire(blocking=False)  # forget an old wake
+        self._needed = needed
+        if len(events) < needed and not self._urgent:
             self._wake.acquire(timeout=-1.0 if timeout is None else timeout)
         self._urgent = False
         taken = []

@@ -1,4 +1,4 @@
-"""The end of a process in which somebody's code has left threads running: Python alone would wait for them for ever."""
+"""End a process in which foreign code has left threads running: Python alone would wait for them for ever."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from collections.abc import Callable
 from time import monotonic
 
 GRACE = 1.0
-"""Time (s) that such threads have to end by themselves."""
+"""Time (s) for such threads to end by themselves."""
 
 
 def leave(status: int, tell: Callable[[str], None]) -> None:
-    """Return if no thread holds the process up; else end it.
+    """Return if no thread keeps the process alive; else end the process.
 
     Parameters
     ----------
     status : int
         Exit status of the process.
     tell : Callable[[str], None]
-        Takes a sentence on the threads that still run.
+        Logs a sentence on the threads that still run.
     """
-    until = monotonic() + GRACE
+    deadline = monotonic() + GRACE
     own = (threading.main_thread(), threading.current_thread())
     left = [thread for thread in threading.enumerate() if not thread.daemon and thread not in own]
     for thread in left:
-        thread.join(max(0.0, until - monotonic()))
+        thread.join(max(0.0, deadline - monotonic()))
     if still := [thread.name for thread in left if thread.is_alive()]:
         tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
-        atexit._run_exitfuncs()  # noqa: SLF001  what Python would do once they had ended
+        atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once they had ended
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

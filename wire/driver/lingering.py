@@ -1,10 +1,10 @@
-"""Zenoh's sockets, made to close at once.
+"""Make Zenoh's sockets close at once.
 
-Zenoh sets SO_LINGER to 10 s on every TCP socket. Closing one whose path is dead then blocks the thread that does it for
-as long, or until the path is whole again; and that thread serves all other links too. So when one host was cut off, the
-agents of all others heard nothing for up to 10 s a link, and after a heal links were added to transports that were
-still being closed. No setting of Zenoh's turns it off. Without it the kernel closes in the background, and still
-delivers what was sent.
+Zenoh sets SO_LINGER to 10 s on every TCP socket. Closing a socket with a dead path then blocks its thread for
+that time, or until the path is healed; and that thread serves all other links too. So when one host was cut off, the
+agents of all others heard nothing for up to 10 s a link, and after a heal Zenoh added links to transports that were
+still closing. No setting of Zenoh turns it off. Without it the kernel closes in the background, and still
+delivers the sent data.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A log in which lines that repeat themselves do not drown the others."""
+"""Limit repeated lines in a log, so that they do not drown the others."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from wire.rate_limit import RateLimit
 
 
 class LogLimit(logging.Filter):
-    """Leaves out of a log what repeats itself, and tells how much that was."""
+    """Omit repeated lines from a log, and count them."""
 
     def __init__(self) -> None:
         super().__init__()
         self._limit = RateLimit()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a line is written; its text then tells of those before it that were not."""
+        """Return whether to write a line; add the number of omitted lines before it to its text."""
         line = self._limit.admit(record.getMessage(), monotonic())
         if line is not None:
             record.msg, record.args = line, ()
         return line is not None
 
     def left_out(self) -> list[str]:
-        """What is yet to be told of lines that were left out."""
+        """Take out one line per kind on its omitted lines."""
         return self._limit.left_out()
 
 
 def limit_log(log: logging.Logger) -> LogLimit:
-    """Have a log leave out what repeats itself; a second call changes nothing."""
-    for known in log.filters:
-        if isinstance(known, LogLimit):
-            return known
+    """Let a log omit repeated lines; a second call changes nothing."""
+    for filter_ in log.filters:
+        if isinstance(filter_, LogLimit):
+            return filter_
     limit = LogLimit()
     log.addFilter(limit)
     return limit

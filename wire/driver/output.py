@@ -1,15 +1,15 @@
-"""Output that gets nowhere: its reader has gone, as by `| head -3`, or its disk is full.
+"""Handle lost output: its reader has gone, as by `| head -3`, or its disk is full.
 
-SIGPIPE ends a C program there. Python ignores it, and so must we: a Zenoh session or a child that goes away in the
-middle of a write would end the process too. So the write itself finds out, below all that buffers: print, logging and
-rich alike. What follows is one of two:
+SIGPIPE ends a C program there. Python ignores it, and so must we: a Zenoh session or a child that disappears in the
+middle of a write would end the process too. So the write itself detects it, below all buffers, for print, logging and
+rich alike. There are two reactions:
 
-- A command that exists for its output quits (`speaking`). If nobody reads, it does so without a word and with the exit
-  status that a shell gives for SIGPIPE; if it cannot be written, with one line on standard error. So does a relay: what
-  it did to the network ends with it, and does not outlast the process that started it.
-- A plant, an agent or a whole fleet goes on, and what it says is dropped. Its output is a log, and its work is to serve
-  others. To leave as on SIGTERM would take an inverter off the network, or end the run for everybody, because somebody
-  quit a pager: who wants that has `gridpeers stop`, `gridpeers down` and signals.
+- A command that exists for its output quits (`speaking`). If no reader is left, it ends silently with the exit
+  status that a shell gives for SIGPIPE; if the output cannot be written, it ends with one line on standard error. A
+  relay does the same: its effect on the network must not outlast the process that started it.
+- A plant, an agent or a group of them continues, and its output is dropped. Its output is a log, and others depend on
+  it. To leave as on SIGTERM would take an inverter off the network, or end the run for all, because a person
+  quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ READER_GONE = 128 + getattr(signal, "SIGPIPE", 13)
 """Exit status of a command whose reader has gone, as a shell counts signals."""
 
 UNWRITABLE = 2
-"""Exit status of a command whose output the machine refuses, as of one whose arguments cannot be used."""
+"""Exit status of a command whose output cannot be written, the same as for bad arguments."""
 
 
 class OutputLostError(SystemExit):
-    """What the command says gets nowhere, so it ends; contexts are left as on any other end."""
+    """End of a command whose output is lost; contexts exit as on any other end."""
 
 
 class ReaderGoneError(OutputLostError):
-    """Nobody reads what the command says."""
+    """The reader of the output has gone."""
 
     def __init__(self) -> None:
         super().__init__(READER_GONE)
@@ -47,7 +47,7 @@ class ReaderGoneError(OutputLostError):
 
 
 class UnwritableError(OutputLostError):
-    """What the command says cannot be written, e.g. to a full disk."""
+    """The output cannot be written, e.g. to a full disk."""
 
     def __init__(self, why: str) -> None:
         super().__init__(UNWRITABLE)
@@ -58,9 +58,9 @@ class UnwritableError(OutputLostError):
 
 
 class _Watched(io.FileIO):
-    """Standard output or error that notices when it gets nowhere; from then on, what a command says is dropped.
+    """Standard output or error that detects its loss; from then on, a command's output is dropped.
 
-    Who goes on tries again: a disk may have space again, a reader that has gone never comes back.
+    A process that continues tries again: a disk may have space again, but a reader never comes back.
     """
 
     def __init__(self, stream: io.TextIOWrapper, *, quits: bool) -> None:
@@ -68,62 +68,62 @@ class _Watched(io.FileIO):
         self.name = stream.name
         self.quits = quits
         self._lost: OutputLostError | None = None
-        self._told = False
+        self._raised = False
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Write what can be written."""
-        if not isinstance(self._lost, ReaderGoneError) and not self._told:
+        """Write, or drop the data if the output is lost."""
+        if not isinstance(self._lost, ReaderGoneError) and not self._raised:
             try:
                 return super().write(data)
             except BrokenPipeError:
                 self._lost = ReaderGoneError()
             except OSError as error:
                 self._lost = UnwritableError(error.strerror or str(error))
-        # Once is enough: what is said on the way out is dropped. In another thread it would end that thread alone.
-        if self._ends() and not self._told and threading.current_thread() is threading.main_thread():
-            self._told = True
+        # Raise once: the rest of the output is dropped. In another thread the error would end only that thread.
+        if self._ends() and not self._raised and threading.current_thread() is threading.main_thread():
+            self._raised = True
             assert self._lost is not None
             raise self._lost
         return memoryview(data).nbytes
 
     def _ends(self) -> bool:
-        """Whether it is a reason to quit; complaints that cannot be written keep their exit status, at least."""
+        """Whether the process quits; a command that cannot write its error message still has its exit status."""
         return self.quits and (isinstance(self._lost, ReaderGoneError) or self.name != "<stderr>")
 
 
 @contextmanager
 def speaking(program: str) -> Iterator[None]:
-    """Run a command that exists for its output; it ends in order when that gets nowhere, by `OutputLostError`.
+    """Run a command that exists for its output; end it by `OutputLostError` when the output is lost.
 
     Parameters
     ----------
     program : str
-        Who says on standard error that standard output cannot be written.
+        Name of the program, for its message on standard error.
     """
     watch_readers(quits=True)
     try:
         try:
             yield
         finally:
-            _flush()  # what this does at the interpreter's own end would be a complaint
+            _flush()  # an error at the interpreter's own flush would print a traceback
     except UnwritableError as error:
         print(f"{program}: {error}", file=sys.stderr)
         raise
 
 
 def watch_readers(*, quits: bool) -> None:
-    """Have standard output and error notice when they get nowhere; a later call changes what follows.
+    """Let standard output and error detect their loss; a later call changes the reaction.
 
-    Streams that are not the process's own, as those of tests, are left alone.
+    Streams that are not the process's own, such as those of tests, stay as they are.
 
     Parameters
     ----------
     quits : bool
-        Whether the process ends then, by `OutputLostError` in its main thread, or goes on in silence.
+        Whether the process then ends, by `OutputLostError` in its main thread, or continues silently.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if not isinstance(stream, io.TextIOWrapper):  # closed from the beginning, or somebody else's
+        if not isinstance(stream, io.TextIOWrapper):  # closed from the beginning, or replaced
             continue
         binary = stream.buffer
         raw = getattr(binary, "raw", binary)  # python -u has no buffer between
@@ -143,7 +143,7 @@ def watch_readers(*, quits: bool) -> None:
 
 
 def _flush() -> None:
-    """Write what is still buffered, while it can yet be noticed that it gets nowhere."""
+    """Write all buffers, while their loss can still be detected."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.flush()

@@ -1,7 +1,7 @@
-"""What the processes of a run have in common: their start by a line of JSON, their log, their end.
+"""Start, log and end of every process of a run.
 
-Exit statuses: 0 the run ended, or the process was asked to leave; 1 an error of our own, with a traceback in the log;
-2 a configuration that cannot work; 3 the run broke, or this process could not go on.
+Exit statuses: 0, the run ended, or the process was asked to leave; 1, an error of our own, with a traceback in the log;
+2, a configuration that cannot work; 3, the run broke, or this process could not continue.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from wire.links import Links
 OK, BAD_CONFIG, BROKE = 0, 2, 3
 
 _GRACE = 5.0
-"""Time (s) that a process has for a proper end once its parent is gone."""
+"""Time (s) for a proper end once the parent is gone."""
 
 LEASH = "--leash"
 """Option: end when standard input ends, that is, when the parent is gone."""
 
 _USAGE = """usage: python -m {module} [{leash} [NAME]] < CONFIG.json
 
-Runs {what}. The configuration is one JSON object on standard input; see {module}/config.py.
+Runs {what}. The configuration is one JSON object on standard input; see {config}.
 With {leash} it must be on one line, and the process ends when standard input does; NAME is only for `ps`.
 """
 
@@ -57,22 +57,22 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
         If the configuration has emulated links.
     """
     if tree:
-        raise ConfigurationError(f"{name}: links are to be emulated; start it by scenarios.emulation instead")
+        raise ConfigurationError(f"{name}: the configuration has emulated links; start it with scenarios.emulation")
 
 
 def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:
-    """Read the configuration, run, and say how it went.
+    """Read the configuration and run.
 
     Parameters
     ----------
     module : str
-        Name under which it is run, for the usage message.
+        Name of the module, for the usage message.
     what : str
-        What it runs, for the usage message.
+        Description of the process, for the usage message.
     config_type : type
         Type of the configuration.
     run : Callable[[C], str]
-        Runs and returns why it broke, or nothing.
+        Runs, and returns why the run broke, or an empty text.
 
     Returns
     -------
@@ -88,7 +88,8 @@ def _main(module: str, what: str, config_type: type[C], run: Callable[[C], str])
     watch_readers(quits=False)
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
-        sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH))
+        config_name = f"{config_type.__module__}.{config_type.__name__}"
+        sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH, config=config_name))
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
     log = logging.getLogger(module)
@@ -116,7 +117,7 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 
 
 def _read_line() -> bytes:
-    """First line of standard input, unbuffered: the rest is for the thread that waits for its end."""
+    """Return the first line of standard input, unbuffered: the thread that waits for its end reads the rest."""
     line = bytearray()
     while not line.endswith(b"\n"):
         piece = os.read(0, 65536)

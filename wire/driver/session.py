@@ -1,7 +1,7 @@
 """A Zenoh session, set up for lock-step or for wall-clock time; the only module that knows Zenoh.
 
-Zenoh's threads only enqueue: what comes in stands in `Session.inbox`, and one thread, the owner's, takes it out.
-What each setting is for was measured (`docs/protocol.md`).
+Zenoh's threads only enqueue into `Session.inbox`, and one thread, the owner's, takes the events out.
+`docs/protocol.md` has the measured reason of each setting.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
     import zenoh
 
 _RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""Few threads: one that receives and one pool for all else. Receiving in that pool too is faster by a tenth, but then a
+"""Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
 flood of messages can stall it."""
 
 LEASE = 60_000
-"""Time (ms) after which a silent link counts as dead, in lock-step. Long, because it must not decide: the death of a
-process closes its links at once, and one that lives but does nothing is for the deadlines of the lock-step."""
+"""Time (ms) after which a silent link counts as dead, in lock-step. It is long because it must not decide: the death of
+a process closes its links at once, and the deadlines of the lock-step detect a frozen one."""
 
 WALL_LEASE = 2_000
-"""The same in wall-clock time: after a cut the link must be made anew soon. Control does not wait for it."""
+"""The same in wall-clock time: after a cut Zenoh must renew the link soon. Control does not wait for it."""
 
 
 WAIT_BEFORE_CLOSE = 5_000_000
-"""How long (us) a message that may not be dropped waits for who does not read, in lock-step: Zenoh's default."""
+"""How long (us) a message that may not be dropped waits for a full link, in lock-step: Zenoh's default."""
 
 WALL_WAIT_BEFORE_CLOSE = 200_000
-"""The same in wall-clock time, where a plant that waits holds up the control of all others. A link that was closed is
-made anew when its other end reads again."""
+"""The same in wall-clock time, where a waiting plant holds up the control of all others. Zenoh renews a closed link
+when its other end reads again."""
 
 
 class _Profile(NamedTuple):
-    """What differs between the two kinds of time."""
+    """Settings that differ between the two kinds of time."""
 
     lease: int
-    """ms."""
+    """Silence (ms) after which a link counts as dead."""
     retry: tuple[int, int, float]
-    """Between tries to connect: first (ms), longest (ms), growth."""
+    """Time between attempts to connect: first (ms), longest (ms), growth."""
     timeout: int
-    """For a link to open (ms)."""
+    """Longest time for a link to open (ms)."""
     wait_before_close: int
     """How long (us) a message that may not be dropped waits for a link that is full; then the link is closed."""
     may_drop: bool
@@ -64,14 +64,14 @@ _PROFILES: dict[Clock, _Profile] = {
 }
 
 FIRST_LINK = 0.5
-"""Longest wait (s) for the first link, to see whether a router or a peer answers; on one host it comes after 20 ms."""
+"""Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
 
 _QUERY_TIMEOUT = 600.0
-"""Time (s) after which a query is forgotten; deadlines are kept by who asked."""
+"""Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
 
 class SessionError(ValueError):
-    """No session could be had; the message says why and what to do."""
+    """Zenoh could not open a session; the message says why and what to do."""
 
 
 class Session:
@@ -82,21 +82,22 @@ class Session:
     who : str
         Name of the process, for error messages.
     listen : tuple[str, ...], optional
-        Endpoints to listen on, e.g. ("tcp/127.0.0.1:7447",). Without any, nobody can connect to this peer.
+        Endpoints to listen on, e.g. ("tcp/127.0.0.1:7447",). Without any, no peer can connect to this one.
     connect : tuple[str, ...], optional
         Endpoints to connect to, tried again until they answer.
     gossip : bool, optional
-        Whether to be told of the other peers by those connected to, and to connect to them in turn.
+        Whether to learn of other peers from the connected ones, and to connect to them in turn.
     clock : {"simulated", "wall"}, optional
-        Which kind of time the run has.
+        Kind of time of the run.
     rendezvous : bool, optional
-        Whether others are told to connect to this one. In wall-clock time whoever is not becomes the client of a router
-        that answers: between two peers that know each other both directly and through a router, Zenoh changes the way
-        of their declarations while these are on it, and loses some.
+        Whether others connect to this peer by its address. In wall-clock time any other peer becomes the client of a
+        router that answers: between two peers that know each other both directly and through a router, Zenoh changes
+        the way of their declarations under way, and loses some.
     inbox : Inbox, optional
-        Takes what comes in; that of a former session, which this one takes the place of.
+        Inbox of a former session, which this one replaces; by default a new one.
     meets_all : bool, optional
-        Whether to connect to every peer, instead of the one with the greater id of each pair: for who does not listen.
+        Whether to connect to every peer, instead of the one with the greater id of each pair: for a peer that does not
+        listen.
 
     Raises
     ------
@@ -139,11 +140,11 @@ class Session:
             self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
             self._changeable = False
         self._links: Any = None
-        if clock == "wall":  # not by a callback: one that comes while Python is being ended would abort the process
+        if clock == "wall":  # no callback: one during the end of Python would abort the process
             channel: Any = zenoh.handlers.RingChannel(1)
             self._links = self._session.info.declare_link_events_listener(channel, history=True)
         self.id = str(self._session.zid())
-        """Unique id of this session: the instance of who holds it."""
+        """Unique id of this session: the instance of its process."""
 
     def _open(self, who: str, config: dict[str, Any]) -> zenoh.Session:
         try:
@@ -153,7 +154,7 @@ class Session:
             raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
 
     def _meets_router(self) -> bool:
-        """Wait for the first link; whether it leads to a router."""
+        """Wait for the first link; return whether it leads to a router."""
         linked = threading.Event()
 
         def on_event(event: zenoh.TransportEvent) -> None:
@@ -170,17 +171,17 @@ class Session:
 
     @property
     def misplaced(self) -> bool:
-        """Whether a router has answered too late for this session to be its client: another one should be opened."""
+        """Whether a router has answered too late for this session to be its client: open another one."""
         return self._changeable and bool(self._session.info.routers_zid())
 
-    def take(self, wanted: int, timeout: float | None) -> list[Stamped]:
-        """Take what has come out of the inbox, as `Inbox.take` does, and see to links that are new."""
+    def take(self, needed: int, timeout: float | None) -> list[Stamped]:
+        """Take the events out of the inbox, as `Inbox.take` does, and set up new links."""
         if self._links is not None and self._links.try_recv() is not None:
             do_not_linger()
-        return self.inbox.take(wanted, timeout)
+        return self.inbox.take(needed, timeout)
 
     def subscribe(self, key: str) -> None:
-        """Have messages on a key, without wildcards, put into the inbox."""
+        """Put messages on a key, without wildcards, into the inbox."""
         enqueue = self.inbox.put
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -201,9 +202,9 @@ class Session:
         self._declared.append(self._session.declare_queryable(key, handler, complete=True))
 
     def fetch(self, key: str) -> None:
-        """Query a key; an answer comes into the inbox like a message.
+        """Query a key; an answer enters the inbox like a message.
 
-        All are asked who answer on it, as one of them may be the stale end of a link that is gone.
+        The query goes to all queryables of the key, because one may be the stale end of a lost link.
         """
         enqueue = self.inbox.put
 
@@ -216,7 +217,7 @@ class Session:
         self._session.get(key, handler, target=target, consolidation=consolidation, timeout=_QUERY_TIMEOUT)
 
     def watch(self, key: str) -> None:
-        """Have tokens that appear and vanish put into the inbox, those already there included."""
+        """Put appearing and vanishing tokens into the inbox, those already present included."""
         enqueue, gone = self.inbox.put, self._zenoh.SampleKind.DELETE
 
         def on_token(sample: zenoh.Sample) -> None:
@@ -227,11 +228,11 @@ class Session:
         self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))
 
     def hold_token(self, key: str) -> None:
-        """Be seen as alive under a key, until the session or the process ends."""
+        """Declare a liveliness token, until the session or the process ends."""
         self._declared.append(self._session.liveliness().declare_token(key))
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Publish bytes on a key; blocks rather than drops, but for what is of no use late in wall-clock time."""
+        """Publish bytes on a key; block rather than drop, except in wall-clock time for keys of `LATEST_ONLY`."""
         publisher = self._publishers.get(key)
         if publisher is None:
             self.prepare(key)
@@ -250,7 +251,7 @@ class Session:
             )
 
     def may_drop(self, key: str) -> bool:
-        """Return whether a message on a key is dropped rather than waited for, on a link that does not keep up."""
+        """Return whether Zenoh drops a message on a key, instead of waiting, when a link is full."""
         self.prepare(key)
         return bool(self._publishers[key].congestion_control == self._zenoh.CongestionControl.DROP)
 
@@ -260,13 +261,13 @@ class Session:
         return len(info.peers_zid()) + len(info.routers_zid())
 
     def close(self) -> None:
-        """Take back the tokens and leave."""
-        # close() may raise when a peer has just gone; there is nothing left to do about it
+        """Undeclare the tokens and close."""
+        # close() may raise when a peer has just gone; nothing can be done about it
         with contextlib.suppress(self._zenoh.ZError):
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
-        """Have a callback run in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
+        """Run a callback in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
 
         def from_zenoh(item: Any) -> None:
             keep_thread_state()
@@ -291,8 +292,8 @@ def _config(
         },
         "scouting": {
             "multicast": {"enabled": False},
-            # Of two peers that hear of each other the one with the greater id connects: no double links. Who cannot be
-            # connected to, as it does not listen, connects to all itself.
+            # Of two peers that learn of each other the one with the greater id connects: no double links. A peer that
+            # does not listen connects to all by itself.
             "gossip": {
                 "enabled": gossip,
                 "autoconnect_strategy": {
@@ -301,9 +302,9 @@ def _config(
             },
         },
         "transport": {
-            # Not lowlatency, though it saves a fifth of a tick: while links are being made, a declaration could wait
+            # No lowlatency, although it saves a fifth of a tick: while links open, a declaration could wait
             # for a link to become writable and hold the lock that all Zenoh threads wait for (4 starts in 100 hung).
-            # Without QoS everything on a link keeps its order, on which discovery relies.
+            # Without QoS everything on a link keeps its order; discovery relies on that.
             "unicast": {
                 "lowlatency": False,
                 "qos": {"enabled": False},
@@ -317,7 +318,7 @@ def _config(
                     "queue": {"congestion_control": {"block": {"wait_before_close": profile.wait_before_close}}},
                 }
             },
-            # Else the first message of more than 3 kB makes pools of it, 65 ms in which the plant misses its steps.
+            # Else Zenoh makes pools at the first message of more than 3 kB: 65 ms in which the plant misses its steps.
             "shared_memory": {"enabled": False},
         },
     }
