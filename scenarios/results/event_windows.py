@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from plant.equipment import Feeder
-from scenarios.results.history import Flags, Floats, History
+from scenarios.results.history import Flags, Floats, History, history_of
 from scenarios.results.record import Recorded
 from scenarios.schema.participants import with_agent
 from scenarios.schema.scenario_model import ScenarioModel
@@ -136,7 +136,7 @@ class CaseRecord:
             opened = windows(as_they_came(scenario, recorded.events), scenario.time.end_s)
         agents = len(with_agent(scenario, feeder, case))
         return cls(
-            history=History.of(recorded.inverters, recorded.rows),
+            history=history_of(recorded),
             windows=opened,
             messages_saved=messages_saved(recorded.quiet, opened, agents, scenario.time.T_c_s),
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import Feeder, InverterRow
-from scenarios.results.record import QUANTITIES, RowFile, Rows, header
+from scenarios.results.record import QUANTITIES, Recorded, Row, header
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,9 +95,9 @@ class History:
 
     @property
     def present(self) -> Flags:
-        """Who is on the network in each row, shape (T, N).
+        """Which inverters are on the network in each row, shape (T, N).
 
-        The plant tells exactly no power of who is off it; of who is on it, not even at no load are both exactly 0.
+        The plant reports exactly no power of an inverter that is off it; of others P and Q are never both exactly 0.
         """
         on: Flags = (self.P != 0.0) | (self.Q != 0.0)
         return on
@@ -129,10 +129,17 @@ class History:
         return frame
 
     @classmethod
-    def of(cls, inverters: tuple[str, ...], rows: Rows) -> History:
-        """Arrays from recorded rows, see `wire.messages.Telemetry.rows`; one after the other, as they may be many."""
-        width = 1 + len(QUANTITIES) * len(inverters)
-        table = np.fromiter(_numbers(rows, width), np.float64, len(rows) * width).reshape(len(rows), width)
+    def of(cls, inverters: tuple[str, ...], rows: Sequence[Row] | Floats) -> History:
+        """Return the arrays of recorded rows, see `wire.messages.Telemetry.rows`.
+
+        Raises
+        ------
+        ValueError
+            If a row has not as many numbers as the inverters need.
+        """
+        table, shape = np.asarray(rows, np.float64), (len(rows), 1 + len(QUANTITIES) * len(inverters))
+        if table.shape != shape:
+            raise ValueError(f"the rows of a history have {table.shape[1:]} numbers instead of {shape[1]}")
         f, P, Q, V, P_set, V_set = np.moveaxis(table[:, 1:].reshape(len(rows), len(inverters), len(QUANTITIES)), 2, 0)
         return cls(inverters=inverters, t=table[:, 0], f=f, P=P, Q=Q, V=V, P_set=P_set, V_set=V_set)
 
@@ -146,15 +153,8 @@ def read_only(of: T) -> T:
     return replace(of, **views)
 
 
-def _numbers(rows: Rows, width: int) -> Iterator[float]:
-    for row in rows:
-        if len(row) != width:
-            raise ValueError(f"a row of a history has {len(row)} numbers instead of {width}: {row[:1]}")
-        yield from row
-
-
 def read_history(path: Path) -> History:
-    """Read history.csv back.
+    """Read history.csv back, to the last bit.
 
     Raises
     ------
@@ -163,8 +163,12 @@ def read_history(path: Path) -> History:
     """
     with path.open(encoding="ascii") as file:
         first = file.readline().rstrip("\n")
-        count = sum(1 for _ in file)
-    names = tuple(column.removesuffix("_f_Hz") for column in first.split(",") if column.endswith("_f_Hz"))
-    if tuple(first.split(",")) != header(names):
-        raise ValueError(f"{path.name}: the first line is not the header of a history: {first[:80]}")
-    return History.of(names, RowFile(path, count))
+        names = tuple(column.removesuffix("_f_Hz") for column in first.split(",") if column.endswith("_f_Hz"))
+        if tuple(first.split(",")) != header(names):
+            raise ValueError(f"{path.name}: the first line is not the header of a history: {first[:80]}")
+        return History.of(names, np.loadtxt(file, delimiter=",", ndmin=2))
+
+
+def history_of(recorded: Recorded) -> History:
+    """Return the arrays of a recorded case, from memory or from its file."""
+    return History.of(recorded.inverters, recorded.rows) if recorded.file is None else read_history(recorded.file)

@@ -10,10 +10,10 @@ from __future__ import annotations
 import contextlib
 import csv
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Protocol, cast
+from typing import BinaryIO
 
 import msgspec
 
@@ -32,44 +32,15 @@ Row = tuple[float, ...]
 """As in `wire.messages.Telemetry.rows`."""
 
 
-class Rows(Protocol):
-    """Rows in the order of time, in memory or in a file."""
-
-    def __len__(self) -> int: ...
-    def __iter__(self) -> Iterator[Row]: ...
-
-
-class RowFile:
-    """Rows of a history.csv, read anew each time they are looked through.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    count : int
-        Number of its rows.
-    """
-
-    def __init__(self, path: Path, count: int) -> None:
-        self._path, self._count = path, count
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __iter__(self) -> Iterator[Row]:
-        with self._path.open(encoding="ascii") as file:
-            next(file)  # the header
-            for line in file:
-                yield tuple(map(float, line.split(",")))
-
-
 class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """One case as recorded."""
 
     inverters: tuple[str, ...]
     """Order of the columns."""
-    rows: Rows
-    """What was recorded, in the order of time."""
+    rows: Sequence[Row] = ()
+    """Rows in the order of time; empty where they are in a file."""
+    file: Path | None = None
+    """The history.csv with the rows; None where they are in memory."""
     ended: float
     """Time of the last row (s)."""
     missing: tuple[tuple[float, float], ...] = ()
@@ -208,16 +179,16 @@ class Recorder:
                 f"history has {self.count} rows, but {end:g} s in steps of {record_step:g} s are {expected}; "
                 f"{last}{holes}"
             )
-        rows, link_lines = cast(Rows, self.rows), []
+        file, link_lines = None, []
         if self._folder is not None:
             self._write_events(self._folder)
             link_lines = self.links.write(self._folder, self._self_check)
-            (self._folder / PARTIAL).rename(self._folder / "history.csv")
-            rows = RowFile(self._folder / "history.csv", self.count)
+            file = (self._folder / PARTIAL).rename(self._folder / "history.csv")
         self._finished = True
         return Recorded(
             inverters=self._inverters,
-            rows=rows,
+            rows=self.rows,
+            file=file,
             ended=self.ended,
             missing=tuple(self.missing),
             events=tuple(self.events),

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from scenarios.results.history import History, read_history
+from scenarios.results.history import History, history_of, read_history
 from scenarios.results.record import PARTIAL, Recorder, RecordError
 from wire.messages import PlantEvent, Telemetry
 
@@ -105,7 +105,7 @@ def test_a_gap_that_is_allowed_is_known_by_its_times(tmp_path: Path) -> None:
         recorded = recorder.finish(4.0, recorder.record_step)
 
     assert recorded.missing == ((1.0, 3.5),)
-    assert (recorded.ended, [read[0] for read in recorded.rows]) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
+    assert (recorded.ended, history_of(recorded).t.tolist()) == (4.0, [0.0, 0.5, 1.0, 3.5, 4.0])
 
 
 def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_a_recorder_keeps_no_rows(tmp_path: Path) -> None:
         grown, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         recorded = recorder.finish(0.01 * 19_999, 0.01)
-    history = History.of(recorded.inverters, recorded.rows)
+    history = history_of(recorded)
 
     assert grown < 50_000
     assert (len(history.t), history.V_set[-1, -1]) == (20_000, 59.0)
