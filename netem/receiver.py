@@ -11,14 +11,12 @@ from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 from zlib import crc32
 
-import msgspec
-
 from netem.channel import FOREVER, NEVER, Channel
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models import INSTANT
 from netem.models.copies import flip
-from netem.schema.change import Change, Heal, changed, schedule_of
-from netem.schema.fault import Fault, Span
+from netem.schema.change import Change, changed, schedule_of
+from netem.schema.fault import Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link
 from wire.links import Arrival
@@ -78,6 +76,7 @@ class Receiver:
 
     Examples
     --------
+    >>> from netem.schema.fault import Fault
     >>> netem = Netem(links=(Fault(on="inv1 -> inv2", delay=0.25),))
     >>> receiver = Receiver("inv2", netem, {"inv1": "MG1", "inv2": "MG1"})
     >>> receiver.offer("inv1", seq=0, t=0.0, at=0.0, payload=b"state")
@@ -88,7 +87,8 @@ class Receiver:
     def __init__(self, name: str, netem: Netem, microgrids: Mapping[str, str], *, keep_trace: bool = True) -> None:
         self.name = name
         self._netem, self._microgrids, self._keep = netem, dict(microgrids), keep_trace
-        self._changes: list[Change] = []
+        self.changes: list[Change] = []
+        """Live changes so far."""
         self._links: dict[str, _Inbound] = {}
         self._heap: list[_Waiting] = []
         self._kept: list[_Waiting] = []
@@ -164,35 +164,22 @@ class Receiver:
 
     # ---------------------------------------------------------------- live
 
-    def change(self, fault: Fault, t: float) -> tuple[str, ...]:
-        """Give links a fault, for messages sent at time t (s) or later.
+    def apply(self, change: Change) -> tuple[str, ...]:
+        """Change links for messages sent at `change.from_s` (s of run time) or later; kept messages are judged anew.
 
         Returns
         -------
         tuple[str, ...]
             Senders so far whose links to this receiver it changes.
         """
-        return self._apply(msgspec.structs.replace(fault, from_s=max(t, fault.from_s)), t)
-
-    def heal(self, on: str, t: float, kinds: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """End the faults of links at time t (s), or some kinds of them; kept messages go on then.
-
-        Returns
-        -------
-        tuple[str, ...]
-            As `change` does.
-        """
-        return self._apply(Heal(on=on, from_s=t, kinds=kinds), t)
-
-    def _apply(self, change: Change, t: float) -> tuple[str, ...]:
-        self._changes.append(change)
+        self.changes.append(change)
         concerned = []
         for src, inbound in self._links.items():
             channel = inbound.channel
             schedule = changed(channel.schedule, change, channel.link, self._microgrids)
             if schedule is not channel.schedule:
                 concerned.append(src)
-                kept = self._take_kept(src, t)
+                kept = self._take_kept(src, change.from_s)
                 channel.reschedule(schedule, rewind=bool(kept))
                 inbound.is_clear = channel.is_clear
                 for seq, content, special in kept:
@@ -253,7 +240,7 @@ class Receiver:
         inbound = self._links.get(src)
         if inbound is None:
             link = Link(src, self.name)
-            schedule = schedule_of(link, self._netem, self._changes, self._microgrids)
+            schedule = schedule_of(link, self._netem, self.changes, self._microgrids)
             inbound = _Inbound(Channel(link, schedule.spans, self._netem.seed), keep=self._keep)
             self._links[src] = inbound
         return inbound

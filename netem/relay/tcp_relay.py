@@ -19,7 +19,7 @@ _LINGER = struct.pack("ii", 1, 0)
 
 
 class _End(asyncio.Protocol):
-    """One end of a connection: what comes in here leaves at the other end."""
+    """One end of a connection: its data leave at the other end."""
 
     def __init__(self, relay: TcpRelay, name: str, direction: Direction, back: Direction) -> None:
         way = Segments(partial(Stream, relay.link.seed, name, direction.name), direction, back)
@@ -36,7 +36,7 @@ class _End(asyncio.Protocol):
         if self._relay.admit(self):
             self.resume_writing()
         else:
-            self.close(reset=True)
+            self._relay.end(self, reset=True)
 
     def data_received(self, data: bytes) -> None:
         for start in range(0, len(data), SIZE):
@@ -58,7 +58,7 @@ class _End(asyncio.Protocol):
         self._relay.end(self, reset=error is not None)
 
     def close(self, *, reset: bool) -> None:
-        """Close it: with RST, and what is on the way to it lost, or after the last byte."""
+        """Close it: at once with RST, or after the last byte."""
         self.flow.close()
         if self.transport is None:
             return

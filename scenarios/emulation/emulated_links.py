@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from netem.receiver import Receiver
-from netem.schema.change import Change, schedule_of
-from netem.schema.fault import Fault
+from netem.schema.change import schedule_of
 from netem.schema.node_fault import NodeFault
 from netem.schema.pattern import Link, links_among, parse
 from scenarios.emulation.emulation_config import EmulationConfig
@@ -98,13 +97,9 @@ class EmulatedLinks:
             raise ValueError("; ".join(f"{path}: {what}" for path, what in problems))
         links, change = self._concerned(command, t), command.at(t)
         senders = [link.src for link in links if link.dst == self._name]
-        self._changes.append(change)
+        self._receiver.apply(change)
         if senders:
             self.clear.clear()
-            if isinstance(change, Fault):
-                self._receiver.change(change, t)
-            else:
-                self._receiver.heal(change.on, t, change.kinds)
         return CommandEffect(
             text=command.in_words(links),
             receivers=tuple(dict.fromkeys(link.dst for link in links)),
@@ -117,7 +112,7 @@ class EmulatedLinks:
         links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
         if command.fault is not None:
             return links
-        schedules = {link: schedule_of(link, netem, self._changes, self._microgrids) for link in links}
+        schedules = {link: schedule_of(link, netem, self._receiver.changes, self._microgrids) for link in links}
         return [link for link in links if schedules[link].at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
@@ -141,8 +136,6 @@ class EmulatedLinks:
     def _begin(self) -> None:
         config = self._config
         self.clear.clear()
-        self._changes: list[Change] = []
-        """The commands so far, to whichever links."""
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:

@@ -14,6 +14,7 @@ from netem.models.delay import Constant, Lognormal, Normal, Trace, Uniform
 from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott, Markov
 from netem.receiver import Receiver
+from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link
@@ -168,9 +169,9 @@ def test_many_links_together_do_not_raise_a_false_alarm() -> None:
 def test_of_a_message_judged_twice_the_last_verdict_counts() -> None:
     """A message that a healed cut let go is in the check once, with the delay it had in the end."""
     to = Receiver("inv2", Netem(links=(Fault(on="* -> inv2", delay=Constant(delay_s=0.1)),)), MICROGRIDS)
-    to.change(Fault(on="* -> inv2", cut=Cut(hold=True)), 0.0)
+    to.apply(Fault(on="* -> inv2", cut=Cut(hold=True)))
     to.offer("inv1", 0, 0.0, 0.0, b"x")
-    to.heal("* -> inv2", 0.0, kinds=("cut",))
+    to.apply(Heal(on="* -> inv2", from_s=0.0, kinds=("cut",)))
     (row,) = held_against(to.take_trace(), {"delay": 0.1}).rows
 
     assert (row.n, row.ok) == (1, True)

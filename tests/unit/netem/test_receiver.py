@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from netem.ledger import LinkTrace
 from netem.models.copies import Corrupt, Duplicate
@@ -16,6 +17,7 @@ from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott
 from netem.models.medium import Rate, Slots
 from netem.receiver import Receiver
+from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition
@@ -73,9 +75,9 @@ def test_accounting_closes_whatever_happens(entries: list[Fault], live: list[tup
     for k in range(100):
         for at, fault in live:
             if at == k:
-                to.change(fault, k * T_C)
+                to.apply(replace(fault, from_s=max(k * T_C, fault.from_s)))
             if at + 10 == k:
-                to.heal("* -> inv2", k * T_C)
+                to.apply(Heal(on="* -> inv2", from_s=k * T_C))
         handed += len(send(to, range(k, k + 1), "inv1", "inv3"))
         assert all(count.closes for count in to.counts().values())
         assert handed == sum(count.delivered for count in to.counts().values())
@@ -210,11 +212,11 @@ def test_a_live_fault_acts_from_its_time_on_and_heals() -> None:
     """Messages sent before the change or after the healing fare as the scenario has it, those between as was said."""
     to = receiver(Fault(on="* -> inv2", delay=0.1))
     send(to, range(50))
-    assert to.change(Fault(on="inv1 <-> inv2", delay=0.5, loss=0.0), 1.0) == ("inv1",)
+    assert to.apply(Fault(on="inv1 <-> inv2", from_s=1.0, delay=0.5, loss=0.0)) == ("inv1",)
     send(to, range(50, 100))
-    to.heal("inv1 <-> inv2", 2.0, kinds=("loss",))
+    to.apply(Heal(on="inv1 <-> inv2", from_s=2.0, kinds=("loss",)))
     send(to, range(100, 150))
-    to.heal("* -> inv2", 3.0)
+    to.apply(Heal(on="* -> inv2", from_s=3.0))
     send(to, range(150, 200))
     seen = outcomes(to.take_trace())["inv1"]
 
@@ -226,10 +228,10 @@ def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> No
     rest = Fault(on="* -> inv2", delay=0.05, rate=Rate(bytes_per_s=20_000.0), loss=0.2, duplicate=0.2)
     live, planned = receiver(rest), receiver(rest, Fault(on="inv1 -> inv2", cut=Cut(hold=True), from_s=0.5, to_s=1.0))
     arrived = send(live, range(25))
-    live.change(Fault(on="inv1 -> inv2", cut=Cut(hold=True)), 0.5)
+    live.apply(Fault(on="inv1 -> inv2", from_s=0.5, cut=Cut(hold=True)))
     arrived += send(live, range(25, 50))
     assert live.counts()["inv1"].in_flight >= 25
-    live.heal("inv1 -> inv2", 1.0, kinds=("cut",))
+    live.apply(Heal(on="inv1 -> inv2", from_s=1.0, kinds=("cut",)))
     arrived += send(live, range(50, 100))
 
     assert arrived == send(planned, range(100))
@@ -242,7 +244,7 @@ def test_healing_a_holding_cut_lets_go_at_once_as_if_it_had_been_planned() -> No
 def test_a_link_heard_first_after_a_change_is_changed_as_well() -> None:
     """A newcomer's link has what was said of it before it came."""
     to = receiver()
-    to.change(Fault(on="MG4 -> MG1", cut=True), 0.0)
+    to.apply(Fault(on="MG4 -> MG1", cut=True))
     to.meet("inv10", "MG4")
     send(to, range(3), "inv10")
 
