@@ -19,6 +19,7 @@ from netem.schema.fault import Fault
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
 from scenarios.results.evaluation import claims, metric
 from scenarios.results.evaluation.benchmark_registry import CLAIMS
@@ -48,7 +49,7 @@ _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
 }
 """By topic: the registry, how an entry is written, and how a scenario names one."""
 
-TOPICS = ("keys", "messages", "scenario", *_REGISTRIES)
+TOPICS = ("keys", "messages", "scenario", "feeder", *_REGISTRIES)
 """Pages there are."""
 
 _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
@@ -79,7 +80,7 @@ def page(topic: str) -> str:
     topic : str
         One of `TOPICS`.
     """
-    makers = {"keys": _keys, "messages": _messages, "scenario": _scenario}
+    makers = {"keys": _keys, "messages": _messages, "scenario": _scenario, "feeder": _feeder}
     lines = makers[topic]() if topic in makers else _registry(topic)
     return "\n".join(lines) + "\n"
 
@@ -124,6 +125,20 @@ def _scenario() -> Iterator[str]:
         yield from ("", f"## {title}", "", class_doc(cls), "")
         elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
         yield from field_table(cls, left_out=elsewhere)
+
+
+def _feeder() -> Iterator[str]:
+    yield "# A feeder"
+    yield ""
+    yield "A folder of CSV tables with one header line, UTF-8. A quantity's unit is in its column's name. Further"
+    yield "columns are free. `plant/data/README.md` says which files a feeder needs."
+    tables: list[type[msgspec.Struct]] = [*TABLES.values(), LoadColumns, Manifest]
+    for cls in tables:
+        file, _, text = class_doc(cls).removesuffix(".").partition(": ")
+        yield from ("", f"## {file}", "")
+        if text:
+            yield from (f"{text[0].upper()}{text[1:]}.", "")
+        yield from field_table(cls)
 
 
 def _section(title: str, cls: type[msgspec.Struct], text: str, leave_out: Iterable[str] = ()) -> Iterator[str]:

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, cast
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.plausible_feeder import (
-    LENGTH,
+from plant.tables.feeder_columns import (
     MUTUAL,
-    R_PERCENT,
+    MUTUAL_B,
     RATED_CURRENT,
     RATIO,
+    SELF_B,
     SELF_R,
     SELF_X,
-    SHUNT,
-    X_PERCENT,
-    positive_definite,
+    LineColumns,
+    LineConfigColumns,
+    RegulatorColumns,
+    SwitchColumns,
+    TransformerColumns,
     power_of,
 )
 from wire.suggestion import suggestion
@@ -28,21 +29,19 @@ from wire.suggestion import suggestion
 
 def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:
     """Read line_configs.csv: the upper triangles of the matrices, one element per row. None if it is unreadable."""
-    columns = ("config", "phase_1", "phase_2", "R_ohm_per_km", "X_ohm_per_km", "B_uS_per_km")
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
-    last_row: dict[str, CsvRow] = {}
+    last_row: dict[str, CsvRow[LineConfigColumns]] = {}
     mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
-    table = CsvTable(folder, "line_configs.csv", columns, problems, required=True)
+    table = CsvTable(folder, "line_configs.csv", LineConfigColumns, problems, required=True)
     for row in table:
-        name = row.text("config")
-        first, second = (row.choice(column, "phase", PHASES) for column in ("phase_1", "phase_2"))
-        misplaced = row.mistaken
+        it, misplaced = row.columns, not row.wrong.isdisjoint(("config", "phase_1", "phase_2"))
+        name, first, second = it.config, it.phase_1, it.phase_2
         diagonal = first == second and not misplaced
-        above = 0.0 if diagonal else None
-        R = row.number("R_ohm_per_km", above=above, plausible=SELF_R if diagonal else MUTUAL)
-        X = row.number("X_ohm_per_km", above=above, plausible=SELF_X if diagonal else MUTUAL)
-        B = row.number("B_uS_per_km", at_least=above, plausible=SHUNT) * 1e-6
+        row.require("R_ohm_per_km", SELF_R if diagonal else MUTUAL)
+        row.require("X_ohm_per_km", SELF_X if diagonal else MUTUAL)
+        row.require("B_uS_per_km", SELF_B if diagonal else MUTUAL_B)
+        R, X, B = it.R_ohm_per_km, it.X_ohm_per_km, it.B_uS_per_km * 1e-6
         matrix = elements.setdefault(name, {})
         if misplaced:
             spoiled.add(name)
@@ -65,7 +64,7 @@ def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig
         if missing or name in spoiled or mistaken[name]:
             continue
         for what, part in (("an R", lambda z: z.real), ("an X", lambda z: z.imag)):
-            if not positive_definite(tuple(tuple(map(part, row)) for row in Z)):
+            if not _positive_definite(tuple(tuple(map(part, row)) for row in Z)):
                 last_row[name].problem(
                     f'config "{name}" has {what} matrix that no line has (not positive definite); the elements off '
                     "the diagonal must be smaller than those on it"
@@ -77,11 +76,9 @@ def read_lines(
     folder: Path, buses: BusTable, configs: dict[str, LineConfig] | None, problems: list[str]
 ) -> tuple[Line, ...]:
     """Read lines.csv; lengths in m."""
-    columns = ("line", "from_bus", "to_bus", "phases", "config", "length_m")
     lines: dict[str, Line] = {}
-    for row in CsvTable(folder, "lines.csv", columns, problems, required=True):
-        name, config, phases = row.text("line"), row.text("config"), row.phases()
-        length = row.number("length_m", above=0.0, plausible=LENGTH)
+    for row in CsvTable(folder, "lines.csv", LineColumns, problems, required=True):
+        name, config, phases = row.columns.line, row.columns.config, row.columns.phases
         ends = buses.find_ends(row, phases)
         if configs is None or not config:
             pass
@@ -101,25 +98,23 @@ def read_lines(
                 to_bus=ends[1].name,
                 phases=phases,
                 config=config,
-                length=length / 1000.0,
+                length=row.columns.length_m / 1000.0,
             )
     return tuple(lines.values())
 
 
 def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Switch, ...]:
     """Read switches.csv; a switch is named by its buses ("13-152"), column alias may give a second name."""
-    columns = ("from_bus", "to_bus", "phases", "state")
     switches: list[Switch] = []
     names: set[str] = set()
-    for row in CsvTable(folder, "switches.csv", columns, problems):
-        phases = row.phases()
+    for row in CsvTable(folder, "switches.csv", SwitchColumns, problems):
+        phases, alias, closed = row.columns.phases, row.columns.alias, row.columns.state == "closed"
         ends = buses.find_ends(row, phases)
-        closed = row.choice("state", "state of a switch", ("closed", "open")) == "closed"
         if not ends:
             continue
         buses.require_equal_voltage(row, ends, "switch")
         one, other = ends[0].name, ends[1].name
-        name, alias = f"{one}-{other}", row.text("alias", default="")
+        name = f"{one}-{other}"
         for taken in [text for text in (name, alias) if text in names]:
             row.problem(f'switch "{taken}": there is one of this name already; names must differ')
         switch = Switch(name=name, alias=alias, from_bus=one, to_bus=other, phases=phases, closed=closed)
@@ -130,13 +125,12 @@ def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[S
 
 def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Regulator, ...]:
     """Read regulators.csv; one row for all phases that stand on the same tap."""
-    columns = ("regulator", "from_bus", "to_bus", "phases", "tap", "tap_step_pu")
     regulators: list[Regulator] = []
     seen: set[tuple[str, str]] = set()
-    for row in CsvTable(folder, "regulators.csv", columns, problems):
-        name, phases = row.text("regulator"), row.phases()
+    for row in CsvTable(folder, "regulators.csv", RegulatorColumns, problems):
+        name, phases = row.columns.regulator, row.columns.phases
         ends = buses.find_ends(row, phases)
-        ratio = 1.0 + row.number("tap") * row.number("tap_step_pu", above=0.0)
+        ratio = 1.0 + row.columns.tap * row.columns.tap_step_pu
         if ratio <= 0.0:
             row.problem(f"tap and tap_step_pu give a ratio of {ratio:g}; it must be positive")
         elif not math.isnan(ratio) and not RATIO.low <= ratio <= RATIO.high:
@@ -157,27 +151,39 @@ def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple
 
 def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Transformer, ...]:
     """Read transformers.csv; impedances in percent of the rating."""
-    columns = ("transformer", "from_bus", "to_bus", "connection", "S_rated_kVA", "R_percent", "X_percent")
     transformers: dict[str, Transformer] = {}
-    for row in CsvTable(folder, "transformers.csv", columns, problems):
-        name = row.text("transformer")
+    for row in CsvTable(folder, "transformers.csv", TransformerColumns, problems):
+        it, name = row.columns, row.columns.transformer
         ends = buses.find_ends(row, "ABC")
-        connection = row.choice("connection", "connection of a transformer", ("D-D", "Yg-Yg"))
-        most = power_of("a transformer", min(end.V_nom for end in ends), RATED_CURRENT, 3) if ends else None
-        S_rated = row.number("S_rated_kVA", above=0.0, plausible=most and replace(most, low=1.0)) * 1000.0
-        R = row.number("R_percent", at_least=0.0, plausible=R_PERCENT)
-        z = complex(R, row.number("X_percent", above=0.0, plausible=X_PERCENT)) / 100.0
+        if ends:
+            most = power_of("a transformer", min(end.V_nom for end in ends), RATED_CURRENT, 3)
+            row.require("S_rated_kVA", replace(most, low=1.0))
         if name in transformers:
             row.problem(f'transformer "{name}": there is one of this name already; names must differ')
         elif ends:
-            if connection == "D-D":
+            if it.connection == "D-D":
                 buses.mark_floating(ends[1])
             transformers[name] = Transformer(
                 name=name,
                 from_bus=ends[0].name,
                 to_bus=ends[1].name,
-                connection=cast(Literal["D-D", "Yg-Yg"], connection),
-                S_rated=S_rated,
-                z=z,
+                connection=it.connection,
+                S_rated=it.S_rated_kVA * 1000.0,
+                z=complex(it.R_percent, it.X_percent) / 100.0,
             )
     return tuple(transformers.values())
+
+
+def _positive_definite(matrix: tuple[tuple[float, ...], ...]) -> bool:
+    """Return whether a symmetric matrix of up to three rows is positive definite, by its leading minors.
+
+    Examples
+    --------
+    >>> _positive_definite(((2.0, 1.0), (1.0, 2.0))), _positive_definite(((1.0, 2.0), (2.0, 1.0)))
+    (True, False)
+    """
+    (a, *ab), rest = matrix[0], matrix[1:]
+    if a <= 0.0:
+        return False
+    schur = tuple(tuple(x - row[0] * ab[k] / a for k, x in enumerate(row[1:])) for row in rest)
+    return not schur or _positive_definite(schur)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import sqrt
 from pathlib import Path
+from typing import Any
 
 from plant.connectivity import Connectivity, Node
 from plant.equipment import PHASES, Bus, Feeder
 from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.plausible_feeder import BUS_VOLTAGE
+from plant.tables.feeder_columns import BusColumns
 from wire.suggestion import suggestion
 
 _SHOWN = 24
@@ -27,21 +28,15 @@ class BusTable:
 
     def __init__(self, folder: Path, problems: list[str]) -> None:
         self._by_name: dict[str, Bus] = {}
-        self._row_of: dict[str, CsvRow] = {}
-        table = CsvTable(folder, "buses.csv", ("bus", "phases", "V_nom_kV_LL"), problems, required=True)
+        self._row_of: dict[str, CsvRow[BusColumns]] = {}
+        table = CsvTable(folder, "buses.csv", BusColumns, problems, required=True)
         self._readable = table.readable and len(table) > 0
         if table.readable and not len(table):
             problems.append("buses.csv: has no rows; a feeder needs at least one bus")
         for row in table:
-            name = row.text("bus")
-            bus = Bus(
-                name=name,
-                phases=row.phases(stand_in="ABC"),
-                V_nom=row.number("V_nom_kV_LL", above=0.0, plausible=BUS_VOLTAGE) * 1000.0 / sqrt(3.0),
-                zone=row.text("zone", default=""),
-                x=row.number("x") if row.text("x", default="") else 0.0,
-                y=row.number("y") if row.text("y", default="") else 0.0,
-            )
+            it = row.columns
+            name, V_nom = it.bus, it.V_nom_kV_LL * 1000.0 / sqrt(3.0)
+            bus = Bus(name=name, phases=it.phases, V_nom=V_nom, zone=it.zone, x=it.x, y=it.y)
             if name in self._by_name:
                 row.problem(f'bus "{name}": there is one of this name already; names must differ')
             elif name:
@@ -50,15 +45,15 @@ class BusTable:
         self.rows = tuple(self._by_name.values())
         self._floating: set[str] = set()
 
-    def find(self, row: CsvRow, column: str = "bus") -> Bus | None:
+    def find(self, row: CsvRow[Any], column: str = "bus") -> Bus | None:
         """Read a reference to a bus; None, and a problem noted, if there is no such bus."""
-        name = row.text(column)
+        name = getattr(row.columns, column)
         bus = self._by_name.get(name)
         if name and bus is None and self._readable:
             row.problem(f'{column} "{name}": no such bus; {suggestion(name, self._by_name, "buses")}')
         return bus
 
-    def find_ends(self, row: CsvRow, phases: str) -> tuple[Bus, Bus] | None:
+    def find_ends(self, row: CsvRow[Any], phases: str) -> tuple[Bus, Bus] | None:
         """Read the two ends of a branch that carries `phases`."""
         ends = self.find(row, "from_bus"), self.find(row, "to_bus")
         for bus in dict.fromkeys(ends):
@@ -71,14 +66,14 @@ class BusTable:
             return None
         return ends[0], ends[1]
 
-    def require_phases(self, row: CsvRow, bus: Bus, phases: Iterable[str]) -> bool:
+    def require_phases(self, row: CsvRow[Any], bus: Bus, phases: Iterable[str]) -> bool:
         """Note a problem if the bus lacks one of the phases; tell whether all is well."""
         missing = [phase for phase in phases if phase not in bus.phases]
         if missing:
             row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
         return not missing
 
-    def require_equal_voltage(self, row: CsvRow, ends: tuple[Bus, Bus], what: str) -> None:
+    def require_equal_voltage(self, row: CsvRow[Any], ends: tuple[Bus, Bus], what: str) -> None:
         """Note a problem if something that is no transformer joins two nominal voltages."""
         V_from, V_to = (bus.V_nom * sqrt(3.0) / 1000.0 for bus in ends)
         if abs(V_from - V_to) > 1e-6 * V_from:
@@ -91,7 +86,7 @@ class BusTable:
         """Note that a bus stands behind a delta winding, where no current can return through ground."""
         self._floating.add(bus.name)
 
-    def require_ground(self, row: CsvRow, bus: Bus, what: str) -> bool:
+    def require_ground(self, row: CsvRow[Any], bus: Bus, what: str) -> bool:
         """Note a problem if something connected to ground stands behind a delta winding; tell whether all is well."""
         if bus.name in self._floating:
             row.problem(
@@ -100,7 +95,7 @@ class BusTable:
             )
         return bus.name not in self._floating
 
-    def row_of(self, name: str) -> CsvRow:
+    def row_of(self, name: str) -> CsvRow[BusColumns]:
         """Give the table's row of a bus, to note a problem there."""
         return self._row_of[name]
 

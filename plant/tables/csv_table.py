@@ -4,105 +4,109 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
+
+import msgspec
 
 from plant.equipment import PHASES
 from wire.plausible import Plausible
 from wire.suggestion import suggestion
+from wire.table_reading import shown
+from wire.table_schema import Field, Label, fields_of, named
+
+C = TypeVar("C", bound=msgspec.Struct)
 
 
-class CsvRow:
-    """One line of a table. Every reader notes a problem and returns a harmless stand-in when the cell is wrong.
+@dataclass(frozen=True)
+class PhaseLetters:
+    """Annotation of a text that is a set of phases, such as "ABC" or "AC"."""
+
+    stand_in: str = ""
+    """Phases in place of wrong ones; no later check asks anything of no phase."""
+
+
+class CsvRow(Generic[C]):
+    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN.
 
     Attributes
     ----------
+    columns : C
+        Its values.
     mistaken : bool
         Whether a problem was noted so far.
+    wrong : set[str]
+        Columns whose cells are wrong.
     """
 
-    def __init__(self, file: str, number: int, cells: dict[str, str], problems: list[str]) -> None:
-        self._where = f"{file} row {number}"
-        self._cells = cells
-        self._problems = problems
+    def __init__(self, table: type[C], where: str, cells: dict[str | None, Any], problems: list[str]) -> None:
+        self._table, self._where, self._problems = table, where, problems
         self.mistaken = False
+        self.wrong: set[str] = set()
+        if surplus := cells.get(None):  # `DictReader` files what stands beyond the last column under None
+            self.problem(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
+        values = {field.name: self._value(field, (cells.get(field.key) or "").strip()) for field in fields_of(table)}
+        self.columns = table(**values)
 
     def problem(self, text: str) -> None:
         """Note that something is wrong with this row."""
         self.mistaken = True
         self._problems.append(f"{self._where}: {text}")
 
-    def text(self, column: str, default: str | None = None) -> str:
-        """Read a name; an empty cell is a problem unless there is a default."""
-        value = self._cells.get(column, "")
-        if not value:
-            if default is not None:
-                return default
-            self.problem(f"{column} is empty; give a name")
-        if not value.isprintable():
-            self.problem(f"{column} {value!a}: has characters that cannot be printed; use letters and digits")
+    def require(self, column: str, plausible: Plausible) -> bool:
+        """Note a number that is not plausible, beside what its column asks of it; return whether it is."""
+        value = getattr(self.columns, column)
+        text = "" if math.isnan(value) else plausible.objection(value, named(self._table, column).unit)
+        if text:
+            self.problem(f"{column}: {text}")
+        return not text
+
+    def _value(self, field: Field, cell: str) -> Any:
+        """Return the value of a cell, or its stand-in after noting why the cell is wrong."""
+        if not cell and not field.required:
+            return field.default
+        value, text = _converted(field, cell)
+        if text:
+            self.wrong.add(field.key)
+            self.problem(f"{field.key}{text}")
         return value
 
-    def number(
-        self,
-        column: str,
-        *,
-        at_least: float | None = None,
-        above: float | None = None,
-        plausible: Plausible | None = None,
-    ) -> float:
-        """Read a finite number within bounds; NaN stands in, which no later comparison complains about.
 
-        An implausible number is a problem, but stands: what it relates to can still be checked.
-        """
-        value = self._cells.get(column, "")
+def _converted(field: Field, cell: str) -> tuple[Any, str]:
+    """Return the value of a cell and "", or a stand-in and the end of a sentence on the cell."""
+    if letters := field.mark(PhaseLetters):
+        ordered = "".join(phase for phase in PHASES if phase in cell)
+        if cell and sorted(cell) == sorted(ordered):
+            return ordered, ""
+        return letters.stand_in, f' must be letters out of A, B, C, each once (as "ABC" or "B"), got "{cell}"'
+    if field.type is float:
         try:
-            number = float(value) if "_" not in value else math.nan
+            number = float(cell) if "_" not in cell else math.nan
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            self.problem(f'{column} must be a number, got "{value}"')
-            return math.nan
-        unit = f" {_unit_of(column)}".rstrip()
-        if above is not None and not number > above:
-            self.problem(f"{column} must be greater than {above:g}{unit}, got {number:g}{unit}")
-            return math.nan
-        if at_least is not None and number < at_least:
-            self.problem(f"{column} must not be less than {at_least:g}{unit}, got {number:g}{unit}")
-            return math.nan
-        if plausible is not None and (wrong := plausible.objection(number, unit.strip())):
-            self.problem(f"{column}: {wrong}")
-        return number
-
-    def choice(self, column: str, what: str, choices: Collection[str]) -> str:
-        """Read one of a few words; the first choice stands in."""
-        value = self._cells.get(column, "")
-        if value not in choices:
-            self.problem(f'{column} "{value}": no such {what}; choose one of {", ".join(choices)}')
-            return next(iter(choices))
-        return value
-
-    def phases(self, column: str = "phases", *, stand_in: str = "") -> str:
-        """Read a set of phases such as "ABC" or "AC"; nothing asks anything of the stand-in, no phase."""
-        value = self._cells.get(column, "")
-        ordered = "".join(phase for phase in PHASES if phase in value)
-        if not value or sorted(value) != sorted(ordered):
-            self.problem(f'{column} must be letters out of A, B, C, each once (as "ABC" or "B"), got "{value}"')
-            return stand_in
-        return ordered
+            return math.nan, f' must be a number, got "{cell}"'
+        text = field.objection(number)
+        return (math.nan, f": {text}") if text else (number, "")
+    if get_origin(field.type) is Literal:
+        choices, label = get_args(field.type), field.mark(Label)
+        if cell in choices:
+            return cell, ""
+        if not field.required:
+            return field.default, f' "{cell}": must be {" or ".join(map(shown, filter(None, choices)))} or empty'
+        return choices[0], f' "{cell}": no such {label.text}; choose one of {", ".join(choices)}'
+    if not cell:
+        return cell, " is empty; give a name"
+    return (
+        cell,
+        "" if cell.isprintable() else f" {cell!a}: has characters that cannot be printed; use letters and digits",
+    )
 
 
-def _unit_of(column: str) -> str:
-    """Read the unit off a column's name: what follows the last quantity, as in `length_m`, `R_ohm_per_km`."""
-    for unit, text in (("_ohm_per_km", "ohm/km"), ("_kV_LL", "kV"), ("_kV_LN", "kV"), ("_kVA", "kVA")):
-        if column.endswith(unit):
-            return text
-    last = column.rsplit("_", 1)[-1]
-    return {"m": "m", "kW": "kW", "kvar": "kvar", "pu": "pu", "percent": "%", "deg": "deg"}.get(last, "")
-
-
-class CsvTable:
-    """A CSV file with one header line. Columns beyond the required ones are free (origin, note).
+class CsvTable(Generic[C]):
+    """A CSV file with one header line. Columns beyond the declared ones are free (origin, note).
 
     Parameters
     ----------
@@ -110,10 +114,10 @@ class CsvTable:
         Folder of the feeder.
     file : str
         Name of the file in it.
-    columns : Collection[str]
-        Columns that must be there.
+    columns : type[C]
+        Struct that declares the columns; one without a default must be there.
     problems : list of str
-        Where problems are noted.
+        Takes the problems; those of a row when the row is reached.
     required : bool
         Whether it is a problem if the file does not exist; else it then has no rows.
 
@@ -124,17 +128,16 @@ class CsvTable:
     """
 
     def __init__(
-        self, folder: Path, file: str, columns: Collection[str], problems: list[str], *, required: bool = False
+        self, folder: Path, file: str, columns: type[C], problems: list[str], *, required: bool = False
     ) -> None:
-        self.file = file
-        self._problems = problems
-        self._rows: list[CsvRow] = []
+        self._file, self._columns, self._problems = file, columns, problems
+        self._rows: list[tuple[int, dict[str | None, Any]]] = []
         before = len(problems)
-        self._open(folder / file, columns, required)
+        self._open(folder / file, required_columns(columns), required)
         self.readable = len(problems) == before
 
-    def _open(self, path: Path, columns: Collection[str], required: bool) -> None:
-        file, problems = self.file, self._problems
+    def _open(self, path: Path, columns: list[str], required: bool) -> None:
+        file, problems = self._file, self._problems
         if path.exists() and not path.is_file():
             problems.append(f"{file}: is no file")
             return
@@ -154,23 +157,20 @@ class CsvTable:
                     if column not in found:
                         problems.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
                 if set(columns) <= set(found):
-                    self._read(reader)
+                    self._rows = [(reader.line_num, {**cells}) for cells in reader]
         except OSError as error:
             problems.append(f"{file}: cannot be read: {error.strerror}")
         except (UnicodeDecodeError, csv.Error) as error:
             problems.append(f"{file}: not a CSV file in UTF-8 ({error})")
 
-    def _read(self, reader: csv.DictReader[str]) -> None:
-        for cells in reader:
-            # DictReader files what stands beyond the last column under the key None.
-            surplus = cells.pop(None, None)
-            row = CsvRow(self.file, reader.line_num, {k: (v or "").strip() for k, v in cells.items()}, self._problems)
-            if surplus:
-                row.problem(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
-            self._rows.append(row)
-
-    def __iter__(self) -> Iterator[CsvRow]:
-        return iter(self._rows)
+    def __iter__(self) -> Iterator[CsvRow[C]]:
+        for number, cells in self._rows:
+            yield CsvRow(self._columns, f"{self._file} row {number}", cells, self._problems)
 
     def __len__(self) -> int:
         return len(self._rows)
+
+
+def required_columns(columns: type[msgspec.Struct]) -> list[str]:
+    """Return the columns that a table must have."""
+    return [field.key for field in fields_of(columns) if field.required]

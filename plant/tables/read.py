@@ -7,25 +7,14 @@ from pathlib import Path
 from plant.equipment import Feeder
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
+from plant.tables.csv_table import required_columns
+from plant.tables.feeder_columns import TABLES, LoadColumns
 from plant.tables.manifest import read_f_nom
-from plant.tables.shunts import LOAD_COLUMNS, read_capacitors, read_inverters, read_loads, read_source
+from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
 from wire.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""
-
-FILES = (
-    "buses.csv",
-    "lines.csv",
-    "line_configs.csv",
-    "switches.csv",
-    "regulators.csv",
-    "transformers.csv",
-    "capacitors.csv",
-    "inverters.csv",
-    "source.csv",
-)
-"""Tables of a feeder, beside its load sets."""
 
 
 class FeederError(ValueError):
@@ -98,11 +87,11 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     if load_set in sets:
         loads = read_loads(folder, f"loads_{load_set}.csv", buses, problems)
     else:
-        loads = ()
+        loads, columns = (), ", ".join(required_columns(LoadColumns))
         problems.append(
             f'load set "{load_set}": no such set; there are {", ".join(sets)}'
             if sets
-            else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {', '.join(LOAD_COLUMNS)}"
+            else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {columns}"
         )
     capacitors = read_capacitors(folder, buses, problems)
     inverters = read_inverters(folder, buses, loads, problems)
@@ -154,5 +143,5 @@ def _folder(feeder: str) -> Path:
 
 def _report_strange_files(folder: Path, problems: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
-        if path.name not in FILES and not path.name.startswith("loads_"):
-            problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, FILES, 'tables')}")
+        if path.name not in TABLES and not path.name.startswith("loads_"):
+            problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, TABLES, 'tables')}")

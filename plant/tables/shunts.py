@@ -6,19 +6,19 @@ import math
 import re
 from math import radians
 from pathlib import Path
-from typing import Literal, cast
+from typing import Any
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.plausible_feeder import (
+from plant.tables.feeder_columns import (
     BRANCH_CURRENT,
-    P_F_DROOP,
-    Q_V_DROOP,
     RATED_CURRENT,
-    SOURCE_ANGLE,
-    SOURCE_VOLTAGE,
     TIMES_THE_LOAD,
+    CapacitorColumns,
+    InverterColumns,
+    LoadColumns,
+    SourceColumns,
     power_of,
 )
 from wire.keys import check_name
@@ -32,38 +32,34 @@ TAKEN = {
 }
 """Names that no inverter can have, and why."""
 
-LOAD_COLUMNS = ("bus", "connection", "model", "P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")
-"""Columns of a load set; for a delta load a, b, c are A-B, B-C, C-A."""
+_POWERS = ("P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")
 
 
 def read_loads(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[Load, ...]:
     """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
-    for row in CsvTable(folder, file, LOAD_COLUMNS, problems, required=True):
-        bus = buses.find(row)
-        connection = row.choice("connection", "connection of a load", ("Y", "D"))
-        model = row.choice("model", "load model", ("P", "I", "Z"))
-        most = power_of("a load", bus.V_nom, BRANCH_CURRENT, 1) if bus else None
-        S = tuple(
-            1000.0 * complex(row.number(f"P_{p}_kW", plausible=most), row.number(f"Q_{p}_kvar", plausible=most))
-            for p in "abc"
-        )
+    for row in CsvTable(folder, file, LoadColumns, problems, required=True):
+        it, bus = row.columns, buses.find(row)
         if bus is None:
             continue
-        if connection == "Y":
+        for column in _POWERS:
+            row.require(column, power_of("a load", bus.V_nom, BRANCH_CURRENT, 1))
+        powers = (it.P_a_kW, it.Q_a_kvar), (it.P_b_kW, it.Q_b_kvar), (it.P_c_kW, it.Q_c_kvar)
+        S = tuple(1000.0 * complex(P, Q) for P, Q in powers)
+        if it.connection == "Y":
             buses.require_ground(row, bus, "a Y load")
-        across = ("A", "B", "C") if connection == "Y" else ("AB", "BC", "CA")
+        across = ("A", "B", "C") if it.connection == "Y" else ("AB", "BC", "CA")
         for branch, power in zip(across, S, strict=True):
             missing = [phase for phase in branch if phase not in bus.phases]
             if power == 0 or not missing:
                 continue
-            between = f"between {branch[0]} and {branch[1]}" if connection == "D" else f"on phase {branch}"
+            between = f"between {branch[0]} and {branch[1]}" if it.connection == "D" else f"on phase {branch}"
             row.problem(f'bus "{bus.name}" has a load {between} but no phase {", ".join(missing)}; it has {bus.phases}')
         loads.append(
             Load(
                 bus=bus.name,
-                connection=cast(Literal["Y", "D"], connection),
-                model=cast(Literal["Z", "I", "P"], model),
+                connection=it.connection,
+                model=it.model,
                 S=(S[0], S[1], S[2]),
             )
         )
@@ -72,14 +68,14 @@ def read_loads(folder: Path, file: str, buses: BusTable, problems: list[str]) ->
 
 def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Capacitor, ...]:
     """Read capacitors.csv: banks from phase to ground."""
-    columns = ("bus", "Q_a_kvar", "Q_b_kvar", "Q_c_kvar", "V_rated_kV_LN")
     capacitors: list[Capacitor] = []
-    for row in CsvTable(folder, "capacitors.csv", columns, problems):
-        bus = buses.find(row)
-        most = power_of("a capacitor bank", bus.V_nom, BRANCH_CURRENT, 1) if bus else None
-        Q = tuple(1000.0 * row.number(f"Q_{p}_kvar", at_least=0.0, plausible=most) for p in "abc")
-        V_rated = row.number("V_rated_kV_LN", above=0.0) * 1000.0
+    for row in CsvTable(folder, "capacitors.csv", CapacitorColumns, problems):
+        it, bus = row.columns, buses.find(row)
+        Q = tuple(1000.0 * kvar for kvar in (it.Q_a_kvar, it.Q_b_kvar, it.Q_c_kvar))
+        V_rated = it.V_rated_kV_LN * 1000.0
         if bus is not None:
+            for column in ("Q_a_kvar", "Q_b_kvar", "Q_c_kvar"):
+                row.require(column, power_of("a capacitor bank", bus.V_nom, BRANCH_CURRENT, 1))
             buses.require_phases(row, bus, [phase for phase, q in zip("ABC", Q, strict=True) if q])
             if buses.require_ground(row, bus, "a capacitor bank"):
                 _require_bank_voltage(row, V_rated, bus)
@@ -87,7 +83,7 @@ def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple
     return tuple(capacitors)
 
 
-def _require_bank_voltage(row: CsvRow, V_rated: float, bus: Bus) -> None:
+def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
     """Note a problem if a bank's rated voltage (V) is not near its bus's nominal one, as 4.16 kV L-L is not at 2.40."""
     ratio = V_rated / bus.V_nom
     if math.isnan(ratio) or 0.9 <= ratio <= 1.5:
@@ -109,21 +105,14 @@ def read_inverters(
     A rating is held against the feeder's loads: one that is more than `TIMES_THE_LOAD` of all is in another unit.
     """
     total = sum(S.real for load in loads for S in load.S if S.real > 0.0) / 1e3
-    columns = ("name", "kind", "bus", "microgrid", "P_rated_kW", "m_p_pu", "m_q_pu")
     inverters: dict[str, InverterRow] = {}
     at: dict[str, str] = {}
-    for row in CsvTable(folder, "inverters.csv", columns, problems):
-        name, microgrid = row.text("name"), row.text("microgrid")
-        kind = row.choice("kind", "kind of inverter", ("GFM", "GFL"))
-        bus = buses.find(row)
-        P_rated = row.number("P_rated_kW", above=0.0, plausible=_rating(bus, total)) * 1000.0
-        m_p = row.number("m_p_pu", above=0.0, plausible=P_F_DROOP)
-        m_q = row.number("m_q_pu", above=0.0, plausible=Q_V_DROOP)
+    for row in CsvTable(folder, "inverters.csv", InverterColumns, problems):
+        it, name, bus = row.columns, row.columns.name, buses.find(row)
+        if bus is not None and not math.isnan(bus.V_nom):
+            row.require("P_rated_kW", _rating(bus, total))
         if name:
             _require_name(row, name)
-        spare = row.text("spare", default="")
-        if spare not in ("", "yes"):
-            row.problem(f'spare "{spare}": must be "yes" or empty')
         if name in inverters:
             row.problem(f'inverter "{name}": there is one of this name already; names must differ')
         if bus is None:
@@ -137,30 +126,28 @@ def read_inverters(
             name,
             InverterRow(
                 name=name,
-                kind=cast(Literal["GFM", "GFL"], kind),
+                kind=it.kind,
                 bus=bus.name,
-                microgrid=microgrid,
-                P_rated=P_rated,
+                microgrid=it.microgrid,
+                P_rated=it.P_rated_kW * 1000.0,
                 V_nom=bus.V_nom,
-                m_p=m_p,
-                m_q=m_q,
-                spare=spare == "yes",
+                m_p=it.m_p_pu,
+                m_q=it.m_q_pu,
+                spare=it.spare == "yes",
             ),
         )
     return tuple(inverters.values())
 
 
-def _rating(bus: Bus | None, load: float) -> Plausible | None:
-    """Range of the rating (kW) of an inverter at a bus of a feeder with so much load (kW)."""
-    if bus is None or math.isnan(bus.V_nom):
-        return None
+def _rating(bus: Bus, load: float) -> Plausible:
+    """Return the range of the rating (kW) of an inverter at a bus of a feeder with so much load (kW)."""
     most = power_of("an inverter", bus.V_nom, RATED_CURRENT, 3)
     among = load > 0.0 and load * TIMES_THE_LOAD < most.high
     what = f"{most.what} beside {load:.4g} kW of load" if among else most.what
     return Plausible(what, 1.0, load * TIMES_THE_LOAD if among else most.high)
 
 
-def _require_name(row: CsvRow, name: str) -> None:
+def _require_name(row: CsvRow[Any], name: str) -> None:
     """Note a problem if an inverter's name cannot be a part of a key, or already means something else there."""
     try:
         check_name("name", name)
@@ -177,13 +164,11 @@ def _require_name(row: CsvRow, name: str) -> None:
 def read_source(folder: Path, buses: BusTable, problems: list[str]) -> Source | None:
     """Read source.csv: the substation, at most one."""
     found: Source | None = None
-    for row in CsvTable(folder, "source.csv", ("bus", "V_pu", "angle_deg"), problems):
+    for row in CsvTable(folder, "source.csv", SourceColumns, problems):
         bus = buses.find(row)
-        V_pu = row.number("V_pu", above=0.0, plausible=SOURCE_VOLTAGE)
-        angle = radians(row.number("angle_deg", plausible=SOURCE_ANGLE))
         if found is not None:
             row.problem("a second source; a feeder has one at most")
         if bus is not None:
             buses.require_phases(row, bus, "ABC")
-            found = found or Source(bus=bus.name, V_pu=V_pu, angle=angle)
+            found = found or Source(bus=bus.name, V_pu=row.columns.V_pu, angle=radians(row.columns.angle_deg))
     return found

@@ -16,6 +16,7 @@ class Topic(StrEnum):
     keys = "keys"
     messages = "messages"
     scenario = "scenario"
+    feeder = "feeder"
     laws = "laws"
     metrics = "metrics"
     claims = "claims"

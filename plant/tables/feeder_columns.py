@@ -1,0 +1,251 @@
+"""The columns of a feeder's tables: type, unit, range and meaning of each. A class is a file, an object a row.
+
+Other columns (origin, note) are free.
+
+A range is wide: it holds every value that a distribution feeder may have, and none that only a lost unit explains.
+`power_of` gives ranges that depend on a bus's voltage.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import msgspec
+
+from plant.equipment import F_NOM
+from plant.tables.csv_table import PhaseLetters
+from wire.plausible import Plausible, Range, Unit
+from wire.table_schema import Label
+
+SELF_R = Plausible("the resistance of a line", 1e-3, 20.0, above_zero=True)
+SELF_X = Plausible("the reactance of a line", 1e-3, 20.0, above_zero=True)
+SELF_B = Plausible("the susceptance of a line", 0.0, 2000.0)
+MUTUAL = Plausible("a mutual impedance", -10.0, 10.0)
+MUTUAL_B = Plausible("the susceptance of a line", -2000.0, 2000.0)
+RATIO = Plausible("the ratio of a regulator", 0.8, 1.25)
+
+BRANCH_CURRENT = 2000.0
+"""Largest current of one load or capacitor bank (A per phase); conductors of a distribution feeder carry less."""
+RATED_CURRENT = 5000.0
+"""Largest rated current of an inverter or transformer (A per phase)."""
+TIMES_THE_LOAD = 50.0
+"""Largest rating of one inverter beside the total real power of the feeder's loads."""
+
+Phases = Annotated[str, PhaseLetters()]
+OhmPerKm = Annotated[float, Unit("ohm/km")]
+LoadW = Annotated[float, Unit("kW"), "Real power at nominal voltage."]
+LoadVar = Annotated[float, Unit("kvar"), "Reactive power at nominal voltage."]
+BankVar = Annotated[float, Unit("kvar"), Range(low=0.0), "Reactive power at V_rated_kV_LN."]
+
+
+class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """buses.csv: the order of the rows is the order of the nodes everywhere."""
+
+    bus: str
+    """Name."""
+    phases: Annotated[str, PhaseLetters(stand_in="ABC")]
+    """Phases that it has."""
+    V_nom_kV_LL: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.1, 150.0, above_zero=True)]
+    """Nominal voltage, line-to-line."""
+    zone: str = ""
+    """Part of the feeder."""
+    x: float = 0.0
+    """Place in a drawing (any unit)."""
+    y: float = 0.0
+    """Place in a drawing (any unit)."""
+
+
+class LineColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """lines.csv."""
+
+    line: str
+    """Name."""
+    from_bus: str
+    """One end."""
+    to_bus: str
+    """The other end."""
+    phases: Phases
+    """Phases that it carries."""
+    config: str
+    """Its impedances, by their name in line_configs.csv."""
+    length_m: Annotated[float, Unit("m"), Plausible("the length of a line", 0.1, 1e5, above_zero=True)]
+    """Length."""
+
+
+class LineConfigColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """line_configs.csv: one element of the upper triangle of the matrices a row, at nominal frequency."""
+
+    config: str
+    """Name of the configuration."""
+    phase_1: Annotated[Literal["A", "B", "C"], Label("phase")]
+    """Row of the element."""
+    phase_2: Annotated[Literal["A", "B", "C"], Label("phase")]
+    """Column of the element."""
+    R_ohm_per_km: OhmPerKm
+    """Resistance; above 0 on the diagonal."""
+    X_ohm_per_km: OhmPerKm
+    """Reactance; above 0 on the diagonal."""
+    B_uS_per_km: Annotated[float, Unit("uS/km")]
+    """Shunt susceptance."""
+
+
+class SwitchColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """switches.csv: a switch is called by its buses, "13-152", or by its alias, "sw1_2"."""
+
+    from_bus: str
+    """One end."""
+    to_bus: str
+    """The other end."""
+    phases: Phases
+    """Phases that it switches."""
+    state: Annotated[Literal["closed", "open"], Label("state of a switch")]
+    """Position at the start."""
+    alias: str = ""
+    """Second name."""
+
+
+class RegulatorColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """regulators.csv: V_to = (1 + tap tap_step_pu) V_from, fixed; one row for all phases on the same tap."""
+
+    regulator: str
+    """Name."""
+    from_bus: str
+    """Input."""
+    to_bus: str
+    """Output."""
+    phases: Phases
+    """Phases on this tap."""
+    tap: float
+    """Number of steps, as in 5 or -3."""
+    tap_step_pu: Annotated[float, Unit("pu"), Plausible("a step of a regulator", 1e-5, 0.25, above_zero=True)]
+    """Length of a step, 0.00625 as a rule."""
+
+
+class TransformerColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """transformers.csv: rated voltages are the nominal voltages of the buses. Behind D-D nothing has ground."""
+
+    transformer: str
+    """Name."""
+    from_bus: str
+    """One side."""
+    to_bus: str
+    """The other side."""
+    connection: Annotated[Literal["D-D", "Yg-Yg"], Label("connection of a transformer")]
+    """Delta on both sides, or star with ground on both."""
+    S_rated_kVA: Annotated[float, Unit("kVA"), Plausible("the rating of a transformer", 1.0, 1e6, above_zero=True)]
+    """Rated power."""
+    R_percent: Annotated[float, Unit("%"), Plausible("the resistance of a transformer", 0.0, 20.0)]
+    """Resistance, of the rating."""
+    X_percent: Annotated[float, Unit("%"), Plausible("the reactance of a transformer", 0.1, 40.0, above_zero=True)]
+    """Reactance, of the rating."""
+
+
+class LoadColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """loads_SET.csv: powers per phase; for a delta load a, b, c are A-B, B-C, C-A."""
+
+    bus: str
+    """Its bus."""
+    connection: Annotated[Literal["Y", "D"], Label("connection of a load")]
+    """Star with ground, or delta."""
+    model: Annotated[Literal["P", "I", "Z"], Label("load model")]
+    """Constant power, current or impedance."""
+    P_a_kW: LoadW
+    Q_a_kvar: LoadVar
+    P_b_kW: LoadW
+    Q_b_kvar: LoadVar
+    P_c_kW: LoadW
+    Q_c_kvar: LoadVar
+
+
+class CapacitorColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """capacitors.csv: banks from phase to ground."""
+
+    bus: str
+    """Its bus."""
+    Q_a_kvar: BankVar
+    Q_b_kvar: BankVar
+    Q_c_kvar: BankVar
+    V_rated_kV_LN: Annotated[
+        float, Unit("kV", in_key=False), Plausible("a rated voltage", 0.05, 150.0, above_zero=True)
+    ]
+    """Rated voltage, line-to-neutral; 0.9 to 1.5 times the nominal one of its bus."""
+
+
+class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """inverters.csv: nameplates and places, at most one inverter on a bus."""
+
+    name: str
+    """Name, a part of keys on the wire."""
+    kind: Annotated[Literal["GFM", "GFL"], Label("kind of inverter")]
+    """Grid-forming or grid-following."""
+    bus: str
+    """Its bus, of three phases."""
+    microgrid: str
+    """Name of its microgrid."""
+    P_rated_kW: Annotated[float, Unit("kW"), Plausible("the rating of an inverter", 0.01, 1e6, above_zero=True)]
+    """Rated power, the base of its per-unit values."""
+    m_p_pu: Annotated[float, Unit("pu"), Plausible("a P-f droop", 0.001, 0.2, above_zero=True)]
+    """P-f droop (pu frequency per pu power)."""
+    m_q_pu: Annotated[float, Unit("pu"), Plausible("a Q-V droop", 0.001, 0.5, above_zero=True)]
+    """Q-V droop (pu voltage per pu reactive power)."""
+    spare: Literal["", "yes"] = ""
+    """"yes" if it stands by, switched off, until an agent comes for it."""
+
+
+class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """source.csv: the substation, a stiff voltage, at most one. Without it only inverters feed."""
+
+    bus: str
+    """Its bus, of three phases."""
+    V_pu: Annotated[float, Unit("pu"), Plausible("the voltage of the substation", 0.8, 1.2, above_zero=True)]
+    """Voltage."""
+    angle_deg: Annotated[float, Unit("deg"), Plausible("the angle of the substation", -360.0, 360.0)]
+    """Angle of phase A."""
+
+
+class Manifest(msgspec.Struct, frozen=True, kw_only=True):
+    """feeder.toml, which may be missing: what holds for the feeder as a whole."""
+
+    f_nom_Hz: Annotated[float, Unit("Hz"), Plausible("a nominal frequency", 16.0, 400.0)] = F_NOM
+    """Nominal frequency, at which the impedances are given."""
+
+
+TABLES: dict[str, type[msgspec.Struct]] = {
+    "buses.csv": BusColumns,
+    "lines.csv": LineColumns,
+    "line_configs.csv": LineConfigColumns,
+    "switches.csv": SwitchColumns,
+    "regulators.csv": RegulatorColumns,
+    "transformers.csv": TransformerColumns,
+    "capacitors.csv": CapacitorColumns,
+    "inverters.csv": InverterColumns,
+    "source.csv": SourceColumns,
+}
+"""Tables of a feeder by their files, beside its load sets."""
+
+
+def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
+    """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound.
+
+    Parameters
+    ----------
+    what : str
+        Its load, bank or machine.
+    V_nom : float
+        Nominal voltage (V, line-to-neutral).
+    current : float
+        Greatest current (A per phase).
+    phases : int
+        How many phases carry the power.
+
+    Examples
+    --------
+    >>> power_of("a load", 2400.0, 2000.0, 1)
+    Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0, above_zero=False, hint='')
+    """
+    if math.isnan(V_nom):  # the bus has its own problem
+        return Plausible(what, -math.inf, math.inf)
+    high = phases * V_nom * current / 1e3
+    where = f"{what} {'on a phase of' if phases == 1 else 'at'} {V_nom * 3.0**0.5 / 1e3:.3g} kV"
+    return Plausible(where, -high, high)
