@@ -5,18 +5,10 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from scenarios.results.evaluation.benchmark_registry import (
-    BENCHMARKS,
-    DIGITS,
-    HEADINGS,
-    UNITS,
-    Benchmark,
-    Published,
-    Quantity,
-    benchmark_of,
-)
+from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, Benchmark, Published, benchmark_of
 from scenarios.results.evaluation.claims import Claim, Judge, Verdict, judge
-from scenarios.results.findings import Findings, label
+from scenarios.results.evaluation.quantities import DIGITS, HEADINGS, UNITS, Quantity, label
+from scenarios.results.findings import Findings
 from scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 
 __all__ = [

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from scenarios.sweep.column_labels import unit_of
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """Return the metrics of a case, a row per window; what is no steady value is nan, with its reason in `reasons`.
+    """Return the metrics of a case, a row per window; nan where there is no steady value, with the reason in `reasons`.
 
     Examples
     --------
@@ -54,47 +55,35 @@ def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the windows among what metrics.json holds of a case."""
+    """Return the windows among the entries of a case in metrics.json."""
     return {label: value for label, value in case.items() if isinstance(value, dict) and "f_error_Hz" in value}
 
 
 def events_frame(file: Path) -> pd.DataFrame:
-    """Return what happened, from events.csv."""
+    """Return the events of a run, from events.csv."""
     return _from_csv(file, {"t_s": float})
 
 
 def links_frame(file: Path) -> pd.DataFrame:
     """Return the fate of every message on emulated links, from links.csv; without the file there are no rows."""
-    return _from_csv(file, {"seq": int, "t_s": float, "delay_s": _float_or_nan}, COLUMNS)
+    if not file.exists():
+        return _from_csv(StringIO(",".join(COLUMNS) + "\n"), {})
+    return _from_csv(file, {"seq": int, "t_s": float, "delay_s": float})
 
 
-def _from_csv(
-    file: Path, kinds: Mapping[str, Callable[[str], Any]], without: Sequence[str] | None = None
-) -> pd.DataFrame:
+def _from_csv(file: Path | StringIO, kinds: Mapping[str, type]) -> pd.DataFrame:
     """Return the rows of a file, to the last bit of its numbers; units go from its header into `attrs`.
 
-    Parameters
-    ----------
-    file : Path
-        The file.
-    kinds : Mapping
-        How the columns that are no texts are read.
-    without : Sequence[str], optional
-        Header of the empty table if there is no such file.
+    Columns without a kind are texts; an empty number is nan.
     """
-    if without is not None and not file.exists():
-        header, rows = list(without), []
-    else:
-        with file.open(encoding="utf-8", newline="") as opened:
-            header, *rows = csv.reader(opened)
-    columns = dict(zip(header, zip(*rows, strict=True) if rows else ([] for _ in header), strict=True))
-    units = {name: "s" for name in header if name.endswith("_s")}
-    frame = pd.DataFrame(
-        {name.removesuffix("_s"): [kinds.get(name, str)(text) for text in column] for name, column in columns.items()}
+    frame = pd.read_csv(
+        file,
+        dtype=defaultdict(lambda: str, kinds),
+        float_precision="round_trip",
+        keep_default_na=False,
+        na_values={name: [""] for name, kind in kinds.items() if kind is float},
     )
+    units = {name: "s" for name in frame if name.endswith("_s")}
+    frame = frame.rename(columns={name: name.removesuffix("_s") for name in units})
     frame.attrs["units"] = {name.removesuffix("_s"): unit for name, unit in units.items()}
     return frame
-
-
-def _float_or_nan(text: str) -> float:
-    return float(text) if text else float("nan")

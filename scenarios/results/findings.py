@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from plant.equipment import F_NOM, Feeder
 from scenarios.results.evaluation.benchmark_registry import Published
 from scenarios.results.evaluation.metric import Measured
+from scenarios.results.evaluation.quantities import label
 from scenarios.results.evaluation.window_metrics import own_measures
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.history import Nameplates
@@ -23,17 +24,6 @@ SteadyValues = Mapping[str, Mapping[str, Steady]]
 
 SHARED = ("MPSI", "MQSI", "t_restore_s")
 """Measures that mean nothing over several islands at once."""
-
-
-def label(measure: str, f_nom: float = F_NOM) -> str:
-    """Return the name of a measure for people, at a nominal frequency (Hz).
-
-    Examples
-    --------
-    >>> label("f_error_Hz"), label("MPSI"), label("f_error_Hz", 50.0)
-    ('abs(f-60)', 'MPSI', 'abs(f-50)')
-    """
-    return {"f_error_Hz": f"abs(f-{f_nom:g})", "p": "P"}.get(measure, measure)
 
 
 @dataclass(frozen=True, kw_only=True)

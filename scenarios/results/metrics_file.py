@@ -13,9 +13,9 @@ from typing import Any, Literal
 import msgspec
 
 from plant.equipment import Feeder
+from scenarios.results.evaluation.quantities import UNITS, Measure
 from scenarios.results.findings import SHARED, Findings
 from scenarios.results.record import Recorded
-from scenarios.results.steadiness import BOUNDS
 from scenarios.schema import ScenarioModel
 from wire.messages import Pacing
 
@@ -92,19 +92,16 @@ def metrics_json(
 
 
 def _numbers(steady: dict[str, Any]) -> dict[str, Any]:
-    reasons: Mapping[str, str] = steady["reasons"]
-    found: dict[str, Any] = {
+    reasons: Mapping[Measure, str] = steady["reasons"]
+    numbers: dict[str, Any] = {
         name: value if value is not None and math.isfinite(value) and name not in reasons else None
         for name, value in steady.items()
         if name not in ("p", "reasons")
     }
-    told = {name: f"{text}{_last_mean(name, steady)}" for name, text in reasons.items()}
-    return found | ({"reasons": told} if told else {})
+    texts = {name: f"{text}{_last_mean(name, steady[name])}" for name, text in reasons.items()}
+    return numbers | ({"reasons": texts} if texts else {})
 
 
-def _last_mean(name: str, steady: Mapping[str, Any]) -> str:
-    """Return what the last 0.2 s came to, for a measure that is a number without being steady."""
-    value = steady[name]
-    if not isinstance(value, float) or not math.isfinite(value):
-        return ""
-    return f"; last mean {value:.4g} {BOUNDS[name].unit}".rstrip()
+def _last_mean(name: Measure, value: Any) -> str:
+    """Return the mean of the last 0.2 s, of a measure that is a number without being steady."""
+    return f"; last mean {value:.4g}{UNITS[name]}" if isinstance(value, float) and math.isfinite(value) else ""

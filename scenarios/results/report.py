@@ -11,9 +11,10 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.results.evaluation.benchmark_registry import DIGITS, NO_BENCHMARK, UNITS, Benchmark, Quantity, heading
+from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
 from scenarios.results.evaluation.claims import Verdict
-from scenarios.results.findings import SHARED, Findings, label
+from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
+from scenarios.results.findings import SHARED, Findings
 from scenarios.results.metrics import Steady
 from scenarios.results.steadiness import STEADY
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenarios.results.evaluation.quantities import DIGITS, UNITS, Measure
 from scenarios.results.history import Flags, Floats
 
 STEADY = 0.2
@@ -26,29 +27,8 @@ FEWEST = 2
 """Rows that each of the two means needs at least."""
 
 
-class SteadyBound(NamedTuple):
-    """How far a steady measure may move."""
-
-    digit: float
-    """Largest change between two means, in its unit: one unit of the last digit that the paper prints."""
-    unit: str
-    """Unit, or ""."""
-    part: float = 0.0
-    """The same as a part of its value, where that is more."""
-
-    def of(self, value: float) -> float:
-        """Return the change allowed at a value."""
-        return max(self.digit, self.part * abs(value))
-
-
-BOUNDS: Mapping[str, SteadyBound] = {
-    "f_error_Hz": SteadyBound(0.01, "Hz"),
-    "MPSI": SteadyBound(0.01, ""),
-    "V_error": SteadyBound(0.001, "pu"),
-    "MQSI": SteadyBound(0.01, "", part=0.05),
-    "p": SteadyBound(0.01, "pu"),
-}
-"""Bounds by measure; frequency and power are looked at inverter by inverter."""
+PARTS: Mapping[str, float] = {"MQSI": 0.05}
+"""Part of its value by which a measure may move, where that is more than a unit of its last digit."""
 
 
 class Ends(NamedTuple):
@@ -78,13 +58,13 @@ def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
     return Ends(start, end, apart, last, before, inside, inside & (t >= end - STEADY - 1e-9))
 
 
-def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
+def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
     """Return why a measure has no steady value; "" where it has.
 
     Parameters
     ----------
-    measure : str
-        A key of `BOUNDS`.
+    measure : Measure
+        The measure; frequency and power are looked at inverter by inverter.
     x : Floats
         Its rows, shape (T,), or (T, M) for M inverters; not a number in rows where it has no value. An inverter that
         is off the network for all of `ends.steady` is no column of it.
@@ -105,18 +85,18 @@ def reason(measure: str, x: Floats, ends: Ends, missing: str, names: tuple[str, 
         return f"{missing} in a part of the last {STEADY:g} s"
     if min(ends.last.sum(), ends.before.sum()) < FEWEST:
         return f"not steady: {_rows(int(ends.inside.sum()), ends.end - ends.start)} too few to tell"
-    bound, found = BOUNDS[measure], []
-    unit = f" {bound.unit}".rstrip()
+    unit, found = UNITS[measure], []
     for i, column in enumerate(columns.T):
         recent, earlier = column[ends.last], column[ends.before]
         recent, earlier = recent[np.isfinite(recent)], earlier[np.isfinite(earlier)]
         if not recent.size:
             continue
         of = f"{names[i]} " if names else ""
-        allowed, swing = bound.of(float(recent.mean())), float(np.ptp(recent))
+        part = PARTS.get(measure, 0.0) * abs(float(recent.mean()))
+        allowed, swing = max(10.0 ** -DIGITS[measure], part), float(np.ptp(recent))
         change = float(recent.mean() - earlier.mean()) if earlier.size else 0.0
         if abs(change) * STEADY > allowed * ends.apart * (1.0 + 1e-9):
-            per = f"{bound.unit or '1'}/s"
+            per = f"{unit.strip() or '1'}/s"
             found.append((abs(change) / allowed, f"not steady: {of}still moves {change / ends.apart:+.2g} {per}"))
         elif swing > SWINGS * allowed:
             found.append((swing / allowed / SWINGS, f"not steady: {of}still swings by {swing:.2g}{unit}"))

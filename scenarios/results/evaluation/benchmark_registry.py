@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from scenarios.results.evaluation.quantities import Quantity
 from wire.anybody import ANYTHING, named
 from wire.plugin import callable_objection, plugin_of
 from wire.printable import printable
@@ -18,35 +19,6 @@ from wire.registry import Registry
 if TYPE_CHECKING:
     from scenarios.results.evaluation.claims import Claim
     from scenarios.results.findings import Findings
-
-Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]
-"""A column, named as in metrics.json."""
-
-HEADINGS: dict[Quantity, str] = {
-    "f_error_Hz": "abs(f-60) Hz",
-    "MPSI": "MPSI",
-    "V_error": "V_error pu",
-    "MQSI": "MQSI",
-}
-"""Heading of a column, with the unit."""
-
-
-def heading(quantity: Quantity, f_nom: float) -> str:
-    """Return the heading of a column of a run whose nominal frequency (Hz) need not be the paper's.
-
-    Examples
-    --------
-    >>> heading("f_error_Hz", 50.0), heading("MPSI", 50.0)
-    ('abs(f-50) Hz', 'MPSI')
-    """
-    return f"abs(f-{f_nom:g}) Hz" if quantity == "f_error_Hz" else HEADINGS[quantity]
-
-
-UNITS: dict[Quantity, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": ""}
-"""Unit as it follows a number."""
-
-DIGITS: dict[Quantity, int] = {"f_error_Hz": 2, "MPSI": 2, "V_error": 3, "MQSI": 2}
-"""Decimals that make sense: what is less moves from run to run of a real microgrid."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scenarios.results.evaluation.benchmark_registry import CLAIMS, Quantity
+from scenarios.results.evaluation.benchmark_registry import CLAIMS
+from scenarios.results.evaluation.quantities import Measure
 from scenarios.results.findings import Findings
 from wire.anybody import ANYTHING, named
 from wire.plugin import Plugin, made
@@ -31,9 +32,6 @@ from wire.registry import PluginError
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
-
-Measure = Quantity | Literal["p"]
-"""A steady value: a quantity of the tables, or the powers of the inverters."""
 
 Judge = Callable[[Findings], tuple[bool, str]]
 """Whether it holds, and what we found, with units."""
