@@ -50,7 +50,9 @@ def experiment(
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
     again = f"gridpeers experiment {name}" + (f" --out {shlex.quote(str(out))}" if out else "")
-    result = _swept(source, folder, jobs, again) if isinstance(source, FromSweep) else _told(source, folder)
+    result = (
+        _from_sweep(source, folder, jobs, again) if isinstance(source, FromSweep) else _from_scenario(source, folder)
+    )
     try:
         files = result.write(folder)
     except OSError as error:
@@ -59,12 +61,12 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> ExperimentResult:
+def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: str) -> ExperimentResult:
     """Do what is left of the sweep, and draw."""
     from gridpeers.cli.commands.sweep_command import check_packages, finish
 
     check_packages()
-    import pyarrow.parquet as pq
+    import pandas as pd
 
     from gridpeers.sweep_files import read_sweep
     from papers.singhal2022.experiments.experiment_data import SweepData
@@ -76,11 +78,10 @@ def _swept(source: FromSweep, folder: Path, jobs: int | None, again: str) -> Exp
     summary = finish(source.sweep, plan, folder, jobs, "", again)
     if sum(summary.broke.values()):
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
-    rows = pq.read_table(summary.table).to_pylist()
-    return source.make(SweepData(rows=rows, base=plan.base, window=plan.base.events[0].label))
+    return source.make(SweepData(rows=pd.read_parquet(summary.table), base=plan.base, window=plan.base.events[0].label))
 
 
-def _told(source: FromScenario, folder: Path) -> ExperimentResult:
+def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
     from rich.console import Console
 

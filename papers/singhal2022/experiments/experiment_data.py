@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from gridpeers.measures import (
     MPSI,
@@ -28,11 +29,13 @@ from gridpeers.theory import (
     InverterGroup,
     LoadStep,
     ScenarioModel,
+    Times,
     VarResponse,
     feeder_of,
     first_window,
     inverter_group_of,
     load_steps,
+    predicted_times,
     var_response,
     without_faults,
 )
@@ -83,7 +86,7 @@ class CaseData:
         t = self.t(case)
         return float(x[(t >= end - STEADY - 1e-9) & (t < end - 1e-9)].mean())
 
-    def fleet(self, case: str) -> InverterGroup:
+    def inverters(self, case: str) -> InverterGroup:
         """Return the inverters under the rule of a case."""
         return inverter_group_of(self.scenario, self.feeder, case)
 
@@ -94,24 +97,31 @@ class CaseData:
         return {step.label: step.load for step in steps if step.load is not None}
 
 
-def cut_between(fleet: InverterGroup, groups: Mapping[str, str]) -> set[tuple[str, str]]:
+def cut_between(inverters: InverterGroup, groups: Mapping[str, str]) -> set[tuple[str, str]]:
     """Return the links (src, dst) between members of different groups."""
-    names = [name for name in fleet.names if name in groups]
+    names = [name for name in inverters.names if name in groups]
     return {(a, b) for a in names for b in names if groups[a] != groups[b]}
 
 
-def without(fleet: InverterGroup, links: set[tuple[str, str]]) -> InverterGroup:
-    """Return the fleet as if these links (src, dst) were not there."""
-    A = np.array(fleet.A)
+def without(inverters: InverterGroup, links: set[tuple[str, str]]) -> InverterGroup:
+    """Return the inverters as if these links (src, dst) were not there."""
+    A = np.array(inverters.A)
     for src, dst in links:
-        A[fleet.names.index(dst), fleet.names.index(src)] = 0.0
-    return replace(fleet, A=A)
+        A[inverters.names.index(dst), inverters.names.index(src)] = 0.0
+    return replace(inverters, A=A)
 
 
-RunColumns = Mapping[str, Any]
-"""Columns of one run."""
+INDEXES = (("t_f_s", "Frequency within 0.01 Hz"), ("t_share_s", "Power shared, MPSI < 0.01"))
+"""The two times of an event that most experiments are about, and their titles."""
 
-_ALL: Mapping[str, Any] = MappingProxyType({})
+TimePair = tuple[float, float]
+"""Times to restore the frequency and to share power (s); infinite for never."""
+
+
+def times_of(predicted: Times) -> TimePair:
+    """Return the times to restore and to share (s); infinite for never."""
+    restore, share = (np.inf if t is None else t for t in (predicted.restore_s, predicted.share_s))
+    return restore, share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,50 +130,49 @@ class SweepData:
 
     Examples
     --------
-    >>> rows = [{"case": "a", "link[0].delay": d, "e.t_f_s": t} for d, t in ((0.1, 2.0), (0.0, 1.0), (0.2, None))]
-    >>> swept = SweepData(rows=rows, base=None, window="e")
-    >>> swept.curve("link[0].delay", "t_f_s", {"case": "a"})
+    >>> table = pd.DataFrame({"case": "a", "link[0].delay": [0.1, 0.0, 0.2], "e.t_f_s": [2.0, 1.0, None]})
+    >>> sweep = SweepData(rows=table, base=None, window="e")
+    >>> sweep.curve("link[0].delay", "t_f_s", {"case": "a"})
     (array([0. , 0.1, 0.2]), array([ 1.,  2., inf]))
     """
 
-    rows: Sequence[RunColumns]
+    rows: pd.DataFrame
     """All runs, in the order of the sweep."""
     base: ScenarioModel
     """The scenario that was varied."""
     window: str
     """Label of the event that is measured."""
-    _fleets: dict[str, InverterGroup] = field(default_factory=dict)
 
-    def where(self, equal: Mapping[str, Any] = _ALL) -> Iterator[RunColumns]:
+    def where(self, equal: Mapping[str, Any]) -> pd.DataFrame:
         """Return the rows whose columns have these values."""
-        return (row for row in self.rows if all(row[name] == value for name, value in equal.items()))
+        keep = np.ones(len(self.rows), bool)
+        for name, value in equal.items():
+            keep &= (self.rows[name] == value).to_numpy()
+        return self.rows[keep]
 
-    def values(self, column: str, equal: Mapping[str, Any] = _ALL) -> list[Any]:
+    def values(self, column: str, equal: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
         """Return the different values of a column, sorted."""
-        return sorted({row[column] for row in self.where(equal)})
+        return sorted(self.where(equal)[column].unique().tolist())
 
-    def measure(self, row: RunColumns, index: str) -> float:
-        """Return an index of a row: infinite for a time that never came, not a number where a run broke."""
-        value = row[f"{self.window}.{index}"]
-        if value is not None:
-            return float(value)
-        return np.inf if index.startswith("t_") and row.get("status") != "broke" else np.nan
+    def measured(self, index: str, rows: pd.DataFrame) -> Floats:
+        """Return an index of some rows: infinite for a time that never came, not a number where a run broke."""
+        values = rows[f"{self.window}.{index}"].to_numpy(float)
+        ran = rows["status"].to_numpy() != "broke" if "status" in rows else True
+        return np.where(np.isnan(values) & ran & index.startswith("t_"), np.inf, values)
 
     def median(self, index: str, equal: Mapping[str, Any]) -> float:
         """Return the median of an index over the rows whose columns have these values."""
-        return float(np.median([self.measure(row, index) for row in self.where(equal)]))
+        return float(np.median(self.measured(index, self.where(equal))))
 
     def curve(
         self, x: str, index: str, equal: Mapping[str, Any], over: Callable[[Floats], Any] = np.median
     ) -> tuple[Floats, Floats]:
         """Return an index against a column, by default the median over all other columns."""
         at = self.values(x, equal)
-        found = [
-            float(over(np.array([self.measure(row, index) for row in self.where({**equal, x: value})]))) for value in at
-        ]
+        found = [float(over(self.measured(index, self.where({**equal, x: value})))) for value in at]
         return np.array(at, float), np.array(found)
 
-    # ---------------------------------------------------------------- what theory needs
+    # ---------------------------------------------------------------- theory
 
     @cached_property
     def feeder(self) -> Feeder:
@@ -187,8 +196,11 @@ class SweepData:
         """How voltages and vars respond to V_set."""
         return var_response(self.calm, self.feeder)
 
-    def fleet(self, case: str) -> InverterGroup:
-        """Return the inverters under the rule of a case."""
-        if case not in self._fleets:
-            self._fleets[case] = inverter_group_of(self.base, self.feeder, case)
-        return self._fleets[case]
+    @cached_property
+    def inverters(self) -> Mapping[str, InverterGroup]:
+        """The inverters under the rule of each case."""
+        return {case: inverter_group_of(self.base, self.feeder, case) for case in self.base.cases}
+
+    def predicted(self, case: str, *, link_delay_s: float = 0.0, loss: float = 0.0) -> TimePair:
+        """Return the times of a case over late or lossy links, by theory."""
+        return times_of(predicted_times(self.inverters[case], link_delay_s=link_delay_s, loss=loss, load=self.load))

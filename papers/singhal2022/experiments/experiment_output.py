@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from gridpeers.measures import Floats
 from gridpeers.output_folders import write_whole
+from papers.singhal2022.experiments.experiment_data import INDEXES
 
 Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid", "reference"]
 """Measured: line and filled markers. Hollow: hollow markers, another way to measure. Predicted: a dashed line. Points:
@@ -21,7 +22,7 @@ filled markers without a line. Trace: a line over time with the dashes of its st
 wide pale line, which is drawn first and stays visible below others."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Curve:
     """One curve of a panel."""
 
@@ -83,6 +84,24 @@ class Page:
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""
+
+
+def time_panels(curves: Callable[[int, str], Sequence[Curve]], suffix: str = "", **axes: Any) -> list[Panel]:
+    """Return a panel for each of the two times after islanding.
+
+    Parameters
+    ----------
+    curves : Callable[[int, str], Sequence[Curve]]
+        Makes the curves, given the number of the time (0 or 1) and its name.
+    suffix : str, optional
+        Follows the title of the time.
+    **axes : Any
+        Further fields of the panels.
+    """
+    return [
+        Panel(title=f"{title}{suffix}", y_label="time after islanding (s)", curves=curves(number, index), **axes)
+        for number, (index, title) in enumerate(INDEXES)
+    ]
 
 
 FIGURE = "figure.png"

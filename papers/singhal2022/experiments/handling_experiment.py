@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gridpeers.theory import predicted_times
-from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.experiment_data import RunColumns, SweepData
+from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
 from papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
@@ -41,49 +39,60 @@ Condition = tuple[float, float]
 """Delay (s) and loss of all agent-agent links."""
 
 
-def handling(swept: SweepData) -> ExperimentResult:
+def handling(sweep: SweepData) -> ExperimentResult:
     """Return the times of every option under every condition."""
-    conditions = list(dict.fromkeys(_condition(row) for row in swept.rows))
-    panels: list[Panel] = []
+    conditions = {links: _condition(links) for links in sweep.rows["link"].unique().tolist()}
+    theory = {
+        (case, links): sweep.predicted(case, link_delay_s=late, loss=lost)
+        for case in CASES
+        for links, (late, lost) in conditions.items()
+    }
+
+    def measured(case: str, links: str, option: str, index: str) -> float:
+        options = {f"handling.{key}": value for key, value in (_PAPER | dict(OPTIONS[option])).items()}
+        (value,) = sweep.measured(index, sweep.where({"case": case, "link": links, **options}))
+        return float(value)
+
+    def curves(number: int, index: str, links: str) -> list[Curve]:
+        found = []
+        for style, case in enumerate(CASES):
+            x = np.arange(float(len(OPTIONS))) + 0.18 * (style - 1)
+            y = np.array([measured(case, links, option, index) for option in OPTIONS])
+            predicted = np.array([theory[case, links][number]])
+            found += [Curve(x, y, style, "points"), Curve(x[:1], predicted, style, "hollow")]
+        return found
+
+    panels = [
+        Panel(
+            title=words(condition),
+            x_label="",
+            y_label=f"{title.partition(',')[0]}, time (s)" if links == next(iter(conditions)) else "",
+            curves=curves(number, index, links),
+            log="y",
+            x_names=list(OPTIONS) if number else [""] * len(OPTIONS),
+            y_range=(0.2, 30.0),
+        )
+        for number, (index, title) in enumerate(INDEXES)
+        for links, condition in conditions.items()
+    ]
     rows: list[tuple[TableCell, ...]] = []
-    for number, (index, title) in enumerate(INDEXES):
-        for condition in conditions:
-            curves = []
-            for style, case in enumerate(CASES):
-                y = [_measured(swept, case, condition, option, index) for option in OPTIONS]
-                x = np.arange(float(len(OPTIONS))) + 0.18 * (style - 1)
-                curves.append(Curve(x=x, y=np.array(y), style=style, look="points"))
-                said = _predicted(swept, case, condition)[number]
-                curves.append(Curve(x=x[:1], y=np.array([said]), style=style, look="hollow"))
-            panels.append(
-                Panel(
-                    title=words(condition),
-                    x_label="",
-                    y_label=f"{title.partition(',')[0]}, time (s)" if condition == conditions[0] else "",
-                    curves=curves,
-                    log="y",
-                    x_names=list(OPTIONS) if number else [""] * len(OPTIONS),
-                    y_range=(0.2, 30.0),
-                )
-            )
     for case in CASES:
-        for condition in conditions:
-            rows.append((case, words(condition), "hold, predicted", *_predicted(swept, case, condition)))
+        for links, condition in conditions.items():
+            rows.append((case, words(condition), "hold, predicted", *theory[case, links]))
             for option in OPTIONS:
-                times = [_measured(swept, case, condition, option, index) for index, _ in INDEXES]
+                times = [measured(case, links, option, index) for index, _ in INDEXES]
                 rows.append((case, words(condition), option, *times))
     page = Page(
         title="Islanding over late and lossy links, with every option of the agents",
         panels=panels,
         columns=len(conditions),
-        names={style: swept.base.cases[case].title for style, case in enumerate(CASES)},
+        names={style: sweep.base.cases[case].title for style, case in enumerate(CASES)},
         looks={"points": "measured", "hollow": "predicted (hold)"},
         share_y=True,
         height=2.6,
     )
-    return ExperimentResult(
-        page=page, table=ExperimentTable(columns=("graph", "links", "handling", "f (s)", "sharing (s)"), rows=rows)
-    )
+    columns = ("graph", "links", "handling", "f (s)", "sharing (s)")
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 
 def words(condition: Condition) -> str:
@@ -98,17 +107,6 @@ def words(condition: Condition) -> str:
     return f"late by {late:g} s" if late else f"loss {100 * lost:g} %" if lost else "good links"
 
 
-def _condition(row: RunColumns) -> Condition:
-    entries = json.loads(row["link"])
+def _condition(links: str) -> Condition:
+    entries = json.loads(links)
     return (entries[0].get("delay", 0.0), entries[0].get("loss", 0.0)) if entries else (0.0, 0.0)
-
-
-def _measured(swept: SweepData, case: str, condition: Condition, option: str, index: str) -> float:
-    wanted = {f"handling.{key}": value for key, value in {**_PAPER, **OPTIONS[option]}.items()}
-    (row,) = (row for row in swept.where({"case": case, **wanted}) if _condition(row) == condition)
-    return swept.measure(row, index)
-
-
-def _predicted(swept: SweepData, case: str, condition: Condition) -> tuple[float, float]:
-    late, lost = condition
-    return of_times(predicted_times(swept.fleet(case), link_delay_s=late, loss=lost, load=swept.load))

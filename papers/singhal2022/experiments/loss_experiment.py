@@ -6,96 +6,78 @@ the one period that every state takes, and T_c p/(1 - p) more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from gridpeers.theory import predicted_times
-from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.experiment_data import SweepData
-from papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, ExperimentTable, Page, Panel
+from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    TableCell,
+    time_panels,
+)
 
 DELAY, LOSS = "link[0].delay", "link[0].loss"
 
 
-def loss(swept: SweepData) -> ExperimentResult:
+def loss(sweep: SweepData) -> ExperimentResult:
     """Return the times against loss, and against mean age, measured and predicted."""
-    cases, T_c = list(swept.base.cases)[:4], swept.base.time.T_c_s
-    lost, late = swept.values(LOSS, {DELAY: 0.0}), swept.values(DELAY, {LOSS: 0.0})[1:]
-    age_of_loss, ages = [T_c / (1.0 - p) for p in lost], [T_c, *late]
+    cases, T_c = list(sweep.base.cases)[:4], sweep.base.time.T_c_s
+    lost, late = sweep.values(LOSS, {DELAY: 0.0}), sweep.values(DELAY, {LOSS: 0.0})[1:]
+    age_of_loss, ages = np.array([T_c / (1.0 - p) for p in lost]), np.array([T_c, *late])
     fine = np.linspace(0.0, 0.96, 25)
-    said_of_loss = {c: _said(swept, c, losses=fine.tolist()) for c in cases}
-    said_of_age = {c: _said(swept, c, delays=ages) for c in cases}
-    panels = []
-    for number, (index, title) in enumerate(INDEXES):
-        curves = []
+    by_loss = {case: np.array([sweep.predicted(case, loss=p) for p in fine.tolist()]) for case in cases}
+    by_age = {case: np.array([sweep.predicted(case, link_delay_s=d) for d in ages.tolist()]) for case in cases}
+
+    def against_loss(number: int, index: str) -> list[Curve]:
+        found = []
         for style, case in enumerate(cases):
-            x, y = swept.curve(LOSS, index, {"case": case, DELAY: 0.0})
-            low, high = (swept.curve(LOSS, index, {"case": case, DELAY: 0.0}, over)[1] for over in (np.min, np.max))
-            curves.append(Curve(x=x, y=y, style=style, low=low, high=high))
-            curves.append(Curve(x=fine, y=said_of_loss[case][:, number], style=style, look="predicted"))
-        panels.append(
-            Panel(
-                title=title,
-                x_label="probability p that a message is lost",
-                y_label="time after islanding (s)",
-                curves=curves,
-                log="y",
-                y_range=(0.3, 25.0),
-            )
-        )
-    for number, (index, title) in enumerate(INDEXES):
-        curves = []
+            x, y = sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})
+            low, high = (sweep.curve(LOSS, index, {"case": case, DELAY: 0.0}, over)[1] for over in (np.min, np.max))
+            found += [
+                Curve(x, y, style, low=low, high=high),
+                Curve(fine, by_loss[case][:, number], style, "predicted"),
+            ]
+        return found
+
+    def against_age(number: int, index: str) -> list[Curve]:
+        found = []
         for style, case in enumerate(cases):
-            _, y = swept.curve(LOSS, index, {"case": case, DELAY: 0.0})
-            curves.append(Curve(x=np.array(age_of_loss), y=y, style=style, look="points"))
-            x, y = swept.curve(DELAY, index, {"case": case, LOSS: 0.0})
-            curves.append(Curve(x=np.maximum(x, T_c), y=y, style=style, look="hollow"))
-            curves.append(Curve(x=np.array(ages), y=said_of_age[case][:, number], style=style, look="predicted"))
-        panels.append(
-            Panel(
-                title=f"{title}, against mean age",
-                x_label="mean age of what is used: delay, or T_c/(1 - p) (s)",
-                y_label="time after islanding (s)",
-                curves=curves,
-                log="xy",
-                x_ticks=[0.02, 0.04, 0.1, 0.2, 0.4],
-                y_range=(0.3, 25.0),
-            )
-        )
+            x, y = sweep.curve(DELAY, index, {"case": case, LOSS: 0.0})
+            found += [
+                Curve(age_of_loss, sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})[1], style, "points"),
+                Curve(np.maximum(x, T_c), y, style, "hollow"),
+                Curve(ages, by_age[case][:, number], style, "predicted"),
+            ]
+        return found
+
+    panels = time_panels(against_loss, x_label="probability p that a message is lost", log="y", y_range=(0.3, 25.0))
+    panels += time_panels(
+        against_age,
+        ", against mean age",
+        x_label="mean age of what is used: delay, or T_c/(1 - p) (s)",
+        log="xy",
+        x_ticks=[0.02, 0.04, 0.1, 0.2, 0.4],
+        y_range=(0.3, 25.0),
+    )
     page = Page(
         title="Islanding over lossy links, the last state held",
         panels=panels,
         columns=2,
-        names={style: swept.base.cases[case].title for style, case in enumerate(cases)},
+        names={style: sweep.base.cases[case].title for style, case in enumerate(cases)},
         looks={"measured": "loss: median and range of 3 seeds", "hollow": "delay", "predicted": "predicted"},
     )
-    return ExperimentResult(page=page, table=_table(swept, cases, lost, T_c))
-
-
-def _table(swept: SweepData, cases: Sequence[str], lost: Sequence[float], T_c: float) -> ExperimentTable:
-    """Each loss beside the delay of its mean age, where that was run."""
-    rows = []
+    rows: list[list[TableCell]] = []
     for case in cases:
-        for p in lost:
-            age = T_c / (1.0 - p)
-            d = next((d for d in swept.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
-            said = of_times(predicted_times(swept.fleet(case), loss=p, load=swept.load))
-            cells: list[float | str] = []
-            for i, (index, _) in enumerate(INDEXES):
-                as_late = "" if d is None else swept.median(index, {"case": case, DELAY: d, LOSS: 0.0})
-                cells += [said[i], swept.median(index, {"case": case, DELAY: 0.0, LOSS: p}), as_late]
-            rows.append((case, p, age, *cells))
+        for p, age in zip(lost, age_of_loss.tolist(), strict=True):
+            row: list[TableCell] = [case, p, age]
+            same_age = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
+            predicted = sweep.predicted(case, loss=p)
+            for number, (index, _) in enumerate(INDEXES):
+                late_cell = "" if same_age is None else sweep.median(index, {"case": case, DELAY: same_age, LOSS: 0.0})
+                row += [predicted[number], sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p}), late_cell]
+            rows.append(row)
     columns = ["graph", "loss", "mean age (s)"]
     columns += [f"{w}, {how} (s)" for w in ("f", "sharing") for how in ("predicted", "measured", "delay of that age")]
-    return ExperimentTable(columns=columns, rows=rows)
-
-
-def _said(
-    swept: SweepData, case: str, *, delays: Sequence[float] = (), losses: Sequence[float] = ()
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return the predicted times, a row per delay and loss."""
-    fleet = swept.fleet(case)
-    late = [predicted_times(fleet, link_delay_s=d, load=swept.load) for d in delays]
-    lossy = [predicted_times(fleet, loss=p, load=swept.load) for p in losses]
-    return np.array([of_times(times) for times in (*late, *lossy)])
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))

@@ -6,8 +6,7 @@ import numpy as np
 
 from gridpeers.measures import Floats, Settling
 from gridpeers.theory import Case, Loop, Ticks, Times, predicted_times, sharing_index
-from papers.singhal2022.experiments.delay_experiment import of_times
-from papers.singhal2022.experiments.experiment_data import CaseData, cut_between, without
+from papers.singhal2022.experiments.experiment_data import CaseData, cut_between, times_of, without
 from papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
@@ -32,19 +31,19 @@ LOST = 1.0 - 1e-12
 """Probability that a message is lost in a partition, for the model, which asks for less than 1."""
 
 
-def partition(told: CaseData) -> ExperimentResult:
+def partition(runs: CaseData) -> ExperimentResult:
     """Return F and MPSI over time, and what is left and comes back, in numbers."""
-    split = told.scenario.cases["halves"].netem.partitions[0]
-    event = told.scenario.events[-1]
-    start, end = split.from_s, split.to_s or told.scenario.time.end_s
+    split = runs.scenario.cases["halves"].netem.partitions[0]
+    event = runs.scenario.events[-1]
+    start, end = split.from_s, split.to_s or runs.scenario.time.end_s
     panels = []
-    for row, (title, measure) in enumerate((("f", told.f), ("MPSI", told.MPSI))):
+    for row, (title, measure) in enumerate((("f", runs.f), ("MPSI", runs.MPSI))):
         for name, cases in COLUMNS:
-            curves = [Curve(x=told.t("whole"), y=measure("whole"), style=WHOLE, look="reference")]
+            curves = [Curve(runs.t("whole"), measure("whole"), WHOLE, "reference")]
             for style, case in zip((HELD, EXPIRED), cases, strict=False):
-                curves.append(Curve(x=told.t(case), y=measure(case), style=style, look="solid"))
-                t, said = predicted(told, case, end - event.t_s)
-                curves.append(Curve(x=t + event.t_s, y=said[row], style=style, look="predicted"))
+                curves.append(Curve(runs.t(case), measure(case), style, "solid"))
+                t, theory = predicted(runs, case, end - event.t_s)
+                curves.append(Curve(t + event.t_s, theory[row], style, "predicted"))
             panels.append(
                 Panel(
                     title=f"{title}, {name}",
@@ -52,7 +51,7 @@ def partition(told: CaseData) -> ExperimentResult:
                     y_label=("f, mean of the GFM (Hz)", "MPSI")[row],
                     curves=curves,
                     spans=[(start, end)],
-                    x_range=(2.0, told.scenario.time.end_s),
+                    x_range=(2.0, runs.scenario.time.end_s),
                     y_range=((59.97, 60.25), (0.0, 0.25))[row],
                 )
             )
@@ -70,43 +69,43 @@ def partition(told: CaseData) -> ExperimentResult:
         looks=looks,
         height=2.5,
     )
-    return ExperimentResult(page=page, table=_table(told, start, event.t_s, end))
+    return ExperimentResult(page=page, table=_table(runs, start, event.t_s, end))
 
 
-def predicted(told: CaseData, case: str, length: float) -> tuple[Floats, tuple[Floats, Floats]]:
+def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return the time after the loss of load (s), and f (Hz) and MPSI, as long as the groups last.
 
     What is held stays, as if all that follows were lost; what has expired is a link that is not there.
     """
-    fleet, load = told.fleet(case), told.loads[told.scenario.events[-1].label]
-    cut = cut_between(fleet, groups_of(told, case))
-    expires = told.scenario.cases[case].handling.max_age > 0.0
+    inverters, load = runs.inverters(case), runs.loads[runs.scenario.events[-1].label]
+    cut = cut_between(inverters, groups_of(runs, case))
+    expires = runs.scenario.cases[case].handling.max_age > 0.0
     ticks = Ticks() if expires else Ticks(loss=dict.fromkeys(cut, LOST))
-    loop = Loop(fleet=without(fleet, cut) if expires else fleet, ticks=ticks)
-    nominal = load.load_pu * float(fleet.weight @ fleet.m_p)
-    path = loop.run(round(length / fleet.T_c), load.start_pu * fleet.m_p, nominal, islanding=load.islanding)
-    return path.t, (told.feeder.f_nom * (1.0 + path.e), sharing_index(path, fleet))
+    loop = Loop(fleet=without(inverters, cut) if expires else inverters, ticks=ticks)
+    nominal = load.load_pu * float(inverters.weight @ inverters.m_p)
+    path = loop.run(round(length / inverters.T_c), load.start_pu * inverters.m_p, nominal, islanding=load.islanding)
+    return path.t, (runs.feeder.f_nom * (1.0 + path.e), sharing_index(path, inverters))
 
 
-def groups_of(told: CaseData, case: str) -> dict[str, str]:
+def groups_of(runs: CaseData, case: str) -> dict[str, str]:
     """Return the group of each inverter in the case's partition."""
-    (split,) = told.scenario.cases[case].netem.partitions
-    microgrids = {row.name: row.microgrid for row in told.feeder.inverters}
+    (split,) = runs.scenario.cases[case].netem.partitions
+    microgrids = {row.name: row.microgrid for row in runs.feeder.inverters}
     return {name: split.group(name, microgrids) or "" for name in microgrids}
 
 
-def _table(told: CaseData, start: float, event: float, end: float) -> ExperimentTable:
+def _table(runs: CaseData, start: float, event: float, end: float) -> ExperimentTable:
     rows: list[list[TableCell]] = []
-    for case, rule in told.scenario.cases.items():
-        t, after = told.t(case), told.settling(case, end, told.scenario.time.end_s)
-        apart = round(1e3 * (told.mean(told.f(case), case, end) - told.feeder.f_nom), 1) + 0.0  # no -0
-        said: tuple[float, float] | tuple[str, str] = ("", "")
+    for case, rule in runs.scenario.cases.items():
+        t, after = runs.t(case), runs.settling(case, end, runs.scenario.time.end_s)
+        apart = round(1e3 * (runs.mean(runs.f(case), case, end) - runs.feeder.f_nom), 1) + 0.0  # no -0
+        theory: tuple[float, float] | tuple[str, str] = ("", "")
         if rule.netem.partitions:
-            _, (f, MPSI) = predicted(told, case, end - event)
-            said = round(1e3 * (float(f[-1]) - told.feeder.f_nom), 1), round(float(MPSI[-1]), 3)
-        largest = 1e3 * float(np.abs(told.f(case)[t > end] - told.feeder.f_nom).max())
-        shared = told.mean(told.MPSI(case), case, end)
-        rows.append([rule.title, said[0], apart, said[1], round(shared, 3), *_back(after), round(largest, 1)])
+            _, (f, MPSI) = predicted(runs, case, end - event)
+            theory = round(1e3 * (float(f[-1]) - runs.feeder.f_nom), 1), round(float(MPSI[-1]), 3)
+        largest = 1e3 * float(np.abs(runs.f(case)[t > end] - runs.feeder.f_nom).max())
+        shared = runs.mean(runs.MPSI(case), case, end)
+        rows.append([rule.title, theory[0], apart, theory[1], round(shared, 3), *_back(after), round(largest, 1)])
     columns = (
         "case",
         "f - 60 before it ends, predicted (mHz)",
@@ -124,21 +123,21 @@ def _back(after: Settling) -> tuple[TableCell, TableCell]:
     return after.t_f_s, after.t_share_s
 
 
-def flapping(told: CaseData) -> ExperimentResult:
+def flapping(runs: CaseData) -> ExperimentResult:
     """Return F and MPSI over time, and times after each event."""
-    cases = told.scenario.cases
+    cases = runs.scenario.cases
     panels = [
         Panel(
             title=title,
             x_label="time (s)",
             y_label=y_label,
-            curves=[Curve(x=told.t(case), y=measure(case), style=i, look="trace") for i, case in enumerate(cases)],
-            x_range=(0.5, told.scenario.time.end_s),
+            curves=[Curve(runs.t(case), measure(case), i, "trace") for i, case in enumerate(cases)],
+            x_range=(0.5, runs.scenario.time.end_s),
             y_range=y_range,
         )
         for title, measure, y_label, y_range in (
-            ("Frequency", told.f, "f, mean of the GFM (Hz)", (59.88, 60.15)),
-            ("Power sharing", told.MPSI, "MPSI", (0.0, 0.25)),
+            ("Frequency", runs.f, "f, mean of the GFM (Hz)", (59.88, 60.15)),
+            ("Power sharing", runs.MPSI, "MPSI", (0.0, 0.25)),
         )
     ]
     page = Page(
@@ -148,7 +147,7 @@ def flapping(told: CaseData) -> ExperimentResult:
         names={i: case.title for i, case in enumerate(cases.values())},
         height=2.4,
     )
-    return ExperimentResult(page=page, table=_flapping_table(told))
+    return ExperimentResult(page=page, table=_flapping_table(runs))
 
 
 def extra_age(rule: Case) -> float:
@@ -157,28 +156,28 @@ def extra_age(rule: Case) -> float:
     return sum(flap.down_s**2 / (2.0 * (flap.up_s + flap.down_s)) for flap in flaps)
 
 
-def _flapping_table(told: CaseData) -> ExperimentTable:
-    ends = [event.t_s for event in told.scenario.events[1:]] + [told.scenario.time.end_s]
+def _flapping_table(runs: CaseData) -> ExperimentTable:
+    ends = [event.t_s for event in runs.scenario.events[1:]] + [runs.scenario.time.end_s]
     rows: list[list[TableCell]] = []
-    for case, rule in told.scenario.cases.items():
+    for case, rule in runs.scenario.cases.items():
         row: list[TableCell] = [rule.title, extra_age(rule)]
-        for event, end in zip(told.scenario.events, ends, strict=True):
-            said = of_times(_flapping_predicted(told, case, event.label))
-            found = told.settling(case, event.t_s, end)
-            row += [said[0], found.t_f_s, said[1], found.t_share_s]
+        for event, end in zip(runs.scenario.events, ends, strict=True):
+            theory = times_of(_flapping_predicted(runs, case, event.label))
+            found = runs.settling(case, event.t_s, end)
+            row += [theory[0], found.t_f_s, theory[1], found.t_share_s]
         rows.append(row)
     columns = ["case", "mean age added (s)"]
-    for event in told.scenario.events:
+    for event in runs.scenario.events:
         for what in ("f", "sharing"):
             columns += [f"{event.label}, {what}, predicted (s)", "measured (s)"]
     return ExperimentTable(columns=columns, rows=rows)
 
 
-def _flapping_predicted(told: CaseData, case: str, label: str) -> Times:
+def _flapping_predicted(runs: CaseData, case: str, label: str) -> Times:
     """Return times with the flapping link as one that is always late by its mean age; one that is cut is not there."""
-    rule, fleet = told.scenario.cases[case], told.fleet(case)
+    rule, inverters = runs.scenario.cases[case], runs.inverters(case)
     ends = ("inv4", "inv5")
-    late = {(a, b): fleet.T_c + extra_age(rule) for a in ends for b in ends if a != b}
+    late = {(a, b): inverters.T_c + extra_age(rule) for a in ends for b in ends if a != b}
     if any(entry.cut for entry in rule.netem.links):
-        return predicted_times(without(fleet, set(late)), load=told.loads[label])
-    return predicted_times(fleet, link_delay_s=late, load=told.loads[label])
+        return predicted_times(without(inverters, set(late)), load=runs.loads[label])
+    return predicted_times(inverters, link_delay_s=late, load=runs.loads[label])

@@ -2,92 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from gridpeers.measures import Floats
 from gridpeers.random_graphs import Control, adjacency
 from gridpeers.theory import InverterGroup, predicted_times
-from papers.singhal2022.experiments.delay_experiment import INDEXES, of_times
-from papers.singhal2022.experiments.experiment_data import RunColumns, SweepData
-from papers.singhal2022.experiments.experiment_output import Curve, ExperimentResult, ExperimentTable, Look, Page, Panel
+from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData, times_of
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    TableCell,
+    time_panels,
+)
 
 DELAY, LINKS = "link[0].delay", "graph.links"
+PREDICTED = ("predicted f", "predicted sharing")
+"""Columns of the predicted times (s)."""
 
 
-def topology(swept: SweepData) -> ExperimentResult:
+def topology(sweep: SweepData) -> ExperimentResult:
     """Return the times against the number of links, with and without delay, measured and predicted."""
-    said = {(row["sample"]): _said(swept, row) for row in swept.rows}
-    delays = swept.values(DELAY)
-    panels = []
-    for number, (index, title) in enumerate(INDEXES):
-        curves = []
+    theory = [
+        times_of(predicted_times(on_graph(sweep, edges), link_delay_s=d, load=sweep.load))
+        for edges, d in zip(sweep.rows["graph.edges"], sweep.rows[DELAY], strict=True)
+    ]
+    runs = sweep.rows.assign(**dict(zip(PREDICTED, np.array(theory).T, strict=True)))
+    delays = sweep.values(DELAY)
+
+    def curves(number: int, index: str) -> list[Curve]:
+        found = []
         for style, d in enumerate(delays):
-            x, y = swept.curve(LINKS, index, {DELAY: d})
-            low, high = (swept.curve(LINKS, index, {DELAY: d}, over)[1] for over in (np.min, np.max))
-            curves.append(Curve(x=x, y=y, style=style, low=low, high=np.minimum(high, 1e3)))
-            rows = list(swept.where({DELAY: d}))
-            at = np.array([row[LINKS] + 0.25 * (-1) ** row["graph.number"] for row in rows])
-            curves.append(Curve(x=at, y=_of(swept, rows, index), style=style, look="points"))
-            curves.append(Curve(x=x, y=_medians(said, rows, x, number), style=style, look="predicted"))
-        panels.append(
-            Panel(
-                title=title,
-                x_label="links of the communication graph",
-                y_label="time after islanding (s)",
-                curves=curves,
-                log="y",
-                x_ticks=[8, 12, 16, 20, 24, 28, 32, 36],
-                y_range=(0.3, 15.0),
-            )
-        )
-    looks: Mapping[Look, str] = {"measured": "median and range", "points": "a graph", "predicted": "predicted, median"}
+            x, y = sweep.curve(LINKS, index, {DELAY: d})
+            low, high = (sweep.curve(LINKS, index, {DELAY: d}, over)[1] for over in (np.min, np.max))
+            rows = runs[runs[DELAY] == d]
+            at = (rows[LINKS] + 0.25 * (-1.0) ** rows["graph.number"]).to_numpy(float)
+            medians = rows.groupby(LINKS)[PREDICTED[number]].median().to_numpy()
+            found += [
+                Curve(x, y, style, low=low, high=np.minimum(high, 1e3)),
+                Curve(at, sweep.measured(index, rows), style, "points"),
+                Curve(x, medians, style, "predicted"),
+            ]
+        return found
+
     page = Page(
         title="Random connected graphs",
-        panels=panels,
+        panels=time_panels(
+            curves,
+            x_label="links of the communication graph",
+            log="y",
+            x_ticks=[8, 12, 16, 20, 24, 28, 32, 36],
+            y_range=(0.3, 15.0),
+        ),
         columns=2,
         names={style: f"links late by {d:g} s" if d else "links at once" for style, d in enumerate(delays)},
-        looks=looks,
+        looks={"measured": "median and range", "points": "a graph", "predicted": "predicted, median"},
         share_y=True,
     )
-    return ExperimentResult(page=page, table=_table(swept, said))
-
-
-def _table(swept: SweepData, said: Mapping[int, tuple[float, float]]) -> ExperimentTable:
-    rows = []
-    for d in swept.values(DELAY):
-        for links in swept.values(LINKS):
-            found = list(swept.where({DELAY: d, LINKS: links}))
-            cells = []
-            for number, (index, _) in enumerate(INDEXES):
-                times = _of(swept, found, index)
-                predicted = float(np.median([said[row["sample"]][number] for row in found]))
-                cells += [predicted, float(np.median(times)), float(times.min()), float(times.max())]
-            rows.append((d, links, len(found), *cells))
+    table: list[list[TableCell]] = []
+    for (d, links), rows in runs.groupby([DELAY, LINKS]):
+        row: list[TableCell] = [d, links, len(rows)]
+        for number, (index, _) in enumerate(INDEXES):
+            times = sweep.measured(index, rows)
+            predicted = rows[PREDICTED[number]].median()
+            row += [float(x) for x in (predicted, np.median(times), times.min(), times.max())]
+        table.append(row)
     columns = ["delay (s)", "links", "graphs"]
     columns += [f"{w}, {h} (s)" for w in ("f", "sharing") for h in ("predicted", "median", "lowest", "highest")]
-    return ExperimentTable(columns=columns, rows=rows)
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table))
 
 
-def _of(swept: SweepData, rows: Sequence[RunColumns], index: str) -> Floats:
-    return np.array([swept.measure(row, index) for row in rows])
-
-
-def _medians(said: Mapping[int, tuple[float, float]], rows: Sequence[RunColumns], at: Floats, number: int) -> Floats:
-    return np.array([np.median([said[row["sample"]][number] for row in rows if row[LINKS] == x]) for x in at])
-
-
-def _said(swept: SweepData, row: RunColumns) -> tuple[float, float]:
-    """Return the predicted times of one random graph."""
-    return of_times(predicted_times(fleet_on(swept, row["graph.edges"]), link_delay_s=row[DELAY], load=swept.load))
-
-
-def fleet_on(swept: SweepData, edges: str) -> InverterGroup:
+def on_graph(sweep: SweepData, edges: str) -> InverterGroup:
     """Return the inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
-    case = next(iter(swept.base.cases))
     first, rest = zip(*(edge.split("-") for edge in edges.split()), strict=True)
     control = Control(secondary="all", graph="links", links=tuple(zip(first, rest, strict=True)))
-    rows = {inverter.name: inverter for inverter in swept.feeder.inverters}
-    return replace(swept.fleet(case), A=np.array(adjacency(control, rows)))
+    rows = {inverter.name: inverter for inverter in sweep.feeder.inverters}
+    return replace(next(iter(sweep.inverters.values())), A=np.array(adjacency(control, rows)))

@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import msgspec
+import pandas as pd
 
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
@@ -48,7 +49,7 @@ def told(scenario: str, end_s: float, *cases: str) -> CaseData:
 @cache
 def theory(scenario: str) -> SweepData:
     """What theory needs to know of a scenario, without any runs."""
-    return SweepData(rows=(), base=load_scenario(scenario)[0], window="event1")
+    return SweepData(rows=pd.DataFrame(), base=load_scenario(scenario)[0], window="event1")
 
 
 def _history(spec: ScenarioModel, feeder: Feeder, case: str) -> History:

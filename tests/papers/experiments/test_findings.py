@@ -7,7 +7,6 @@ import pytest
 from netem.schema.fault import Fault
 from papers.singhal2022.experiments.outage_experiments import predicted
 from plant.equipment import F_NOM
-from scenarios.predict.times import predicted_times
 from scenarios.predict.var_response import var_growth
 from tests.papers.experiments.experiment_runs import ALL, measured, theory, told
 
@@ -17,8 +16,8 @@ def test_over_late_links_the_graph_with_most_links_restores_f_last_as_predicted(
     found = {}
     for graph in ("full", "reduced"):
         run = measured("graphs", graph, 5.5, Fault(on=ALL, delay=0.2), gains={"k_q": 1e5})
-        said = predicted_times(theory("graphs").fleet(graph), link_delay_s=0.2, load=theory("graphs").load).restore_s
-        assert run["t_f_s"] == pytest.approx(said, rel=0.05)
+        restore_s, _ = theory("graphs").predicted(graph, link_delay_s=0.2)
+        assert run["t_f_s"] == pytest.approx(restore_s, rel=0.05)
         found[graph] = run["t_f_s"] or 0.0
 
     assert found["full"] > 1.5 * found["reduced"] > 0.0
@@ -48,7 +47,7 @@ def test_late_set_points_let_vars_swing_long_before_the_frequency() -> None:
 def test_late_links_alone_let_vars_swing_where_their_lags_say_so(d: float, grows: bool) -> None:
     """With the re-tuned gains of reduced communication the var law grows at 0.3 s and not at 0.5 s."""
     reduced = theory("reduced-communication")
-    growth = var_growth(reduced.fleet("reduced"), reduced.response, link_delay_s=d)
+    growth = var_growth(reduced.inverters["reduced"], reduced.response, link_delay_s=d)
     swing = measured("reduced-communication", "reduced", 12.0, Fault(on=ALL, delay=d))["V_swing_pu"] or 0.0
 
     assert (growth > 0.0) == grows
