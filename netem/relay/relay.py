@@ -15,7 +15,7 @@ from netem.relay.direction import Direction, Faults, FaultsError, PacketCounts
 from netem.relay.endpoint import Endpoint
 from netem.relay.flow import RelayedLink
 from netem.relay.packets import NEVER
-from netem.relay.relay_command import RelayCommand, read_command
+from netem.relay.relay_command import new_faults, number
 from netem.relay.tcp_relay import TcpRelay
 from netem.relay.udp_relay import UdpRelay
 
@@ -106,43 +106,45 @@ class Relay:
         FaultsError
             If its values cannot be meant; nothing has changed then.
         """
-        work = self._obey(read_command(line))
-        return asyncio.run_coroutine_threadsafe(work, self._loop.result()).result(PATIENCE)
+        return asyncio.run_coroutine_threadsafe(self._obey(line), self._loop.result()).result(PATIENCE)
 
     def counts(self) -> tuple[PacketCounts, PacketCounts]:
         """Return the counts of packets towards the target, and from it."""
         return self._link.there.counts, self._link.back.counts
 
-    async def _obey(self, command: RelayCommand) -> str:
+    async def _obey(self, line: str) -> str:
         link, answer = self._link, ""
-        match command.name:
-            case "set":
-                answer = self._set_faults(command)
-            case "stall":
-                link.stalled_until = asyncio.get_running_loop().time() + command.duration
-                answer = "stalled until heal" if command.duration == NEVER else f"stalled for {command.duration:g} s"
-            case "reset":
+        match line.split():
+            case ["show"]:
+                return self._show()
+            case ["end"]:
+                return "ending"
+            case ["stall"]:
+                link.stalled_until, answer = NEVER, "stalled until heal"
+            case ["stall", text]:
+                duration = number("stall", text)
+                link.stalled_until = asyncio.get_running_loop().time() + duration
+                answer = f"stalled for {duration:g} s"
+            case ["reset"]:
                 answer = f"{self._connections()} reset"
                 self._relay.reset()
-            case "cut":
+            case ["cut"]:
                 link.is_cut, answer = True, "cut until heal"
                 self._relay.cut()
-            case "heal":
+            case ["heal"]:
                 link.is_cut, link.stalled_until, answer = False, -NEVER, "healed"
                 await self._relay.heal()
-            case "show":
-                return self._show()
-            case "end":
-                return "ending"
+            case _:
+                answer = self._set_faults(*new_faults(line))
         link.changed()
         return answer
 
-    def _set_faults(self, command: RelayCommand) -> str:
-        directions = [one for one in (self._link.there, self._link.back) if one.name in command.directions]
+    def _set_faults(self, values: dict[str, float], names: tuple[str, ...]) -> str:
+        directions = [direction for direction in (self._link.there, self._link.back) if direction.name in names]
         try:
-            faults = [Faults(**(msgspec.structs.asdict(one.faults) | command.values)) for one in directions]
+            faults = [msgspec.structs.replace(direction.faults, **values) for direction in directions]
         except FaultsError as error:
-            raise FaultsError(f"{'/'.join(command.directions)}: {error}") from None
+            raise FaultsError(f"{'/'.join(names)}: {error}") from None
         self._check(*faults)
         for direction, new in zip(directions, faults, strict=True):
             direction.faults = new

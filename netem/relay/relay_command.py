@@ -1,15 +1,9 @@
-"""The commands that change a relay while it runs, one a line."""
+"""The lines that change a relay while it runs."""
 
 from __future__ import annotations
 
-import msgspec
-
 from netem.relay.direction import Faults
-from netem.relay.packets import NEVER
 from wire.table_schema import fields_of
-
-DIRECTIONS = ("there", "back")
-"""From whoever connects to the relay to its target, and back."""
 
 HELP = """\
 delay S | jitter S | rate BYTES_PER_S | queue BYTES | loss P | reorder P
@@ -22,74 +16,46 @@ show            print the faults and the counts
 end             end the relay
 """
 
-ALONE = ("reset", "cut", "heal", "show", "end")
-"""Commands without a value."""
+DIRECTIONS = ("there", "back")
+"""From whoever connects to the relay to its target, and back."""
 
 FAULTS = tuple(field.name for field in fields_of(Faults))
 
 
 class RelayCommandError(ValueError):
-    """A line that is no command of a relay."""
+    """A line that is no command of a relay; the message says what would be one."""
 
 
-class RelayCommand(msgspec.Struct, frozen=True):
-    """A command."""
-
-    name: str
-    """One of `ALONE`, "stall" or "set"."""
-    duration: float = NEVER
-    """Of a stall (s)."""
-    values: dict[str, float] = {}
-    """New values of faults."""
-    directions: tuple[str, ...] = DIRECTIONS
-    """Directions that get them."""
-
-
-def read_command(line: str) -> RelayCommand:
-    """Read a command.
-
-    Raises
-    ------
-    RelayCommandError
-        If it is none of those in `HELP`; the message says what would be.
+def new_faults(line: str) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the values of faults in a line, and the directions that get them; raise RelayCommandError if it is none.
 
     Examples
     --------
-    >>> command = read_command("delay 0.2 jitter 0.05 back")
-    >>> command.values, command.directions
+    >>> new_faults("delay 0.2 jitter 0.05 back")
     ({'delay': 0.2, 'jitter': 0.05}, ('back',))
-    >>> read_command("stall 3").duration
-    3.0
-    >>> read_command("delay fast")  # doctest: +ELLIPSIS
+    >>> new_faults("delay fast")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
     netem.relay.relay_command.RelayCommandError: delay: "fast" is no number; write e.g. "delay 0.2" ...
     """
-    match line.split():
-        case [name] if name in ALONE:
-            return RelayCommand(name)
-        case ["stall"]:
-            return RelayCommand("stall")
-        case ["stall", text]:
-            duration = _number("stall", text)
-            if not duration >= 0.0:
-                raise RelayCommandError(f"stall: a duration is positive, got {duration:g} s")
-            return RelayCommand("stall", duration)
-        case [*pairs, direction] if direction in DIRECTIONS:
-            directions: tuple[str, ...] = (direction,)
-        case pairs:
-            directions = DIRECTIONS
-    if not pairs or len(pairs) % 2 or any(name not in FAULTS for name in pairs[::2]):
-        known = ", ".join((*FAULTS, "stall", *ALONE))
+    words = line.split()
+    directions: tuple[str, ...] = DIRECTIONS
+    if words and words[-1] in DIRECTIONS:
+        directions = (words.pop(),)
+    if not words or len(words) % 2 or any(name not in FAULTS for name in words[::2]):
+        known = ", ".join((*FAULTS, "stall", "reset", "cut", "heal", "show", "end"))
         raise RelayCommandError(f'"{line.strip()}" is not understood; a line begins with one of {known}')
-    values = {name: _number(name, text) for name, text in zip(pairs[::2], pairs[1::2], strict=True)}
-    return RelayCommand("set", values=values, directions=directions)
+    return {name: number(name, text) for name, text in zip(words[::2], words[1::2], strict=True)}, directions
 
 
-def _number(name: str, text: str) -> float:
+def number(name: str, text: str) -> float:
+    """Return the number of a fault or of a stall in a line."""
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
         raise RelayCommandError(
             f'{name}: "{text}" is no number; write e.g. "{name} 0.2" (units: s, bytes/s, probability)'
         ) from None
+    if name == "stall" and not value >= 0.0:
+        raise RelayCommandError(f"stall: a duration is positive, got {value:g} s")
+    return value

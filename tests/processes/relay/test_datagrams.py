@@ -6,10 +6,10 @@ import pytest
 from scipy.stats import binom, kstest
 
 from netem.draws import Stream
+from netem.relay import Relay, RelayCommandError
 from netem.relay.direction import Direction, Faults, FaultsError
 from netem.relay.line import Line
 from netem.relay.packets import NEVER, Datagrams
-from netem.relay.relay_command import RelayCommandError, read_command
 
 N = 4000
 SURE = 1e-4
@@ -89,9 +89,9 @@ def test_a_full_queue_drops_what_comes_and_the_rate_is_kept() -> None:
     ],
 )
 def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -> None:
-    """Whoever types something else is told what there is."""
-    with pytest.raises(RelayCommandError, match=complaint):
-        read_command(line)
+    """The error of a line that is no command lists the commands, or says what is wrong with the number."""
+    with Relay("udp/127.0.0.1:0", "udp/127.0.0.1:1") as relay, pytest.raises(RelayCommandError, match=complaint):
+        relay.do(line)
 
 
 @pytest.mark.parametrize(
