@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
@@ -76,13 +75,9 @@ def _from_csv(file: Path | StringIO, kinds: Mapping[str, type]) -> pd.DataFrame:
 
     Columns without a kind are texts; an empty number is nan.
     """
-    frame = pd.read_csv(
-        file,
-        dtype=defaultdict(lambda: str, kinds),
-        float_precision="round_trip",
-        keep_default_na=False,
-        na_values={name: [""] for name, kind in kinds.items() if kind is float},
-    )
+    frame = pd.read_csv(file, dtype=str, keep_default_na=False)
+    for name, kind in kinds.items():
+        frame[name] = pd.Series([kind(text or "nan") for text in frame[name]], dtype=kind)
     units = {name: "s" for name in frame if name.endswith("_s")}
     frame = frame.rename(columns={name: name.removesuffix("_s") for name in units})
     frame.attrs["units"] = {name.removesuffix("_s"): unit for name, unit in units.items()}
