@@ -21,7 +21,7 @@ from plant.realtime.pacer import sentence
 from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live.numbers.departures import Compared, compare
+from scenarios.live.numbers.departures import Departures, compare
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.evaluation.claims import judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
@@ -139,12 +139,9 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     for case, record in recorded.items():
         unlike: dict[str, Any] = {}
         if one := compared.get(case):
-            unlike = {"disturbed": one.disturbed, "departures": one.lines()} if one.departures else {}
-            if one.disturbed:
-                notes.append(
-                    f"case {case}: {', '.join(one.disturbed)}: not what the scenario means by it, which does not tell "
-                    f"of: {'; '.join(one.lines()[:3])} (all in metrics.json)"
-                )
+            labels = [window.label for window in one.disturbed]
+            unlike = {"disturbed": labels, "departures": one.lines()} if one.events else {}
+            notes += [f"case {case}: {one.note}"] if one.note else []
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, found, facts))
@@ -179,7 +176,7 @@ def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:
         yield "states not told to neighbours: " + ", ".join(f"{100.0 * s:.0f} % in {name}" for name, s in saved.items())
 
 
-def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Compared]:
+def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Departures]:
     """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
     if request.clock == "simulated":
         return {}

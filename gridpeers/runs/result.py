@@ -16,7 +16,7 @@ from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import drawn
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
-from scenarios.live.numbers.live_figures import drawing_by_hand
+from scenarios.live.numbers.live_figures import live_drawing
 from scenarios.results.evaluation.benchmark_registry import benchmark_of
 from scenarios.results.evaluation.claims import Verdict, judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, windows
@@ -55,7 +55,7 @@ class _FromFolder:
 
     @property
     def driver(self) -> str:
-        """Driver of the run: "inprocess", "processes", or "by hand"."""
+        """Driver of the run: "inprocess", "processes", or "live"."""
         return str(self.numbers["driver"])
 
     @property
@@ -143,10 +143,10 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         Raises
         ------
         ValueError
-            If it was a run by hand, whose windows people made.
+            If it was a live run, whose windows people made.
         """
-        if self.driver == "by hand":
-            raise ValueError("this was a run by hand: its windows are those that people made, see metrics")
+        if self.driver == "live":
+            raise ValueError("this was a live run: its windows are those that people made, see metrics")
         cases = {}
         for case, result in self.items():
             came = windows(as_they_came(self._spec, _plant_events(result)), self._spec.time.end_s)
@@ -169,11 +169,11 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return what the figures of some cases share (`scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
-        *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
+        *_, last = cases.values()  # in wall-clock time each case has its own events
         events = _plant_events(last)
-        if self.driver == "by hand":
-            compared = compare(spec, self._feeder, events, float(last.record.t[-1]))
-            return drawing_by_hand(compared, spec, self._feeder, case, last.record, events)
+        if self.driver == "live":
+            departures = compare(spec, self._feeder, events, float(last.record.t[-1]))
+            return live_drawing(departures, spec, self._feeder, last.record, events)
         histories = {case: result.record for case, result in cases.items()}
         return drawing_of(spec, self._feeder, histories, as_they_came(spec, events))
 

@@ -14,6 +14,7 @@ from netem.schema.change import Change, replayed
 from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
+from scenarios.live.live_folders import LIVE
 from scenarios.live.run_address import UsageError
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
@@ -63,7 +64,7 @@ class LinkLog:
         files = [self._replay, self._by_the_way if self._orders else None]
         text = to_toml(
             replay_of(self._scenario, self._feeder, self.changes, t),
-            {"driver": "by hand", "python": platform.python_version()},
+            {"driver": LIVE, "python": platform.python_version()},
         )
         for file in files:
             if file is not None:

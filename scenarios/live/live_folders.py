@@ -13,8 +13,8 @@ from scenarios.run import versions
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 
-BY_HAND = "by hand"
-"""The driver of such a run, as files name it."""
+LIVE = "live"
+"""The driver of a live run, as files name it."""
 
 
 class Folders:
@@ -66,7 +66,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
     try:
-        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": BY_HAND} | versions()))
+        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions()))
         (whole / "log").mkdir()
     except OSError as error:
         why = refusal(whole, error)

@@ -104,7 +104,7 @@ def configure(
     return plant, everyone
 
 
-def node_faults_by_hand(scenario: ScenarioModel) -> str:
+def manual_node_faults(scenario: ScenarioModel) -> str:
     """Return a note on the process faults that people have to inject into agents of their own; "" if there are none.
 
     Parameters

@@ -32,7 +32,7 @@ class RunMetrics:
     feeder: Feeder
     """Its feeder."""
     driver: str
-    """What moved bytes and time: "processes", "inprocess", or "by hand"."""
+    """What moved bytes and time: "processes", "inprocess", or "live"."""
     folder: Path
     """Its run folder."""
     clock: Clock = "simulated"
@@ -51,7 +51,7 @@ def metrics_json(
     ran: RunMetrics,
     found: Findings,
     facts: Mapping[str, Mapping[str, Any]],
-    by_hand: Mapping[str, Any] = MappingProxyType({}),
+    live: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
     """Return the text of metrics.json; a measure that is no number or not steady is null.
 
@@ -63,8 +63,8 @@ def metrics_json(
         Its measures.
     facts : Mapping[str, Mapping[str, Any]]
         By case: other entries; see `case_facts`.
-    by_hand : Mapping[str, Any], optional
-        What a reader must know of a run that people had their hands in.
+    live : Mapping[str, Any], optional
+        The table on a live run; see docs/results.md.
     """
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in found.results.items():
@@ -86,8 +86,8 @@ def metrics_json(
         cases[case] |= facts[case]
     scenario = ran.scenario
     clock = {"clock": ran.clock, "speed": ran.speed} if ran.clock == "wall" else {}
-    hand = {"by_hand": dict(by_hand)} if by_hand else {}
-    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **hand, "cases": cases}
+    table = {"live": dict(live)} if live else {}
+    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **table, "cases": cases}
     return json.dumps(text, indent=2, allow_nan=False) + "\n"
 
 

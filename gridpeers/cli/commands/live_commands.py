@@ -77,8 +77,8 @@ def _start(
     spec, feeder = load(scenario)
     with usage_errors():
         from scenarios.live.link_log import LinkLog, check_new
-        from scenarios.live.live_folders import BY_HAND, folders
-        from scenarios.live.live_options import LiveOptions, chosen_case, configure, node_faults_by_hand
+        from scenarios.live.live_folders import LIVE, folders
+        from scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
         from scenarios.live.live_processes import all_here, plant_here, say
         from scenarios.live.numbers.live_report import conclude
         from scenarios.results.metrics_file import RunMetrics
@@ -96,12 +96,12 @@ def _start(
                 say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log)
             else:
-                if note := node_faults_by_hand(spec):
+                if note := manual_node_faults(spec):
                     say(note)
                 outcome = plant_here(config, kept.record, link_log)
             if kept.whole is not None:
                 ran = RunMetrics(
-                    scenario=spec, feeder=feeder, driver=BY_HAND, folder=kept.whole, clock="wall", speed=speed
+                    scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=speed
                 )
                 outcome = conclude(outcome, ran, kept)
         _finish(outcome)

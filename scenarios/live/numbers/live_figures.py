@@ -1,4 +1,4 @@
-"""Data for the figures of a live run: the whole run, with everything that people did in it."""
+"""Data for the figures of a live run: the whole run, with the departures from its scenario."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import msgspec
 
 from plant.equipment import Feeder
-from scenarios.live.numbers.departures import Compared
+from scenarios.live.numbers.departures import Departures
 from scenarios.results.event_windows import as_they_came
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
@@ -21,45 +21,39 @@ PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "le
 """Verbs of the plant's events, and the same in figures."""
 
 
-def drawing_by_hand(
-    compared: Compared,
-    scenario: ScenarioModel,
-    feeder: Feeder,
-    case: str,
-    history: History,
-    events: Sequence[PlantEvent],
+def live_drawing(
+    departures: Departures, scenario: ScenarioModel, feeder: Feeder, history: History, events: Sequence[PlantEvent]
 ) -> Drawing:
-    """Return what to draw: all events by name, and a line where people departed otherwise from the scenario.
+    """Return the data to draw: all events by name, and a line at each departure from the scenario.
 
     Parameters
     ----------
-    compared : Compared
-        The run beside its scenario.
+    departures : Departures
+        The run compared with its scenario.
     scenario, feeder : ScenarioModel, Feeder
-        What was to be run.
-    case : str
-        Name of the case.
+        As run, with one case.
     history : History
-        The record.
+        The recorded rows.
     events : Sequence[PlantEvent]
-        What the plant told.
+        The plant's events.
     """
-    reached = tuple(event for event in scenario.events if event.t_s < compared.ended)
+    (case,) = scenario.cases
+    reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    drawing = drawing_of(compared.happened, feeder, {case: taken_part(scenario, feeder, history)}, came)
-    marks = [*drawing.events, *_by_hand(compared.departures)]
+    drawing = drawing_of(departures.happened, feeder, {case: taken_part(scenario, feeder, history)}, came)
+    marks = [*drawing.events, *_marks(departures.events)]
     return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
 
 
-def _by_hand(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
-    """Yield marks of departures from the scenario; those of one moment share a mark."""
+def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
+    """Yield marks of departures; those of one moment share a mark."""
     by_time: dict[float, list[PlantEvent]] = {}
     for event in departures:
         if event.t > 0.0:
             by_time.setdefault(event.t, []).append(event)
     for t, of in by_time.items():
         what = ", ".join(dict.fromkeys(text for event in of if (text := _in_short(event))))
-        yield Mark("by hand" if any(event.kind == "switch" for event in of) else "", t, what)
+        yield Mark("live" if any(event.kind == "switch" for event in of) else "", t, what)
 
 
 def _in_short(event: PlantEvent) -> str:

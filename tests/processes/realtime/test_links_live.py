@@ -174,7 +174,7 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
 
 
 LINK = ("inv1", "inv4")
-"""That is set by hand."""
+"""That is set in a live run."""
 
 
 def set_fates(path: Path, since: float, until: float) -> dict[int, tuple[str, str]]:
@@ -195,7 +195,7 @@ def now(desk: Desk) -> float:
     return float(told[1])
 
 
-def test_links_by_hand_from_set_to_replay(desk: Desk) -> None:
+def test_live_links_from_set_to_replay(desk: Desk) -> None:
     """What people type and read: set, cut, show, status, heal, problems; the record, and a scenario that can be run."""
     listen = desk.options[-1]
     kept = ("--out", "here", "--record", "again.toml")

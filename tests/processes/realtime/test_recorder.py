@@ -67,15 +67,15 @@ def test_a_recorder_that_stood_still_has_every_row(desk: Desk, words: tuple[str,
     assert times == pytest.approx([0.01 * k for k in range(1401)])
     command.expect("NOTE  case IV: early.*: not what the scenario means by it, which does not tell of: .* inv3 is sil")
     metrics = json.loads((here / "metrics.json").read_text())
-    assert "missing" not in metrics.get("by_hand", {})
-    found = metrics["by_hand"] if words[0] == "up" else metrics["cases"]["IV"]
+    assert "missing" not in metrics.get("live", {})
+    found = metrics["live"] if words[0] == "up" else metrics["cases"]["IV"]
     assert found["disturbed"][0] == "early"
     assert "inv3 is silent" in found["departures"][0]
     measured = metrics["cases"]["IV"]["late"]
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
 
 
-def test_a_run_by_hand_goes_on_without_its_record_and_says_so(desk: Desk) -> None:
+def test_a_live_run_goes_on_without_its_record_and_says_so(desk: Desk) -> None:
     """At once: from when on and why. What happens is told to the end; then exit status 3, and no process left."""
     (desk.folder / "late.toml").write_text(
         '[time]\nend_s = 60.0\n[[event]]\nlabel = "late"\nt_s = 11.0\nopen = ["13-152"]\n'

@@ -1,4 +1,4 @@
-"""The commands for runs by hand: help, options, and one clear line with exit code 2 for what cannot be."""
+"""The commands for live runs: help, options, and one clear line with exit code 2 for what cannot be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run names and endpoints of the commands for runs by hand."""
+"""Run names and endpoints of the commands for live runs."""
 
 import socket
 

@@ -152,7 +152,7 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
         Mark("leave", 2.0, "inv2 leaves"),
         Mark("return", 3.0, "inv2 joins"),
         Mark("", 3.2),
-        Mark("by hand", 3.3, "sw1_2 opens"),
+        Mark("live", 3.3, "sw1_2 opens"),
     ]
     found = [edges(text, mark.t, side, inches_per_s) for text, mark, side in placed(marks, inches_per_s)]
 

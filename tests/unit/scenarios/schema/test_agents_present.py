@@ -43,8 +43,8 @@ def test_a_spare_that_joins_is_there_but_not_awaited_at_the_start(tmp_path: Path
     assert [row.name for row in inverters_of(scenario, feeder)][-1] == "inv10"
 
 
-def test_by_hand_people_move_the_agents(tmp_path: Path) -> None:
-    """The plant of a run by hand lets nobody leave by itself, and knows each inverter once."""
+def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
+    """The plant of a live run lets nobody leave by itself, and knows each inverter once."""
     text = PLUG.replace('join = ["inv2"]', 'join = ["inv2", "inv10"]')
     plant, agents = configure(*load_scenario(written(tmp_path, text)), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
 

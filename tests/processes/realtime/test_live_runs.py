@@ -1,4 +1,4 @@
-"""Runs by hand with the real commands, one terminal each, in the order of people."""
+"""Live runs with the real commands, one terminal each, in the order of people."""
 
 from __future__ import annotations
 
@@ -81,14 +81,14 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert code == 0
     assert text.startswith("run lab ends at t = ")
     assert [terminal.end() for terminal in (plant, again, late)] == [0, 0, 0]
-    plant.expect("NOTE  case IV: events that the scenario does not have: by hand at .* s: switch 13-152 opened")
+    plant.expect("NOTE  case IV: events that the scenario does not have: live at .* s: switch 13-152 opened")
     metrics = json.loads((desk.folder / "here" / "metrics.json").read_text())
-    by_hand = metrics["by_hand"]
-    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in by_hand["departures"][-4:]] == [
+    live = metrics["live"]
+    assert [re.sub(r"^[0-9.]+ s  |;.*", "", line) for line in live["departures"][-4:]] == [
         *("inv1 joined", "inv2 left", "inv2 joined", "switch 13-152 opened")
     ]
-    ((label, window),) = by_hand["windows"].items()
-    assert window == {"t_s": window["t_s"], "end_s": by_hand["ended_s"], "what": "switch 13-152 opened"}
+    ((label, window),) = live["windows"].items()
+    assert window == {"t_s": window["t_s"], "end_s": live["ended_s"], "what": "switch 13-152 opened"}
     measured = metrics["cases"]["IV"][label]
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
 
@@ -186,7 +186,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     assert (here / "status.txt").read_text() == "complete\n"
     assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv"]
     metrics = json.loads((here / "metrics.json").read_text())
-    assert metrics["by_hand"] | {"ended_s": 0.0} == {
+    assert metrics["live"] | {"ended_s": 0.0} == {
         **{"ended_s": 0.0, "windows": {}, "too_short": []},
         **{"not_reached": ["late"], "disturbed": [], "departures": []},
     }

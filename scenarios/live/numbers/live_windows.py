@@ -1,0 +1,111 @@
+"""Windows of measurement of a live run: of its scenario's events, and of switches that people operated. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+from scenarios.results.event_windows import Window, as_they_came, windows
+from scenarios.results.steadiness import STEADY
+from scenarios.schema import ScenarioModel
+from scenarios.schema.scenario_model import Event
+from wire.messages import PlantEvent
+
+NEAR = 1e-9
+"""Times (s) that differ by less are the same: they are multiples of the plant's step."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveWindows:
+    """The windows of a live run, each kind in the order of time."""
+
+    measured: tuple[Window, ...]
+    """Windows with numbers: each lasts to the next event, of the scenario or live."""
+    too_short: tuple[Window, ...]
+    """Windows that the next event ended before the values could be steady."""
+    not_reached: tuple[Window, ...]
+    """Windows of the scenario whose end the run did not reach."""
+    unrecorded: tuple[Window, ...]
+    """Windows without numbers, as rows are missing at their end, where they are measured."""
+
+
+def live_events(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
+    """Return the switches that people operated, in the order of time, as events; those of one step are one event.
+
+    Examples
+    --------
+    >>> opened = PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened")
+    >>> [(event.label, event.open, event.close) for event in live_events([opened])]
+    [('live at 2.5 s', ('67s-67',), ())]
+    """
+    events = []
+    for t, group in groupby(switched, key=lambda event: event.t):
+        # of several operations of a switch in one step, the last one counts
+        last = {event.subject: event.text.endswith(" opened") for event in group}
+        events.append(
+            Event(
+                label=f"live at {round(t, 3):.12g} s",
+                t_s=t,
+                open=tuple(name for name, opened in last.items() if opened),
+                close=tuple(name for name, opened in last.items() if not opened),
+            )
+        )
+    return tuple(events)
+
+
+def live_windows(
+    scenario: ScenarioModel,
+    events: Iterable[PlantEvent],
+    live: Sequence[Event],
+    ended: float,
+    missing: Sequence[tuple[float, float]] = (),
+) -> LiveWindows:
+    """Return the windows of a live run.
+
+    A live event opens a window as the scenario's events do, and ends the one before it. Its own window lasts to the
+    next event or to the end of the run, whatever the scenario says of its end. A switch operated at the moment of an
+    event of the scenario belongs to the window of that event.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        As run.
+    events : Iterable[PlantEvent]
+        The plant's events.
+    live : Sequence[Event]
+        The live events, in the order of time.
+    ended : float
+        Time (s) of the last row.
+    missing : Sequence[tuple[float, float]], optional
+        Times (s) of the rows before and after each interval without rows.
+    """
+    meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
+    scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
+    starts = [window.start for window in scripted]
+    live = [event for event in live if all(abs(event.t_s - t) > NEAR for t in starts)]
+    reached, not_reached = [], []
+    for plan, window in zip(meant, scripted, strict=True):
+        cut = [event.t_s for event in live if window.start < event.t_s < window.end - NEAR]
+        if cut or plan.end <= ended + NEAR:
+            reached.append(replace(window, end=cut[0]) if cut else window)
+        else:
+            not_reached.append(plan)
+    starts += [event.t_s for event in live]
+    for event in live:
+        end = min((t for t in starts if t > event.t_s), default=ended)
+        reached.append(Window(label=event.label, start=event.t_s, end=min(end, ended)))
+    reached.sort(key=lambda window: window.start)
+    shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
+    too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]
+    unrecorded = [
+        one
+        for one in reached
+        if one not in too_short and any(a < one.end and b > one.end - STEADY - NEAR for a, b in missing)
+    ]
+    return LiveWindows(
+        measured=tuple(one for one in reached if one not in too_short and one not in unrecorded),
+        too_short=tuple(too_short),
+        not_reached=tuple(not_reached),
+        unrecorded=tuple(unrecorded),
+    )
