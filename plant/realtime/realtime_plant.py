@@ -7,62 +7,29 @@ nothing is applied to a time that is past.
 
 **Phases.** *gathering*: until all agents and recorders of the configuration are there, or `wait_for_agents` is over.
 *running*. *closing*: the last telemetry is out, and `Stop`, until all tokens are gone. *over*.
-
-**Agents** come and go. A token and a nameplate: its inverter is put on the network, if it is not there, and its agent
-is sent measurements. `Leave`: its inverter is taken off. A token gone without `Leave`: the agent died, and its inverter
-stays on primary droop at its last set-points. Whom the scenario lets leave is asked to; telemetry tells, once, that
-whoever joins is missing, and the run goes on meanwhile.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Literal
-
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
-from plant.plant_node import CLOSING, STAYS, PlantNode
-from plant.realtime.link_command_sender import LinkCommandSender
+from plant.plant_node import CLOSING
+from plant.realtime.live_plant_node import AGAIN, LivePlantNode
 from plant.realtime.pacer import RealTimePacer
-from plant.realtime.recorder_feed import RecorderFeed
 from plant.realtime.run_commands import RunCommands
-from plant.realtime.silence_detector import SilenceDetector
 from plant.telemetry_reporter import measurement_of
-from wire.admission import FASTER
 from wire.codec import encode
-from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import (
-    PLANT,
-    AgentStatus,
-    Command,
-    Leave,
-    LinkAcknowledgement,
-    LinkReport,
-    Nameplate,
-    PlantEvent,
-    State,
-    Waiting,
-)
+from wire.links import REPORT_TICKS, Links
+from wire.messages import PLANT, Command, PlantEvent, Waiting
 from wire.node import ANYBODY, CLOCK_ALONE, Route
 from wire.rate_limit import RateLimit
 from wire.timer import Timer
-
-Phase = Literal["gathering", "running", "closing", "over"]
-
-REFUSALS = 20
-"""Refused processes that are logged: anybody may hold tokens."""
 
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""
 
 LEAD = 0.25
 """Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
-
-AGAIN = 1.0
-"""Time (s, wall) between two questions for the nameplates that have not come: a question dies with its link."""
-
-HEARD = 1.0
-"""Time (s, wall) after its last state for which an agent is on the roster, as one that the plant hears."""
 
 RECORDING = 15.0
 """Longest time (s, wall) that an ended run stays for a recorder that has not got all of it: it may have stood still."""
@@ -71,7 +38,7 @@ WAITING = 0.5
 """Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
 
 
-class RealtimePlant(PlantNode):
+class RealtimePlant(LivePlantNode):
     """The plant under real time.
 
     Parameters
@@ -87,45 +54,21 @@ class RealtimePlant(PlantNode):
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
         if not config.speed > 0.0:
             raise ValueError(f"speed: must be positive, got {config.speed:g} s/s; 1 is real time")
-        super().__init__(config, plant, links, rate=FASTER / config.T_c)
-        self.phase: Phase = "gathering"
-        self.plant = plant
+        super().__init__(config, plant, links)
         self.pacer = RealTimePacer(config.T_c / config.speed, 0.0)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
-        self._came: dict[str, float] = {}
-        """When the last state of each agent came off the wire (s, driver's clock)."""
-        self._states: dict[str, State] = {}
-        """States that the links let through and that are not held yet."""
-        self._silence = SilenceDetector(config.max_age, config.T_c, self.pacer.period)
-        self._refusals = 0
         self._step_due = False
         self._deadline = 0.0
-        self._waiting_timer, self._ask_timer = Timer(WAITING, 0.0), Timer(AGAIN, 0.0)
+        self._waiting_timer = Timer(WAITING, 0.0)
         self._warnings = RateLimit(burst=5)
         self._commands = RunCommands(self)
-        self.recorder_feed = RecorderFeed(config.recorders, partial(super()._publish, self.keys.telemetry))
         self._stays = False
         """Whether the end is kept back only for recorders."""
-        self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
-        keys = self.keys
-        for name in plant.inverters:
-            self.routes[keys.state(name)] = self.routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
-            self.routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
-            self.routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
-            self.routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
-            self.routes[keys.link_acknowledgement(name)] = Route(name, (LinkAcknowledgement,), self._on_link_answer)
-        self.routes[keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        self.routes[self.keys.command] = Route(ANYBODY, (Command,), self._on_command)
         self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
 
     # ---------------------------------------------------------------- what the driver needs
-
-    @property
-    def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
-        inverters = self.plant.inverters
-        each = (*map(self.keys.measurement, inverters), *map(self.keys.link_request, inverters))
-        return self.keys.control, self.keys.telemetry, *each
 
     @property
     def finished(self) -> bool:
@@ -215,95 +158,7 @@ class RealtimePlant(PlantNode):
         if self.phase == "closing" and (self._all_have_gone() or (self._stays and not feed.awaits(present))):
             self.phase = "over"
 
-    # ---------------------------------------------------------------- liveliness
-
-    def appeared(self, key: str, now: float) -> None:
-        """Note that a token appeared; whoever comes after the end did not hear that the others were told."""
-        parts = self.keys.parts(key)
-        if self.phase == "closing" and parts[:2] == ("alive", "agent"):
-            self._tokens.add(key)
-            self.stop(self.keys.stop_request(*parts[2:]), self.outcome or "the run has ended")
-        else:
-            super().appeared(key, now)
-
-    def _refusal(self, name: str, instance: str) -> str:
-        if name not in self.plant.inverters:
-            return f"{name}: no inverter of this name; inverters are {', '.join(self.plant.inverters)}"
-        if self._is_taken(name, instance):
-            reason = f"{name}: another agent of this name takes part in run {self.config.run} already; stop it"
-            return f"{reason} first (gridpeers stop {name}), or give this one another name"
-        return ""
-
-    def _refuse(self, name: str, instance: str, reason: str) -> None:
-        self._refusals += 1
-        if self._refusals <= REFUSALS:
-            self._say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
-        super()._refuse(name, instance, reason)
-
-    def _ask_again(self, now: float) -> None:
-        """Ask for the nameplates that have not come."""
-        if now >= self._ask_timer.due:
-            self._ask_timer.take(now)
-            for name, instance in self.members.unmet:
-                self._ask(name, instance)
-
-    def _recorder_came(self, name: str, now: float) -> None:
-        if news := self.recorder_feed.came(name):
-            self._say(news)
-        self._gather(now)
-
-    def _recorder_gone(self, name: str) -> None:
-        if self.phase == "running" and (news := self.recorder_feed.gone(name)):
-            self._say(news)
-
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        name = nameplate.sender
-        if self.phase not in ("gathering", "running"):
-            return
-        self._silence.joined(name)
-        self._connect(name, True, now)
-        self._note(name, f"{name} joined")
-        self.link_commands.send(self.members.nameplates, now)
-        self._gather(now)
-
-    def _agent_gone(self, name: str, now: float) -> None:
-        self._forget(name)
-        if self.phase in ("gathering", "running"):
-            self._note(name, f"{name} died; {STAYS}")
-
-    def _forget(self, name: str) -> None:
-        self.link_commands.forget(name)
-        self._silence.forget(name)
-        self._came.pop(name, None)
-        self._states.pop(name, None)
-
     # ---------------------------------------------------------------- messages
-
-    def _on_state(self, state: State, payload: bytes, now: float) -> None:
-        self.admission.take(state)
-        self._came[state.sender] = now
-        self._silence.heard(state.sender, failed=bool(state.fault))
-        self._note_state(state)
-        if is_usable(self._links, state, payload, now * self.config.speed, self.admission):
-            self._states[state.sender] = state
-
-    def _on_status(self, status: AgentStatus, payload: bytes, now: float) -> None:
-        if status.sender in self.members.nameplates:  # one comes before its nameplate now and then
-            self.admission.check(status)
-            self._silence.reported(status)
-
-    def _on_link_answer(self, answer: LinkAcknowledgement, payload: bytes, now: float) -> None:
-        self.link_commands.answered(answer)
-
-    def _on_leave(self, leave: Leave, payload: bytes, now: float) -> None:
-        name = leave.sender
-        instance = self.members.instance(name)
-        self.stop(self.keys.stop_request(name, instance), f"{name} has left")
-        self._forget_process(name, instance)
-        self._forget(name)
-        if self.phase in ("gathering", "running"):
-            self._connect(name, False, now)
-            self._note(name, f"{name} left; its inverter is off the network")
 
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:
         answer = self._commands.answer(command, now)
@@ -313,46 +168,21 @@ class RealtimePlant(PlantNode):
         if command.verb == "telemetry" and self.phase != "running":
             self.recorder_feed.replay()
 
-    def _connect(self, name: str, on: bool, now: float) -> None:
-        """Put an inverter on the network, or take it off."""
-        self._operate(lambda: self.plant.connect(name, on), now)
-
     # ---------------------------------------------------------------- steps
-
-    def _gather(self, now: float) -> None:
-        """Begin, if all are there."""
-        agents, recorders = set(self.config.agents), set(self.config.recorders)
-        if self.phase == "gathering" and self.members.nameplates.keys() >= agents and self._recorders >= recorders:
-            self._begin(now)
 
     def _begin(self, now: float) -> None:
         self.phase = "running"
         self.recorder_feed.paced = True
         self.pacer = RealTimePacer(self.pacer.period, now + LEAD)
-        absent = [name for name in self.config.agents if name not in self.members.nameplates]
-        if absent:
+        if absent := self.absent:
             text = f"started without the agents of {', '.join(absent)}, which stay on primary droop until they come"
             self._note(absent[0], text)
         self._say(f"t = 0; speed {self.config.speed:g}")
 
     def _tell_waiting(self) -> None:
         """Tell the agents that the plant is there, and for whom they wait with it."""
-        absent = tuple(name for name in self.config.agents if name not in self.members.nameplates)
-        waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=absent)
+        waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=self.absent)
         self._publish(self.keys.control, encode(waiting))
-
-    def _let_leave_and_join(self) -> None:
-        """Ask whom the scenario lets leave at this tick to do so, and tell who is to be started."""
-        leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
-        for name in leave:
-            instance = self.members.instance(name)
-            if instance:
-                reason = f"{name} leaves at t = {self.t:.2f} s, as the scenario says"
-                self.stop(self.keys.stop_request(name, instance), reason)
-                self._say(reason)
-        if join:
-            self._say(f"{', '.join(join)} may join from t = {self.t:.2f} s on, as the scenario says")
-            self._report(final=False, missing_agents=join)
 
     def _keep_pace(self, now: float) -> None:
         slipped = self.pacer.note(now)
@@ -369,7 +199,7 @@ class RealtimePlant(PlantNode):
     def _measure(self, now: float) -> None:
         """Send every agent that is present its measurement, and who is heard."""
         readings, t, tick, epoch = self.plant.measure(), self.t, self.tick, self.config.epoch
-        heard = tuple(name for name in self.plant.inverters if now - self._came.get(name, now - HEARD) < HEARD)
+        heard = self._heard(now)
         for name in self.members.nameplates:
             message = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t, roster=heard)
             self._publish(self.keys.measurement(name), encode(message))
@@ -408,10 +238,6 @@ class RealtimePlant(PlantNode):
         """Note a command to links among the events."""
         self._note_event("link", "links", text)
 
-    def _note(self, subject: str, text: str) -> None:
-        self._note_event("roster", subject, f"{text}, at t = {self.t:.2f} s")
-        self._say(f"{text}, at t = {self.t:.2f} s")
-
     def _warn(self, text: str, now: float) -> None:
         line = self._warnings.admit(text, now)
         if line is not None:
@@ -420,12 +246,6 @@ class RealtimePlant(PlantNode):
     def _tell_warning(self, text: str) -> None:
         self._note_event("warning", PLANT, text)
         self._say(text)
-
-    def _publish(self, key: str, payload: bytes) -> None:
-        if key == self.keys.telemetry:
-            self.recorder_feed.publish(self._reporter.seq, payload)
-        else:
-            super()._publish(key, payload)
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         self._reporter.collect()

@@ -25,10 +25,9 @@ from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.link_log import LinkLog
 from scenarios.live.live_recorder import LiveRecorder
-from scenarios.live.own_code import own_code
 from scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
 from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import check_free, configuration
+from scenarios.live.run_requests import check_free, configuration, own_code
 from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError

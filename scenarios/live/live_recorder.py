@@ -11,7 +11,7 @@ from time import monotonic
 from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from scenarios.drivers.telemetry_stream import Recordable
 from scenarios.live.link_log import LinkLog
-from scenarios.live.show.events import line_of
+from scenarios.live.show.snapshot import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.messages import LinkReport, LinkRequest, Telemetry
 from wire.rate_limit import RateLimit

@@ -1,9 +1,8 @@
-"""Requests to a running plant: status, configurations, commands to switches, agents and emulated links."""
+"""Requests to a running plant: status, commands to switches and agents, and configurations of agents."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from time import monotonic
 from typing import Any, Literal
 
@@ -12,15 +11,11 @@ import msgspec
 from agents.agent_config import AgentConfig
 from agents.own_nameplate import check_nameplate
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_reports import LinkStatus, decode_statuses
-from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
-from wire.messages import PLANT, Answer, Command, LinkAcknowledgement
-from wire.table_schema import Problem
+from wire.messages import Answer, Command, LinkAcknowledgement
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
 
@@ -54,11 +49,11 @@ def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
     NobodyError
         If it does not answer.
     """
-    answer, _ = _request(client, lambda text: set(), verb=verb, argument=argument)
+    answer, _ = request(client, lambda text: set(), verb=verb, argument=argument)
     return answer
 
 
-def _request(
+def request(
     client: RunClient, receivers: Callable[[str], set[str]], **command_fields: Any
 ) -> tuple[str, dict[str, LinkAcknowledgement]]:
     """Return the plant's answer, and the answers that come in time of the receivers that follow from it."""
@@ -160,110 +155,26 @@ def check_free(client: RunClient, name: str) -> None:
         )
 
 
-# ---- emulated links
+def own_code(config: AgentConfig) -> tuple[str, ...]:
+    """Return the code that a configuration names beside gridpeers' own and installed plug-ins, in words.
 
-
-class _LinkReply(msgspec.Struct, frozen=True):
-    """The plant's answer to "link" and "links"; see `plant.realtime.run_commands`."""
-
-    number: int
-    t: float
-    asked: tuple[str, ...]
-    said: str = ""
-    receivers: tuple[str, ...] = ()
-
-    @property
-    def reached(self) -> tuple[str, ...]:
-        """Receivers of a command that take part: the plant, and the agents that it has sent the command."""
-        return tuple(name for name in self.receivers if name == PLANT or name in self.asked)
-
-    @property
-    def answers_needed(self) -> set[str]:
-        """Receivers that answer: agents to a command, for which the plant has answered; the plant too to "links"."""
-        return {*self.reached} - {PLANT} if self.number > 0 else {*self.asked, PLANT}
-
-
-@dataclass(frozen=True, kw_only=True)
-class LinkCommandResult:
-    """The receivers' answers to a link command."""
-
-    t: float
-    """Run time (s) from which on it holds."""
-    text: str
-    """Its effect in words: a heal names only links that had a fault."""
-    acknowledged: tuple[str, ...]
-    """Receivers that have taken it."""
-    silent: tuple[str, ...]
-    """Receivers that take part and have not answered in time."""
-    absent: tuple[str, ...]
-    """Receivers without an agent: the plant tells the agent when it comes."""
-    refused: Mapping[str, str]
-    """Receivers that have refused, and why."""
-
-    @property
-    def changes_links(self) -> bool:
-        """Whether it changes any link."""
-        return bool(self.acknowledged or self.silent or self.absent or self.refused)
-
-
-def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
-    """Return the emulated links of a run, and the configuration of one of its agents.
-
-    Raises
-    ------
-    NobodyError
-        If the run has no links that can be changed.
+    Examples
+    --------
+    >>> from agents.agent_config import Control, LawChoice
+    >>> control = Control(secondary="all", graph="full", law=LawChoice(command=("./mylaw",)))
+    >>> own_code(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0, f_nom=60.0,
+    ...     m_p=0.01, m_q=0.05, T_c=0.02, control=control, deadline=10.0, connect=()))
+    ('the law ./mylaw',)
     """
-    for config in configurations(client).values():
-        if config.links:
-            return EmulationConfig.of_tree(config.links), config
-    raise NobodyError(
-        f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
-    )
+    return tuple(_named(config))
 
 
-def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
-    """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
-    problems: Iterable[Problem] = command.wrong_values() if setup is None else command.problems(setup.microgrids)
-    options = [(path.partition(".")[0], text) for path, text in problems]
-    wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
-    if wrong:
-        raise UsageError("; ".join(wrong))
-
-
-def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
-    """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
-    reply, answers = _request_links(client, verb="link", link_command=command.to_tree())
-    refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
-    silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
-    return LinkCommandResult(
-        t=reply.t,
-        text=reply.said,
-        acknowledged=tuple(name for name in reply.reached if name not in refused and name not in silent),
-        silent=silent,
-        absent=tuple(name for name in reply.receivers if name not in reply.reached),
-        refused=refused,
-    )
-
-
-def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
-    """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    reply, answers = _request_links(client, verb="links")
-    found: dict[tuple[str, str], LinkStatus] = {}
-    for name, answer in answers.items():
-        if answer.ok:
-            try:
-                of_sender: dict[str, LinkStatus] = decode_statuses(answer.data)
-            except msgspec.DecodeError:  # counts as no answer
-                continue
-            found |= {(src, name): state for src, state in of_sender.items()}
-    return reply.t, found, tuple(name for name in reply.asked if name not in answers)
-
-
-def _request_links(client: RunClient, **command_fields: Any) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
-    text, answers = _request(client, lambda text: _link_reply(text).answers_needed, **command_fields)
-    return _link_reply(text), answers
-
-
-def _link_reply(text: str) -> _LinkReply:
-    return msgspec.json.decode(text, type=_LinkReply)
+def _named(config: AgentConfig) -> Iterator[str]:
+    law, graph = config.control.law, config.control.own_graph
+    if law.command or law.fmu or ":" in law.use:
+        yield f"the law {law.name}"
+    if graph is not None and ":" in graph.use:
+        yield f"the graph {graph.use}"
+    if config.links:
+        for fault in EmulationConfig.of_tree(config.links).netem.links:
+            yield from (f"the link fault {plugin.use}" for plugin in fault.own if ":" in plugin.use)

@@ -122,7 +122,7 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
     Example:  gridpeers link show
     """
     with run_client(run, connect, wait) as client:
-        from scenarios.live.run_requests import link_states
+        from scenarios.live.link_requests import link_states
         from scenarios.live.show.link_table import links_text
 
         t, states, silent = link_states(client)
@@ -181,8 +181,8 @@ def _give(
     from netem.schema.fault import Fault
     from netem.schema.pattern import parse
     from scenarios.emulation.link_command import LinkCommand
+    from scenarios.live.link_requests import check_link_command, command_links, links_of_run
     from scenarios.live.run_address import UsageError
-    from scenarios.live.run_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
     try:

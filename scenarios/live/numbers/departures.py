@@ -14,7 +14,7 @@ from plant.equipment import Feeder
 from plant.network import Network
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
-from scenarios.live.show.events import line_of
+from scenarios.live.show.snapshot import line_of
 from scenarios.results.event_windows import Window, windows
 from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of

@@ -11,8 +11,7 @@ from collections.abc import Collection
 import msgspec
 
 from agents.agent_config import AgentConfig
-from scenarios.live.show.events import line_of
-from scenarios.live.show.snapshot import InverterStatus, Snapshot
+from scenarios.live.show.snapshot import InverterStatus, Snapshot, line_of
 from scenarios.short_names import in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -158,7 +157,6 @@ class RunMonitor:
         ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
         return InverterStatus(
             name=name,
-            kind=config.kind if config else "",
             island=status.island if status else "",
             f=f,
             P=None if P is None else P / 1e3,
@@ -171,7 +169,6 @@ class RunMonitor:
             received=status.received if status else None,
             sent=status.sent if status else None,
             lost=status.lost if status else None,
-            rejected=status.rejected if status else None,
             impaired=status.impaired if status else (),
             note=self._note(name, present, status, now - at),
         )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
+
+from wire.messages import PlantEvent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -10,8 +13,6 @@ class InverterStatus:
     """One inverter and its agent at one moment; None stands for an unknown value."""
 
     name: str
-    kind: str = ""
-    """GFM or GFL."""
     island: str = ""
     """Name of its island: "grid", or the first inverter in it; "" if nobody has said."""
     f: float | None = None
@@ -36,8 +37,6 @@ class InverterStatus:
     """Messages that went out."""
     lost: int | None = None
     """Messages that were sent to it and never came."""
-    rejected: int | None = None
-    """Messages that came in and could not be used."""
     impaired: tuple[str, ...] = ()
     """Senders between whom and it an emulated fault holds."""
     note: str = ""
@@ -59,3 +58,16 @@ class Snapshot:
     """All inverters, in their order."""
     events: tuple[str, ...] = ()
     """Events, a line each, the latest last."""
+
+
+def line_of(event: PlantEvent) -> str:
+    """Return an event as a line; its time comes first and only there.
+
+    Examples
+    --------
+    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.5 s"))
+    '    1.50 s  inv2 joined'
+    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.50 s"))
+    '    1.50 s  inv2 joined'
+    """
+    return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from time import monotonic
 
 from rich.console import Console
@@ -9,7 +14,6 @@ from rich.live import Live
 
 from scenarios.live.run_client import RunClient
 from scenarios.live.run_requests import plant_status, read_config
-from scenarios.live.show.keyboard import keyboard
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import Snapshot
@@ -143,3 +147,33 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
             live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
             if key(0.0) in QUIT:
                 return
+
+
+@contextmanager
+def keyboard() -> Iterator[Callable[[float], str]]:
+    """Yield a function that waits (s) for a key typed without Enter; "" if none came. Ctrl-C stays Ctrl-C.
+
+    Where standard input is no terminal, or the system has no termios, it returns "" at once.
+    """
+    try:
+        import termios
+        import tty
+    except ImportError:
+        yield lambda seconds: ""
+        return
+    try:
+        file = sys.stdin.fileno()
+        before = termios.tcgetattr(file)
+    except (OSError, ValueError, termios.error):
+        yield lambda seconds: ""
+        return
+
+    def read(seconds: float) -> str:
+        ready, _, _ = select.select([file], [], [], seconds)
+        return os.read(file, 1).decode(errors="replace") if ready else ""
+
+    tty.setcbreak(file)
+    try:
+        yield read
+    finally:
+        termios.tcsetattr(file, termios.TCSADRAIN, before)

@@ -105,7 +105,7 @@ def test_doc_prints_a_page(topic: str) -> None:
         (["run", "islanding", "--out", "full"], "--out full: the folder is not empty"),
         (["run", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
         (["check", "bad.toml"], "2 problems:"),
-        (["run", "used.toml"], "cannot be used: address already in use"),
+        (["run", "used.toml"], "cannot be listened on: address already in use"),
         (["doc", "everything"], 'TOPIC: there is no "everything"; the choices are keys, messages, scenario'),
     ],
 )

@@ -12,8 +12,8 @@ from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live import live_processes as hand
-from scenarios.live.own_code import own_code
 from scenarios.live.run_address import RunAddress, UsageError
+from scenarios.live.run_requests import own_code
 from tests.toy.toy_configs import agent_config
 from wire.plugin import Plugin
 

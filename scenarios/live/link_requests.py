@@ -1,0 +1,125 @@
+"""Requests about the emulated links of a live run: commands to them, and their status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.emulation.link_command import LinkCommand
+from scenarios.emulation.link_reports import LinkStatus, decode_statuses
+from scenarios.live.run_address import UsageError
+from scenarios.live.run_client import NobodyError, RunClient
+from scenarios.live.run_requests import configurations, request
+from wire.messages import PLANT, LinkAcknowledgement
+from wire.table_schema import Problem
+
+
+class _LinkReply(msgspec.Struct, frozen=True):
+    """The plant's answer to "link" and "links"; see `plant.realtime.run_commands`."""
+
+    number: int
+    t: float
+    asked: tuple[str, ...]
+    said: str = ""
+    receivers: tuple[str, ...] = ()
+
+    @property
+    def reached(self) -> tuple[str, ...]:
+        """Receivers of a command that take part: the plant, and the agents that it has sent the command."""
+        return tuple(name for name in self.receivers if name == PLANT or name in self.asked)
+
+    @property
+    def answers_needed(self) -> set[str]:
+        """Receivers that answer: agents to a command, for which the plant has answered; the plant too to "links"."""
+        return {*self.reached} - {PLANT} if self.number > 0 else {*self.asked, PLANT}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkCommandResult:
+    """The receivers' answers to a link command."""
+
+    t: float
+    """Run time (s) from which on it holds."""
+    text: str
+    """Its effect in words: a heal names only links that had a fault."""
+    acknowledged: tuple[str, ...]
+    """Receivers that have taken it."""
+    silent: tuple[str, ...]
+    """Receivers that take part and have not answered in time."""
+    absent: tuple[str, ...]
+    """Receivers without an agent: the plant tells the agent when it comes."""
+    refused: Mapping[str, str]
+    """Receivers that have refused, and why."""
+
+    @property
+    def changes_links(self) -> bool:
+        """Whether it changes any link."""
+        return bool(self.acknowledged or self.silent or self.absent or self.refused)
+
+
+def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
+    """Return the emulated links of a run, and the configuration of one of its agents.
+
+    Raises
+    ------
+    NobodyError
+        If the run has no links that can be changed.
+    """
+    for config in configurations(client).values():
+        if config.links:
+            return EmulationConfig.of_tree(config.links), config
+    raise NobodyError(
+        f"{client.where} has no emulated links that could be changed; runs started by gridpeers plant or up have"
+    )
+
+
+def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> None:
+    """Raise UsageError with all that is wrong with a command; without a setup, with its values alone."""
+    problems: Iterable[Problem] = command.wrong_values() if setup is None else command.problems(setup.microgrids)
+    options = [(path.partition(".")[0], text) for path, text in problems]
+    wrong = [f"{'LINKS' if option == 'on' else f'--{option}'}: {text}" if option else text for option, text in options]
+    if wrong:
+        raise UsageError("; ".join(wrong))
+
+
+def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
+    """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
+    reply, answers = _request_links(client, verb="link", link_command=command.to_tree())
+    refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
+    silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
+    return LinkCommandResult(
+        t=reply.t,
+        text=reply.said,
+        acknowledged=tuple(name for name in reply.reached if name not in refused and name not in silent),
+        silent=silent,
+        absent=tuple(name for name in reply.receivers if name not in reply.reached),
+        refused=refused,
+    )
+
+
+def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
+    """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
+    reply, answers = _request_links(client, verb="links")
+    found: dict[tuple[str, str], LinkStatus] = {}
+    for name, answer in answers.items():
+        if answer.ok:
+            try:
+                of_sender: dict[str, LinkStatus] = decode_statuses(answer.data)
+            except msgspec.DecodeError:  # counts as no answer
+                continue
+            found |= {(src, name): state for src, state in of_sender.items()}
+    return reply.t, found, tuple(name for name in reply.asked if name not in answers)
+
+
+def _request_links(client: RunClient, **command_fields: Any) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
+    text, answers = request(client, lambda text: _link_reply(text).answers_needed, **command_fields)
+    return _link_reply(text), answers
+
+
+def _link_reply(text: str) -> _LinkReply:
+    return msgspec.json.decode(text, type=_LinkReply)
