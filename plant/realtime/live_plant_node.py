@@ -189,7 +189,7 @@ class LivePlantNode(PlantNode):
         self._operate(lambda: self.plant.connect(name, on), now)
 
     def _let_leave_and_join(self) -> None:
-        """Ask the agents that the scenario lets leave at this tick to do so, and report those that are to be started."""
+        """Ask the agents that leave at this tick by the scenario to do so, and report those that are to be started."""
         leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
         for name in leave:
             instance = self.members.instance(name)
