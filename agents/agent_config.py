@@ -8,7 +8,8 @@ import msgspec
 
 from wire.plausible import Plausible, Range, Unit
 from wire.plugin import Plugin
-from wire.table_schema import NO_KEY, Below, Example, Label
+from wire.relations import Below
+from wire.table_schema import NO_KEY, Example, Label
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""

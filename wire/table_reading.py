@@ -14,6 +14,7 @@ import msgspec
 
 from wire.plausible import number_in
 from wire.printable import printable
+from wire.relations import contradictions
 from wire.suggestion import suggestion
 from wire.table_schema import (
     INHERITED,
@@ -24,7 +25,6 @@ from wire.table_schema import (
     OtherKeys,
     Problem,
     below,
-    contradictions,
     fields_of,
 )
 

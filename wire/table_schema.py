@@ -74,18 +74,6 @@ class OtherKeys:
 
 
 @dataclass(frozen=True)
-class Below:
-    """A number that must be less than that of another field."""
-
-    field: str
-    """Name of the other field."""
-    or_equal: bool = False
-    """Whether both may be equal."""
-    only_with: str = ""
-    """Name of a field without which, or with 0 in which, the relation does not hold."""
-
-
-@dataclass(frozen=True)
 class Label:
     """Words for the field beside its unit: at an axis, or over a column."""
 
@@ -225,61 +213,6 @@ def _apart(hint: Any) -> tuple[Any, tuple[Any, ...]]:
 
 def _constant(value: Any) -> Callable[[], Any]:
     return lambda: value
-
-
-def problems_of(struct: msgspec.Struct) -> list[Problem]:
-    """Return the numbers of a struct, and of the structs below it, that are out of range.
-
-    Without one, return where its values contradict each other: by `Below`, and by its method `relations` if it has one.
-
-    Examples
-    --------
-    >>> class Loss(msgspec.Struct):
-    ...     p: Annotated[float, Probability("a loss")]
-    >>> problems_of(Loss(p=2.0))
-    [Problem(path='p', text='a loss is a probability from 0 to 1, got 2; did you mean 0.02 (2 %)?')]
-    """
-    found: list[Problem] = []
-    for field in fields_of(type(struct)):
-        value = getattr(struct, field.name)
-        if isinstance(value, msgspec.Struct):
-            found += below(field.key, problems_of(value))
-        elif isinstance(value, (int, float)) and not isinstance(value, bool) and (text := field.objection(value)):
-            found.append(Problem(field.key, text))
-    return found or [*contradictions(type(struct), struct), *getattr(struct, "relations", list)()]
-
-
-def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
-    """Return the numbers that are not below those of other fields, as they must be.
-
-    Parameters
-    ----------
-    cls : type
-        Whose fields are looked at.
-    values : Any
-        Has the values as attributes.
-    known : Callable[[Field], bool], optional
-        Whether a field has a right value; else nothing is said of it.
-
-    Examples
-    --------
-    >>> class Limits(msgspec.Struct):
-    ...     P_min: Annotated[float, Unit("pu"), Below("P_max")] = 0.0
-    ...     P_max: Annotated[float, Unit("pu")] = 1.0
-    >>> contradictions(Limits, Limits(P_min=2.0))
-    [Problem(path='P_min_pu', text='2 must be below P_max_pu = 1; swap them or set both')]
-    """
-    found = []
-    for field in fields_of(cls):
-        if (below := field.mark(Below)) is None or (below.only_with and not getattr(values, below.only_with)):
-            continue
-        other = named(cls, below.field)
-        low, high = getattr(values, field.name), getattr(values, other.name)
-        if known(field) and known(other) and (low > high if below.or_equal else low >= high):
-            rule = "not be above" if below.or_equal else "be below"
-            text = f"{low:g} must {rule} {other.key} = {high:g}; swap them or set both"
-            found.append(Problem(field.key, text))
-    return found
 
 
 def named(cls: type, name: str) -> Field:

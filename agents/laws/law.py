@@ -15,8 +15,8 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from wire.plausible import Range, Unit
+from wire.relations import Below
 from wire.table_reading import parameter_values
-from wire.table_schema import Below
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""

@@ -19,9 +19,10 @@ from netem.schema.profiles import PROFILES
 from wire.path_text import is_no_path
 from wire.plausible import Plausible, Unit
 from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
+from wire.relations import problems_of
 from wire.suggestion import suggestion
 from wire.table_reading import shown
-from wire.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of, problems_of
+from wire.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""

@@ -10,8 +10,9 @@ import msgspec
 from netem.models.delay import LONGEST_DELAY
 from netem.schema.fault import RunTime, RunTimeOrNone, times_problems
 from wire.plausible import Plausible, Unit
+from wire.relations import problems_of
 from wire.suggestion import suggestion
-from wire.table_schema import Example, Problem, problems_of
+from wire.table_schema import Example, Problem
 
 
 def _in_ppm(factor: float) -> str:

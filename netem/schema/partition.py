@@ -12,8 +12,9 @@ import msgspec
 from netem.models.gates import Cut
 from netem.schema.fault import RunTime, RunTimeOrNone, Span, times_problems
 from wire.messages import PLANT
+from wire.relations import problems_of
 from wire.suggestion import suggestion
-from wire.table_schema import Example, Problem, problems_of
+from wire.table_schema import Example, Problem
 
 _REST = "the rest"
 

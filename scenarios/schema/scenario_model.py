@@ -14,6 +14,7 @@ from agents.agent_config import Gains, Handling, Secondary
 from netem.schema.netem import Netem
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from wire.plausible import Plausible, Unit
+from wire.relations import Divides, MultipleOf
 from wire.table_schema import INHERITED, INLINE, Example, Label
 
 AS_RUN = "as_run"
@@ -30,7 +31,11 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Table `[time]`: how long, and in which steps."""
 
     end_s: Annotated[
-        float, Unit("s"), Label("end of the run"), Plausible("the duration of a run", 0.001, 3600.0, above_zero=True)
+        float,
+        Unit("s"),
+        MultipleOf("T_c_s"),
+        Label("end of the run"),
+        Plausible("the duration of a run", 0.001, 3600.0, above_zero=True),
     ]
     """Duration of the run (s), a multiple of T_c_s."""
     T_c_s: Annotated[
@@ -38,10 +43,20 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ] = 0.02
     """Control period (s): each agent decides once in it."""
     h_s: Annotated[
-        float, Unit("s"), Label("integration step, h"), Plausible("an integration step", 1e-5, 0.02, above_zero=True)
+        float,
+        Unit("s"),
+        Divides("T_c_s"),
+        Label("integration step, h"),
+        Plausible("an integration step", 1e-5, 0.02, above_zero=True),
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
-    record_s: Annotated[float, Unit("s"), Plausible("the distance of recorded rows", 1e-5, 2.0, above_zero=True)] = 0.01
+    record_s: Annotated[
+        float,
+        Unit("s"),
+        MultipleOf("h_s"),
+        Divides("T_c_s"),
+        Plausible("the distance of recorded rows", 1e-5, 2.0, above_zero=True),
+    ] = 0.01
     """Distance of the rows in history.csv (s): a multiple of h_s that divides T_c_s."""
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
+from wire.relations import MultipleOf
 
 PART_OF_T = 0.3
 """Longest integration step, as a part of the inverters' shortest time constant: at 0.4 microgrid123 oscillates."""
@@ -14,16 +15,12 @@ PART_OF_T = 0.3
 def check_times(scenario: ScenarioModel, problems: Problems) -> None:
     """Note times off the grid that they belong to, and events that are not in the order of time."""
     time = scenario.time
-    paths = ["time.end_s", "time.record_s", *(f"event[{i}].t_s" for i in range(len(scenario.events)))]
+    paths = [f"event[{i}].t_s" for i in range(len(scenario.events))]
     read = {path for path in paths if not problems.touch(path)}  # a time off its grid is a time nevertheless
-    divides("time.h_s", time.h_s, "time.T_c_s", time.T_c_s, problems)
-    multiple("time.record_s", time.record_s, "time.h_s", time.h_s, "", problems)
-    divides("time.record_s", time.record_s, "time.T_c_s", time.T_c_s, problems)
-    multiple("time.end_s", time.end_s, "time.T_c_s", time.T_c_s, "", problems)
     for i, event in enumerate(scenario.events):
         path = f"event[{i}].t_s"
         multiple(path, event.t_s, "time.h_s", time.h_s, "the step of the plant", problems)
-        if {path, "time.end_s"} <= read and event.t_s >= time.end_s:
+        if path in read and event.t_s >= time.end_s > 0:  # a missing end is 0
             problems.add(
                 path,
                 f'event "{event.label}" at {event.t_s:g} s does not come before the end at {time.end_s:g} s; '
@@ -39,7 +36,7 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
                 f'event "{second.label}" at {second.t_s:g} s is written after "{first.label}" at {first.t_s:g} s; '
                 "write events in the order of time, and what happens at once as one event",
             )
-        elif "time.record_s" in read and gap < 1.5 * time.record_s:
+        elif not problems.touch("time.record_s") and gap < 1.5 * time.record_s:
             problems.add(
                 path,
                 f'event "{second.label}" follows "{first.label}" by {gap:g} s, so that no recorded row lies between '
@@ -71,7 +68,7 @@ def multiple(path: str, value: float, of: str, step: float, rule: str, problems:
     Parameters
     ----------
     path, of : str
-        Keys of the time and of the step; with a problem noted at either, or with one that is not above 0, nothing is.
+        Keys of the time and of the step; where a problem is noted at one of them, nothing is said.
     value, step : float
         Both (s).
     rule : str
@@ -79,27 +76,5 @@ def multiple(path: str, value: float, of: str, step: float, rule: str, problems:
     problems : Problems
         Takes the problem.
     """
-    if problems.touch(path, of) or value <= 0 or step <= 0 or _whole(value / step):
-        return
-    near = f"{max(round(value / step), 1) * step:.9g}"
-    key = of.rpartition(".")[2]
-    problems.add(
-        path, f"{value:g} s is not a multiple of {key} = {step:g} s{rule and f', {rule}'}; the nearest is {near}"
-    )
-
-
-def divides(path: str, step: float, of: str, value: float, problems: Problems) -> None:
-    """Note a step (s) that does not divide a time (s); the fault is the step's."""
-    if problems.touch(path, of) or value <= 0 or step <= 0 or _whole(value / step):
-        return
-    ratio = value / step
-    key = of.rpartition(".")[2]
-    # a step that can be written down in microseconds, for 0.02 / 7 cannot be typed
-    whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(value / n, 6) * n - value) < 1e-12]
-    near = value / min(whole, key=lambda n: abs(n - ratio), default=1)
-    problems.add(path, f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:g}")
-
-
-def _whole(ratio: float) -> bool:
-    """Return whether it is 1, 2, 3, ...; the tolerance is that of decimal fractions in binary."""
-    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6
+    if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, of.rpartition(".")[2], rule)):
+        problems.add(path, text)
