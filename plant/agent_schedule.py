@@ -1,4 +1,4 @@
-"""Who leaves, dies and joins at which tick, as the scenario says. The same in both kinds of time."""
+"""The scheduled joins, leaves and deaths of agents, by tick. The same in both kinds of time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from plant.plant_config import PlantConfig
 
 
 class TickActions(NamedTuple):
-    """Who leaves, joins and dies at one tick."""
+    """Scheduled joins, leaves and deaths of one tick."""
 
     leave: tuple[str, ...] = ()
     """Inverters whose agents leave."""
@@ -19,12 +19,12 @@ class TickActions(NamedTuple):
 
 
 class AgentSchedule:
-    """Everybody who leaves, joins or dies in a run, by tick.
+    """Scheduled joins, leaves and deaths of a run, by tick.
 
     Parameters
     ----------
     config : PlantConfig
-        With the schedule and the control period.
+        Has the schedule and the control period.
     inverters : tuple[str, ...]
         The plant's inverters.
 
@@ -60,7 +60,7 @@ class AgentSchedule:
 
     @property
     def joiners(self) -> frozenset[str]:
-        """Names of everybody who is yet to join."""
+        """Names of the agents that are yet to join."""
         return frozenset(name for actions in self._at.values() for name in actions.join)
 
     def take(self, tick: int) -> TickActions:

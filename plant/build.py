@@ -1,4 +1,4 @@
-"""From the plant's configuration to the plant."""
+"""Build the plant from its configuration."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from plant.tables.feeder_changes import changed
 
 
 def build_plant(config: PlantConfig) -> Plant:
-    """Read the feeder and find the operating point to start from.
+    """Read the feeder and find the initial operating point.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which parts of a feeder hang together, phase by phase, and which of them something feeds."""
+"""Connected parts of a feeder, phase by phase, and whether they are fed."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Node = tuple[str, str]
 class Connectivity:
     """The graph of a feeder's nodes.
 
-    Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and an
-    inverter that forms the grid join all three phases of theirs. What is connected to ground, or feeds nothing by
-    itself (loads, capacitors, grid-following inverters), joins none.
+    Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and a
+    grid-forming inverter join all their three phases. Equipment that feeds nothing by itself, or is connected to
+    ground (loads, capacitors, grid-following inverters), joins none.
 
     Parameters
     ----------
@@ -35,18 +35,18 @@ class Connectivity:
             self._fixed += [((ends[0], "A"), (bus, phase)) for bus in ends for phase in PHASES]
 
     def closed_at_start(self) -> frozenset[str]:
-        """Switches that are closed before anything is operated."""
+        """Return the switches that are closed at the start."""
         return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
 
     def parts(self, closed: Collection[str] | None = None, whole: Iterable[str] = ()) -> tuple[frozenset[Node], ...]:
-        """Nodes that hang together, each part in the order of its first bus.
+        """Return the sets of connected nodes, in the order of their first buses.
 
         Parameters
         ----------
         closed : Collection[str], optional
-            Names of the closed switches; all of them if left out.
+            Names of the closed switches; by default all.
         whole : Iterable[str], optional
-            Buses whose three phases count as one, for what stands there feeds all of them.
+            Buses whose three phases count as one, because their source feeds all of them.
         """
         above = {node: node for node in self.nodes}
 
@@ -62,22 +62,22 @@ class Connectivity:
                 joined += [((switch.from_bus, p), (switch.to_bus, p)) for p in switch.phases]
         for one, other in joined:
             above[root(one)] = root(other)
-        found: dict[Node, list[Node]] = {}
+        parts: dict[Node, list[Node]] = {}
         for node in self.nodes:
-            found.setdefault(root(node), []).append(node)
-        return tuple(frozenset(nodes) for nodes in found.values())
+            parts.setdefault(root(node), []).append(node)
+        return tuple(frozenset(nodes) for nodes in parts.values())
 
     def fed(
         self, closed: Collection[str], forming: Iterable[str]
     ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
-        """Parts that the substation or a grid-forming inverter feeds, and parts that nothing feeds.
+        """Return the parts that the substation or a grid-forming inverter feeds, and the de-energised parts.
 
         Parameters
         ----------
         closed : Collection[str]
             Names of the closed switches.
         forming : Iterable[str]
-            Buses of the grid-forming inverters that are on the network.
+            Buses of the connected grid-forming inverters.
         """
         feeding = [*forming, *([self._feeder.source.bus] if self._feeder.source else [])]
         alive = {(bus, "A") for bus in feeding}

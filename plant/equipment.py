@@ -1,4 +1,4 @@
-"""What a feeder consists of: the frozen rows that `plant.tables` reads and `plant.network` computes with."""
+"""The equipment of a feeder: frozen rows that `plant.tables` reads and `plant.network` uses."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ PHASES: tuple[Phase, ...] = ("A", "B", "C")
 
 
 F_NOM = 60.0
-"""Nominal frequency (Hz) of a feeder whose data do not say another."""
+"""Nominal frequency (Hz) of a feeder without one in its data."""
 
 
 class Bus(msgspec.Struct, frozen=True, kw_only=True):
-    """A place where things are connected; one node per phase."""
+    """A connection point of equipment; one node per phase."""
 
     name: str
     """Name, as in the feeder's drawings: "13", "150r"."""
@@ -25,7 +25,7 @@ class Bus(msgspec.Struct, frozen=True, kw_only=True):
     V_nom: float
     """Nominal voltage (V, line-to-neutral)."""
     zone: str = ""
-    """Part of the feeder it belongs to, for drawings only."""
+    """Its part of the feeder, for drawings only."""
     x: float = 0.0
     """Place in the drawing (drawing units)."""
     y: float = 0.0
@@ -36,7 +36,7 @@ class LineConfig(msgspec.Struct, frozen=True, kw_only=True):
     """A kind of line: conductors and spacing, per length, at nominal frequency, earth return reduced."""
 
     name: str
-    """Name by which lines refer to it."""
+    """Name, to which lines refer."""
     phases: str
     """Phases of the rows and columns."""
     Z: tuple[tuple[complex, ...], ...]
@@ -63,7 +63,7 @@ class Line(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Switch(msgspec.Struct, frozen=True, kw_only=True):
-    """An ideal switch: closed, it makes one node of two on each of its phases; open, it is not there."""
+    """An ideal switch: closed, it merges two nodes on each of its phases; open, it has no effect."""
 
     name: str
     """Its buses: "13-152"."""
@@ -74,13 +74,13 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
     to_bus: str
     """Other end."""
     phases: str
-    """Phases it switches, all together."""
+    """Phases that it switches together."""
     closed: bool
-    """Its state before anything is operated."""
+    """Its state at the start."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that it is called: its buses in either order, and its alias.
+        """All its names: its buses in either order, and its alias.
 
         Examples
         --------
@@ -94,7 +94,7 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
     """A spot load of one kind: constant impedance (Z), current (I) or power (P)."""
 
     bus: str
-    """Where it is connected."""
+    """Its bus."""
     connection: Literal["Y", "D"]
     """Y: phases to ground. D: between phases A-B, B-C, C-A."""
     model: Literal["Z", "I", "P"]
@@ -107,9 +107,9 @@ class Capacitor(msgspec.Struct, frozen=True, kw_only=True):
     """A shunt capacitor bank, each phase to ground."""
 
     bus: str
-    """Where it is connected."""
+    """Its bus."""
     Q: tuple[float, float, float]
-    """Reactive power given at rated voltage (var) on phases A, B, C."""
+    """Reactive power at rated voltage (var) on phases A, B, C."""
     V_rated: float
     """Rated voltage (V, line-to-neutral)."""
 
@@ -118,13 +118,13 @@ class Regulator(msgspec.Struct, frozen=True, kw_only=True):
     """A step voltage regulator at a fixed tap: an ideal autotransformer, V_to = ratio V_from."""
 
     name: str
-    """Name; phases with taps of their own are rows of their own under the same name."""
+    """Name; phases with different taps are separate rows of one name."""
     from_bus: str
     """Side without taps."""
     to_bus: str
     """Regulated side."""
     phases: str
-    """Phases that stand on this tap."""
+    """Phases on this tap."""
     ratio: float
     """V_to / V_from, 1 + tap * tap_step."""
 
@@ -139,7 +139,7 @@ class Transformer(msgspec.Struct, frozen=True, kw_only=True):
     to_bus: str
     """Other side."""
     connection: Literal["D-D", "Yg-Yg"]
-    """Windings; none of the two shifts the phase."""
+    """Windings; neither shifts the phase."""
     S_rated: float
     """Rated power (VA, three phases)."""
     z: complex
@@ -150,7 +150,7 @@ class Source(msgspec.Struct, frozen=True, kw_only=True):
     """The substation: a stiff three-phase voltage."""
 
     bus: str
-    """Where it stands."""
+    """Its bus."""
     V_pu: float
     """Voltage (pu of the bus's nominal voltage)."""
     angle: float
@@ -158,7 +158,7 @@ class Source(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
-    """The nameplate of an inverter and where it stands."""
+    """An inverter's nameplate and bus."""
 
     name: str
     """Name, unique: "inv1"."""
@@ -167,7 +167,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     bus: str
     """Bus of its terminals (all three phases, only one inverter on a bus)."""
     microgrid: str
-    """Microgrid it belongs to."""
+    """Its microgrid."""
     P_rated: float
     """Rated power (W, three phases), base of its per-unit values."""
     V_nom: float
@@ -177,18 +177,18 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     m_q: float
     """Q-V droop (pu voltage per pu reactive power)."""
     spare: bool = False
-    """Whether it stands by, switched off, until an agent comes for it."""
+    """Whether it stays off until an agent joins for it."""
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):
-    """All tables of a feeder with one load set. `plant.tables.read_feeder` has checked that they fit together."""
+    """All tables of a feeder with one load set. `plant.tables.read_feeder` has checked their consistency."""
 
     name: str
     """Name of the folder."""
     load_set: str
-    """Which loads these are: "main" was read from loads_main.csv."""
+    """Name of the load set: "main" is from loads_main.csv."""
     buses: tuple[Bus, ...]
-    """Their order is that of the nodes in every vector."""
+    """Buses; their order is that of the nodes in every vector."""
     lines: tuple[Line, ...]
     line_configs: tuple[LineConfig, ...]
     switches: tuple[Switch, ...]
@@ -198,8 +198,8 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     transformers: tuple[Transformer, ...]
     inverters: tuple[InverterRow, ...]
     source: Source | None
-    """The substation, or None in a feeder that only inverters feed."""
+    """The substation, or None in a feeder with inverters alone."""
     f_nom: float = F_NOM
-    """Nominal frequency (Hz), at which the impedances are given."""
+    """Nominal frequency (Hz) of the impedances."""
     spares: tuple[InverterRow, ...] = ()
-    """Inverters that are switched off until an agent comes for them; no part of a run with a fixed roster."""
+    """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""

@@ -1,17 +1,17 @@
 """The plant under simulated time: it advances when the whole roster has decided. Pure; `now` serves deadlines only.
 
 *gathering*: until every agent of the configuration has a token and a nameplate, and every recorder a token.
-*preparing*: `Prepare` with the roster is out, until every agent on it is `Ready`.
-*ticking*: Measurement(k) is out, until the whole roster has sent State(k); then the plant holds the set-points, goes on
+*preparing*: from `Prepare` with the roster, until every agent on it is `Ready`.
+*ticking*: from Measurement(k), until the whole roster has sent State(k). Then the plant holds the set-points, advances
 to k+1 and sends Measurement(k+1). A change of the roster goes through *preparing* again, between two ticks.
-*joining*: the tick is held until those whom the scenario lets join have a token and a nameplate; telemetry has told,
-once, that they are missing. As the tick is held, it shows nowhere how long a process took to come up.
-*closing*: `Stop` is out, until all tokens are gone, as proof that everybody has heard it.
+*joining*: the plant holds the tick until the scheduled newcomers have a token and a nameplate; telemetry names them,
+once, as awaited. Because the tick is held, no number depends on how long a process took to start.
+*closing*: from `Stop`, until all tokens are gone, as proof that every node has heard it.
 
-An agent that the scenario lets leave is told to stop, and its inverter goes off the network; one that joins finds its
-inverter on the network again, at no load. One that the scenario lets die is told to stop, but its inverter stays. One
-that dies of itself is taken off the roster and the run goes on, marked not reproducible; one that dies before tick 0
-ends the run: it would be another run. Why there is no deadlock is written in `agents.lockstep_agent`.
+At a scheduled leave the plant sends the agent a stop request and disconnects its inverter; at a join it connects the
+inverter at no load. At a scheduled death it sends the stop request, but the inverter stays. When an agent dies by
+itself, the plant removes it from the roster and the run continues, marked not reproducible; a death before tick 0
+ends the run, because it would be another run. `agents.lockstep_agent` explains why there is no deadlock.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from wire.tick_barrier import Awaited, TickBarrier
 Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
 
 TELEMETRY_TICKS = 10
-"""Telemetry is sent at tick 0 and then every so many ticks: enough for a progress bar, few enough to be cheap."""
+"""Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
 
 
 class LockstepPlant(PlantNode):
@@ -44,7 +44,7 @@ class LockstepPlant(PlantNode):
     plant : PlantLike
         The plant at t = 0.
     links : Links, optional
-        What the links to the plant do to its messages.
+        Emulated links to the plant; None for none.
     """
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
@@ -56,14 +56,14 @@ class LockstepPlant(PlantNode):
         self._plant = plant
         joiners = self._schedule.joiners.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
-        """All who may ever take part, in the order of the inverters."""
+        """All agents that may ever take part, in the order of the inverters."""
         self._roster: tuple[str, ...] = ()
-        """Who is on the roster that was sent last."""
+        """Agents of the last roster sent."""
         self._roster_number = -1
         self._roster_changed = False
-        """Whether somebody has come or gone since."""
+        """Whether an agent has joined or gone since."""
         self._joining: tuple[str, ...] = ()
-        """Whom the tick is held for: they may appear although the run has begun."""
+        """Newcomers that the held tick waits for: they may appear although the run has begun."""
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._states: dict[str, State] = {}
         for name in self._everyone:
@@ -88,21 +88,21 @@ class LockstepPlant(PlantNode):
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages without which the plant cannot go on."""
+        """Number of messages that the plant needs to continue."""
         return self._barrier.messages_needed
 
     @property
     def deadline(self) -> float | None:
-        """When the deadline of the present wait passes (s on the driver's clock)."""
+        """End of the present wait (s on the driver's clock)."""
         return self._barrier.deadline
 
     def start(self, now: float) -> None:
-        """Begin to wait for the agents."""
+        """Start to wait for the agents."""
         self._barrier.renew(now)
         self._gather(now)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Who is awaited, and for what."""
+        """Return the missing messages with their senders."""
         match self.phase:
             case "gathering":
                 absent = [name for name in self.config.recorders if name not in self._recorders]
@@ -118,11 +118,11 @@ class LockstepPlant(PlantNode):
         if self.deadline is not None and now >= self.deadline:
             if self.phase == "closing":
                 self._be_over()
-            elif missing := self.missing_messages():  # else the last that was awaited has just come
+            elif missing := self.missing_messages():  # else the last awaited message has just arrived
                 self.abort(self._barrier.complaint(missing, now), now)
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because something went wrong."""
+        """End the run because of a failure."""
         if self.phase not in ("closing", "over"):
             self.outcome = reason
             self.reproducible = False
@@ -134,7 +134,7 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- liveliness
 
     def _unmet(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
-        """What is still to come of these: tokens and nameplates."""
+        """Return the missing tokens and nameplates of these agents."""
         here = [name for name in names if self.members.instance(name)]
         tokens = [Awaited("token", name) for name in names if name not in here]
         return *tokens, *(Awaited("nameplate", name) for name in here if name not in self.members.nameplates)
@@ -162,14 +162,14 @@ class LockstepPlant(PlantNode):
         begun = self.phase != "gathering" and not (self.phase == "preparing" and self._roster_number == 0)
         self.reproducible = False
         self._roster_changed = True
-        self._barrier.came(name)  # it never will
+        self._barrier.came(name)  # its message will never come
         if not begun:
             self.abort(f"{name} died before the run began", now)
         elif name in self._joining:
             self.abort(f"{name} died at t = {self.t:g} s, before it had joined", now)
         else:
             self._note(name, f"{name} died at t = {self.t:g} s; {STAYS}")
-        if self.phase == "preparing":  # nobody can get ready to hear the dead
+        if self.phase == "preparing":  # no agent can get ready to hear a dead one
             self._prepare(now)
 
     def _close_if_alone(self) -> None:
@@ -198,14 +198,14 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- the roster
 
     def _gather(self, now: float) -> None:
-        """Begin, if all are there."""
+        """Prepare the first roster, if all agents and recorders are there."""
         if self.phase == "gathering" and not self.missing_messages():
             self._reporter.collect()
             self._prepare(now)
             assert set(self._roster) == set(self.config.agents)
 
     def _prepare(self, now: float) -> None:
-        """Send the next roster: all who are there."""
+        """Send the next roster: all present agents."""
         self._roster = tuple(name for name in self._everyone if self.members.instance(name))
         self._roster_number += 1
         self._roster_changed = False
@@ -222,7 +222,7 @@ class LockstepPlant(PlantNode):
         self._publish(self.keys.control, encode(prepare))
 
     def _let_leave_and_join(self, now: float) -> None:
-        """Let leave who leaves at this tick, and begin to wait for who joins."""
+        """Perform the scheduled leaves and deaths of this tick, and start to wait for its newcomers."""
         leave, join, die = self._schedule.take(self.tick)
         when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:
@@ -239,7 +239,7 @@ class LockstepPlant(PlantNode):
             self._report(final=False, missing_agents=joining)
 
     def _dismiss(self, name: str, text: str) -> None:
-        """Tell an agent's process, if there is one, to close; it takes part no more."""
+        """Send an agent's process, if there is one, a stop request; it takes part no more."""
         self._note(name, text)
         self._roster_changed = True
         instance = self.members.instance(name)
@@ -251,7 +251,7 @@ class LockstepPlant(PlantNode):
         self._note_event("roster", name, text)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
-        """Put an inverter on the network, or take it off."""
+        """Connect or disconnect an inverter."""
         if self.outcome:
             return
         try:
@@ -265,7 +265,7 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- ticks
 
     def work(self, now: float) -> bool:
-        """Go on if all that is awaited is here: a roster, or one tick of the plant. Whether anything was done."""
+        """Do the next roster or tick if no message is missing; return whether anything was done."""
         if self.phase not in ("preparing", "ticking", "joining") or not self._barrier.is_open:
             return False
         ticked = self.phase == "ticking"

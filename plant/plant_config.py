@@ -1,4 +1,4 @@
-"""What the plant process is told at its start (JSON on its standard input)."""
+"""Configuration of the plant process (JSON on its standard input)."""
 
 from __future__ import annotations
 
@@ -134,34 +134,34 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Synchronism check of a switch that is to join two live islands: the largest differences across it."""
+    """Synchronism check of a switch that joins two live islands: the largest differences across it."""
 
     angle: Annotated[float, Unit("deg"), Plausible("a window of angles", 0.0, 180.0)] = 0.0
-    """Of the angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE 1547-2018,
-    Table 5)."""
+    """Largest angle (deg); 0: 20, 15 or 10 for up to 500, up to 1500, or more kVA in the smaller island (IEEE
+    1547-2018, Table 5)."""
     f: Annotated[float, Unit("Hz"), Plausible("a window of frequencies", 0.0, 10.0)] = 0.0
-    """Of the frequency (Hz); 0: 0.3, 0.2 or 0.1 at 60 Hz, likewise, in proportion at another nominal frequency."""
+    """Largest difference of frequency (Hz); 0: 0.3, 0.2 or 0.1 at 60 Hz by the same ratings, in proportion at another
+    nominal frequency."""
     V: Annotated[float, Unit("pu"), Plausible("a window of voltages", 0.0, 1.0)] = 0.0
-    """Of the voltage (pu of nominal); 0: 0.10, 0.05 or 0.03, likewise."""
+    """Largest difference of voltage (pu of nominal); 0: 0.10, 0.05 or 0.03 by the same ratings."""
     timeout: Annotated[float, Unit("s"), Plausible("the longest wait for synchronism", 0.0, 3600.0)] = 10.0
-    """How long (s) a switch of the schedule waits for synchronism before it gives up."""
+    """Longest wait (s) of a scheduled switch for synchronism."""
 
 
 class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """When inverters trip by voltage or frequency, and when they enter service again: IEEE 1547-2018."""
+    """Trips of inverters by voltage or frequency, and their return to service: IEEE 1547-2018."""
 
     category: Literal["II", "III", "off"] = "III"
-    """Abnormal operating performance category whose default trip settings hold; "off": no inverter trips."""
+    """Abnormal operating performance category of the default trip settings; "off": no inverter trips."""
     trips: Annotated[dict[str, tuple[float, float]], Example("{ UV2 = [0.5, 0.2] }")] = {}
-    """Settings in place of the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
+    """Settings that replace the defaults, by the standard's names OV2, OV1, UV1, UV2, OF2, OF1, UF1, UF2: threshold, in
     pu or in Hz, and clearing time in seconds: { UV2 = [0.5, 0.2] }. The standard's own are for 60 Hz; at another
     nominal frequency the defaults are in proportion."""
     enter_service: Annotated[
         float, Unit("s"), Plausible("the delay of entering service", 0.01, 3600.0, above_zero=True)
     ] = 5.0
     """How long (s) voltage (0.917 to 1.05 pu) and frequency (59.5 to 60.1 Hz, in proportion at another nominal
-    frequency) must be normal before an inverter that tripped comes back. The standard's default is 300 s, longer than
-    a run."""
+    frequency) must be normal before a tripped inverter returns. The standard's default is 300 s, longer than a run."""
 
 
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -173,11 +173,11 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Name, e.g. "13-152" or "sw1_2"."""
     action: Literal["open", "close"]
     synchronised: bool = False
-    """Whether to wait, where it would join two live islands, until they are in step within the synchronism check."""
+    """Whether a switch that would join two live islands waits until they are in step."""
 
 
 class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The power that a grid-following inverter has available from a time of the scenario on, e.g. under clouds."""
+    """Available power of a grid-following inverter from a scheduled time on, e.g. under clouds."""
 
     t: float
     """Time (s), a multiple of h."""
@@ -188,7 +188,7 @@ class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class ScheduledAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An agent leaves with its inverter, dies without it, or joins."""
+    """A scheduled leave (with the inverter), death (without it) or join of an agent."""
 
     t: float
     """Time (s), a multiple of T_c."""
@@ -198,7 +198,7 @@ class ScheduledAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 
 
 class InverterChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What one inverter is otherwise than in the feeder's table; None is as there."""
+    """Values of one inverter that replace the feeder's table; None keeps the table's."""
 
     m_p: float | None = None
     """P-f droop (pu frequency per pu power)."""
@@ -209,22 +209,22 @@ class InverterChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a scenario changes in the tables of its feeder."""
+    """Changes of a scenario to the tables of its feeder."""
 
     f_nom: float | None = None
     """Nominal frequency (Hz); None is the feeder's."""
     load_factor: float = 1.0
     """Factor on all loads, real and reactive power."""
     m_p_factor: float = 1.0
-    """Factor on the P-f droops of all inverters that have none of their own here."""
+    """Factor on the P-f droops of all inverters without an m_p below."""
     m_q_factor: float = 1.0
-    """Factor on the Q-V droops, likewise."""
+    """Factor on the Q-V droops of all inverters without an m_q below."""
     inverters: dict[str, InverterChange] = {}
-    """By name."""
+    """Changes by inverter."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything that decides the plant's numbers."""
+    """All settings that determine the plant's numbers."""
 
     feeder: str = "microgrid123"
     """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
@@ -243,15 +243,15 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Switches operated on schedule."""
     sync_check: SyncCheck = SyncCheck()
     limits: tuple[PowerLimit, ...] = ()
-    """Available power that changes on schedule."""
+    """Scheduled changes of available power."""
     changes: FeederChanges = FeederChanges()
-    """What the feeder has otherwise than in its tables."""
+    """Changes to the feeder's tables."""
     spares: tuple[str, ...] = ()
-    """Spare inverters that are there, switched off at the start."""
+    """Spare inverters of the run, off at the start."""
 
 
 class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything the plant process is started with (JSON on its standard input)."""
+    """Configuration of the plant process (JSON on its standard input)."""
 
     run: str
     """Name of the run, part of every key."""
@@ -259,11 +259,11 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     agents: tuple[str, ...]
     """Agents the plant waits for before tick 0."""
     schedule: tuple[ScheduledAction, ...] = ()
-    """Agents that leave and join on schedule; who joins need not be among `agents`."""
+    """Scheduled joins, leaves and deaths; an agent that joins need not be among `agents`."""
     T_c: float
     """Control period (s), a multiple of h."""
     end: float | None
-    """Duration of the run (s), a multiple of T_c; None, in wall-clock time only: until somebody ends it."""
+    """Duration of the run (s), a multiple of T_c; None, in wall-clock time only: until a person ends it."""
     record_step: float
     """Distance of the recorded rows (s): a multiple of h that divides T_c."""
     deadline: float
@@ -271,14 +271,14 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     listen: tuple[str, ...]
     """Endpoints the plant listens on; the rendezvous of the run."""
     links: dict[str, Any] = {}
-    """Emulated links to the plant: `scenarios.emulation.emulation_config` as a tree, as the plant knows no netem.
+    """Emulated links to the plant: `scenarios.emulation.emulation_config` as a tree, because the plant knows no netem.
     Empty: none."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
     recorders: tuple[str, ...] = ()
     """Recorders of the telemetry that the plant waits for before tick 0."""
     epoch: int = 1
-    """Which life of this plant."""
+    """Epoch of this process; see `wire.admission`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the agents, or real time."""
     speed: float = 1.0
@@ -286,8 +286,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     max_age: float = 0.25
     """Wall-clock: age (s of run time) beyond which agents do not use a neighbour's state."""
     wait_for_agents: float = 10.0
-    """Wall-clock: how long (s) the plant waits for its agents before it starts without those that are missing."""
+    """Wall-clock: longest wait (s) for the agents; then the plant starts without the missing ones."""
     strict: bool = False
     """Wall-clock: whether the run breaks when it cannot keep pace."""
     agent_configs: dict[str, dict[str, Any]] = {}
-    """Wall-clock: of each inverter the configuration, as a tree, with which an agent that joins a live run starts."""
+    """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""

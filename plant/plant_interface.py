@@ -1,4 +1,4 @@
-"""What the plant's side of a run needs of a plant: `plant.feeder.Plant` has it, and the small plants of the tests."""
+"""The interface of a plant to its node: `plant.feeder.Plant` has it, and so have the small plants of the tests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wire.messages import PlantEvent
 
 
 class ReadingLike(Protocol):
-    """What the sensors of one inverter read; units as in `wire.messages.Measurement`."""
+    """Sensor readings of one inverter; units as in `wire.messages.Measurement`."""
 
     @property
     def P(self) -> float: ...  # noqa: D102
@@ -30,7 +30,7 @@ class ReadingLike(Protocol):
 
 
 class PlantLike(Protocol):
-    """What the lock-step needs of a plant; `plant.feeder.Plant` is one."""
+    """The part of a plant that the lock-step uses; `plant.feeder.Plant` has it."""
 
     @property
     def inverters(self) -> tuple[str, ...]:
@@ -46,30 +46,29 @@ class PlantLike(Protocol):
         ...
 
     def connect(self, name: str, on: bool) -> None:
-        """Put an inverter on the network or take it off; nothing happens if it is so already."""
+        """Connect or disconnect an inverter; do nothing if it is in that state already."""
         ...
 
     def advance(self) -> None:
-        """Go one control period on; an island without solution is de-energised and told, and ends nothing."""
+        """Advance one control period; de-energise an island without solution, which is an event and ends nothing."""
         ...
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Rows recorded since last taken."""
+        """Take out the rows recorded since the last call."""
         ...
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Events since last taken."""
+        """Take out the events since the last call."""
         ...
 
 
 class LivePlant(PlantLike, Protocol):
-    """What wall-clock time needs of a plant on top: switches operated by hand."""
+    """The further part that wall-clock time uses: switches that people operate."""
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        """Operate a switch ("open" or "close") at the next step; ValueError, naming what there is, if unknown.
+        """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.
 
-        One that is to close synchronised and is not in step is a ValueError, too, that says how far off it is.
-
-        Tells whether it stood so already.
+        Raise ValueError if there is no such switch, with the names of all switches, or if it should close synchronised
+        and its sides are not in step, with their differences.
         """
         ...

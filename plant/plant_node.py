@@ -1,8 +1,8 @@
-"""The plant as a node: what it does alike under both kinds of time. Pure.
+"""The plant as a node: the common part of both kinds of time. Pure.
 
-It meets the agents by their tokens and nameplates and refuses those that cannot take part, holds the set-points that
-the links let through, passes on what emulated links did, and tells recorders. When it advances,
-`plant.lockstep_plant` and `plant.realtime.realtime_plant` decide.
+The node meets the agents by their tokens and nameplates and refuses those that cannot take part. It holds the
+set-points that the links deliver, passes on the accounts of emulated links, and sends telemetry to recorders.
+`plant.lockstep_plant` and `plant.realtime.realtime_plant` decide when the plant advances.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from wire.node import Node
 from wire.printable import printable
 
 CLOSING = 2.0
-"""Longest wait for the others to close (s)."""
+"""Longest wait (s) for the other nodes to close."""
 
 STAYS = "its inverter stays on primary droop at its last set-points"
-"""What becomes of the inverter of an agent that dies."""
+"""State of the inverter whose agent has died."""
 
 
 class PlantNode(Node):
-    """The plant in a run.
+    """The plant as a participant of a run.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class PlantNode(Node):
     plant : PlantLike
         The plant at t = 0.
     links : Links or None
-        What the links to the plant do to its messages.
+        Emulated links to the plant; None for none.
     rate : float, optional
         Most messages of one sender per s of run time; see `wire.admission`.
     """
@@ -52,21 +52,21 @@ class PlantNode(Node):
             if name not in plant.inverters:
                 raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
         self.outcome = ""
-        """Why the run broke; empty while it goes well."""
+        """Why the run broke; empty while it is sound."""
         self.cause: Exception | None = None
-        """What the plant raised, if that broke the run."""
+        """Error of the plant that broke the run, if any."""
         self.tick = 0
-        """k: the plant stands at k T_c."""
+        """k: the plant is at k T_c."""
         self.config = config
         self._links = links
         self._end_tick = None if config.end is None else ticks_until(config.end, config.T_c)
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
-        """All tokens of agents and recorders that are there now, refused ones too."""
+        """All present tokens of agents and recorders, refused ones too."""
         self._schedule = AgentSchedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         self._last_due = False
-        """Whether the last telemetry is yet to be sent, though the run has ended."""
+        """Whether the run has ended and the last telemetry is still to be sent."""
 
     @property
     def token(self) -> str:
@@ -75,7 +75,7 @@ class PlantNode(Node):
 
     @property
     def t(self) -> float:
-        """Run time the plant stands at (s)."""
+        """Present run time of the plant (s)."""
         return time_of(self.tick, self.config.T_c)
 
     # ---------------------------------------------------------------- liveliness
@@ -108,11 +108,11 @@ class PlantNode(Node):
         self._close_if_alone()
 
     def _is_taken(self, name: str, instance: str) -> bool:
-        """Whether another process speaks for a name."""
+        """Whether another process holds a name."""
         return self.members.instance(name) not in ("", instance)
 
     def _refusal(self, name: str, instance: str) -> str:
-        """Give the reason why a process cannot take part; empty if it can."""
+        """Return the reason why a process cannot take part; empty if it can."""
         raise NotImplementedError
 
     def _refuse(self, name: str, instance: str, reason: str) -> None:
@@ -126,21 +126,21 @@ class PlantNode(Node):
         """Note that a recorder's token is gone."""
 
     def _agent_gone(self, name: str, now: float) -> None:
-        """Note that the process which took part for a name is gone."""
+        """Note that the process that took part for a name is gone."""
         raise NotImplementedError
 
     def _close_if_alone(self) -> None:
-        """End the wait for the others to close, if that is over."""
+        """End the wait for the other nodes to close, once all have gone."""
         raise NotImplementedError
 
     # ---------------------------------------------------------------- the plant itself
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because something went wrong."""
+        """End the run because of a failure."""
         raise NotImplementedError
 
     def _operate(self, operation: Callable[[], object], now: float) -> bool:
-        """Have the plant do something; abort the run and return False if the network has no solution."""
+        """Call an operation of the plant; abort the run and return False if it raises RuntimeError."""
         try:
             operation()
         except RuntimeError as error:
@@ -149,7 +149,7 @@ class PlantNode(Node):
             return False
         return True
 
-    # ---------------------------------------------------------------- what is told
+    # ---------------------------------------------------------------- events and reports
 
     def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
         """Note an event at the plant's time."""
@@ -162,7 +162,7 @@ class PlantNode(Node):
         self._publish(key, encode(stop))
 
     def _note_state(self, state: State) -> None:
-        """Note what a state says beside its set-points: a law that has failed, or that does not tell its neighbours."""
+        """Note a failed law or a quiet state."""
         if state.fault:
             text = f"{state.sender}: {state.fault}; its agent stands still, its inverter stays on primary droop"
             self._note_event("law", state.sender, text)
@@ -170,21 +170,21 @@ class PlantNode(Node):
             self._reporter.note_quiet(self.t)
 
     def _late_states(self, now: float) -> Iterable[State]:
-        """States that the emulated links have let through by now (s of run time) and that are of use."""
+        """Return the usable states that the emulated links have delivered by now (s of run time)."""
         return (state for state in arrived(self._links, now, self.rejects, self.admission) if isinstance(state, State))
 
     def _on_report(self, report: LinkReport, payload: bytes, now: float) -> None:
-        """Pass on what an agent's links did; it closes once it knows that its last report is here."""
+        """Pass on the account of an agent's links; acknowledge the last one, so that the agent closes."""
         self._publish(self.keys.telemetry, payload)
         if report.final:
             self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
     def _report_links(self, *, last: bool = False) -> None:
-        """Send what the emulated links to the plant did since the last report."""
+        """Send the account of the emulated links to the plant since the last report."""
         self._publish_link_reports(self.keys.telemetry, self._links, self.config.epoch, t=self.t, last=last)
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
-        """Send telemetry; name the agents that are to be started."""
+        """Send telemetry, with the names of agents to start."""
         raise NotImplementedError
 
     def _telemetry(
@@ -214,20 +214,20 @@ class PlantNode(Node):
     # ---------------------------------------------------------------- the end
 
     def _tell_the_end(self, reason: str) -> None:
-        """Have everybody close. The last telemetry waits for what the agents have to say of emulated links."""
+        """Let all nodes close. The last telemetry waits for the agents' accounts of emulated links."""
         self._last_due = True
         if self._links is None:
             self._send_the_last()
         self.stop(self.keys.control, reason)
 
     def _all_have_gone(self) -> bool:
-        """Whether all tokens have; once those of the agents have, the last telemetry is sent."""
+        """Return whether all tokens are gone; send the last telemetry once those of the agents are."""
         if not any(self.keys.parts(token)[1] == "agent" for token in self._tokens):
             self._send_the_last()
         return not self._tokens
 
     def _send_the_last(self) -> None:
-        """Send the last telemetry, if it has not been sent."""
+        """Send the last telemetry, unless it is sent already."""
         if self._last_due:
             self._last_due = False
             self._report_links(last=True)

@@ -21,19 +21,19 @@ from wire.driver.session import Session
 from wire.messages import PLANT
 
 LISTENING, COMPILING, READY = "listening", "compiling", "ready"
-"""Words on standard output, one a line: the rendezvous is there; the step is being compiled, which takes up to a minute
-at the very first start; agents are awaited."""
+"""Words on standard output, one a line: the session is open; the step compiles, which takes up to a minute
+at the very first start; the plant waits for agents."""
 
 
 def build(config: PlantConfig) -> LivePlant:
     """Build the configuration's plant."""
-    from plant.build import build_plant  # numba and scipy take a second: only once the rendezvous is there
+    from plant.build import build_plant  # numba and scipy take a second: import them only once the session is open
 
     return build_plant(config)
 
 
 def print_word(word: str) -> None:
-    """Print a word at once, for the process that started this one."""
+    """Print a word at once, for the parent process."""
     sys.stdout.write(word + "\n")
     sys.stdout.flush()
 
@@ -46,18 +46,18 @@ def run_plant(
 ) -> str:
     """Run the plant until the end of the scenario.
 
-    The session is opened first, as it is the rendezvous: the agents find each other while the plant is built.
+    The session opens first, because it is the rendezvous: the agents find each other while the plant is built.
 
     Parameters
     ----------
     config : PlantConfig
         The plant, its agents and its times.
     builder : Callable[[PlantConfig], LivePlant], optional
-        Makes the plant; tests have smaller ones.
+        Builds the plant; tests have smaller ones.
     make_links : MakeLinks, optional
-        Makes the emulated links to it, if there are any.
+        Makes the emulated links to the plant, if there are any.
     on_word : Callable[[str], None], optional
-        Called with `LISTENING`, `COMPILING` and `READY` as the plant comes up.
+        Receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def run_plant(
     """
     log = logging.getLogger("plant")
     wall = config.clock == "wall"
-    if wall:  # each life has an epoch of its own, by which its ghost is known; which is greater does not matter
+    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
     session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
     try:
@@ -89,7 +89,7 @@ def run_plant(
             session.prepare(key)
         for name, agent_config in config.agent_configs.items():
             session.answer(node.keys.config(name), msgspec.json.encode(agent_config))
-        gc.freeze()  # what was built stays: later collections need not look at it
+        gc.freeze()  # the plant stays: later collections can skip it
         on_word(READY)
         try:
             drive(node, session, log)
@@ -97,7 +97,7 @@ def run_plant(
             node.interrupt(f"the plant was asked to leave: {stop}", 0.0)
             perform(node.take_actions(), session, log)
             raise
-        except Exception as error:  # whatever it is: agents that are told close at once, else they seek a plant
+        except Exception as error:  # tell the agents, so that they close at once instead of seeking the plant
             node.cause = error
             node.abort(f"plant at t = {node.t:g} s: {type(error).__name__}: {error}", monotonic())
             serve(node, session, log)

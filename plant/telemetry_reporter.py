@@ -1,4 +1,4 @@
-"""What the plant tells: measurements to its agents, telemetry to who records. The same in both kinds of time."""
+"""Messages of the plant: measurements for its agents, telemetry for recorders. The same in both kinds of time."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _NUMBER_BYTES = 9
 def measurement_of(
     name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] = ()
 ) -> Measurement:
-    """Measurement of one inverter (t in s) from what its sensors read, within the range of any sensor.
+    """Return the measurement of one inverter (t in s) from its reading, within the range of a sensor.
 
-    Beyond it a sensor shows the end of its scale. So a plant that swings wildly still grants its ticks; what it really
-    did stands in the telemetry.
+    Beyond its range a sensor shows the end of its scale. So a plant that swings wildly still grants its ticks; the
+    telemetry has the true values.
     """
     return Measurement(
         sender=PLANT,
@@ -44,7 +44,7 @@ def measurement_of(
 
 
 def _scale(field: str) -> Callable[[float], float]:
-    """The scale of a sensor: the bounds of what a field of a measurement may be."""
+    """Return the scale of a sensor, which clips to the bounds of a measurement's field."""
     bounds = get_type_hints(Measurement, include_extras=True)[field].__metadata__[0]
     low, high = float(bounds.ge), float(bounds.le)
     return lambda value: value if low <= value <= high else min(max(value, low), high)
@@ -53,18 +53,18 @@ def _scale(field: str) -> Callable[[float], float]:
 _in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
 
 _LATEST = 20
-"""Events that are told to who comes late: with twice as many of the longest, an answer is still short."""
+"""Number of latest events for late clients: with twice as many of the longest, an answer is still short."""
 
 
 class Reporter:
-    """Gathers rows and events between two reports.
+    """Gather rows and events between two reports.
 
     Parameters
     ----------
     epoch : int
-        Which life of the plant.
+        Epoch of the plant.
     plant : PlantLike
-        Where the rows come from.
+        Source of the rows.
     """
 
     def __init__(self, epoch: int, plant: PlantLike) -> None:
@@ -72,14 +72,14 @@ class Reporter:
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
         self._quiet: dict[float, int] = {}
-        """States that their neighbours were not told of, by run time (s)."""
+        """Number of quiet states, by run time (s)."""
         self.seq = 0
-        """Number of the next Telemetry, or of the one that is being sent."""
+        """Number of the next Telemetry, or of the one under way."""
         self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
-        """The latest events, for who comes late."""
+        """The latest events, for late clients."""
 
     def collect(self) -> None:
-        """Take what the plant has recorded."""
+        """Take the plant's new rows and events."""
         self._rows += self._plant.take_rows()
         for event in self._plant.take_events():
             self.note(event)
@@ -91,7 +91,7 @@ class Reporter:
         self.latest.append(event)
 
     def note_quiet(self, t: float) -> None:
-        """Count a state that its neighbours were not told of, at run time t (s)."""
+        """Count a quiet state at run time t (s)."""
         self._quiet[t] = self._quiet.get(t, 0) + 1
 
     def report(
@@ -106,7 +106,7 @@ class Reporter:
         impaired: tuple[str, ...] = (),
         others: int = 0,
     ) -> Iterator[Telemetry]:
-        """Telemetry at run time t (s) of all that was gathered: as many messages as the limit of size asks for."""
+        """Yield telemetry at run time t (s) of all gathered rows and events, in messages within the size limit."""
         inverters = self._plant.inverters
         bytes_per_row = _NUMBER_BYTES * (1 + VALUES * len(inverters)) + 8
         at_once = max(1, LIMIT // 2 // bytes_per_row)

@@ -1,9 +1,9 @@
-"""Default trip settings of IEEE 1547-2018. Pure, and without numpy: a scenario is checked against them."""
+"""Default trip settings of IEEE 1547-2018. Pure, and without numpy, because the check of a scenario needs them."""
 
 from __future__ import annotations
 
 F_BASE = 60.0
-"""Nominal frequency (Hz) for which the standard gives its settings; the defaults go in proportion to another one."""
+"""Nominal frequency (Hz) of the standard's settings; at another one the defaults are in proportion."""
 
 _FREQUENCY = {"OF2": (62.0, 0.16), "OF1": (61.2, 300.0), "UF1": (58.5, 300.0), "UF2": (56.5, 0.16)}
 
@@ -15,7 +15,7 @@ DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def defaults(category: str, f_nom: float) -> dict[str, tuple[float, float]]:
-    """Default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
+    """Return the default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
 
     Examples
     --------

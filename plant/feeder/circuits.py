@@ -1,4 +1,4 @@
-"""The circuits of a feeder: for each set of closed switches, the network as the dynamics want it."""
+"""The circuits of a feeder: for each set of closed switches, the network in the form of the dynamics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from plant.network.loads import LoadBranches
 
 
 class Circuits:
-    """A feeder's circuits, each made at the first call for its switches and then the same object.
+    """A feeder's circuits; each is made at the first call for its switches and then kept.
 
     Parameters
     ----------
@@ -24,12 +24,12 @@ class Circuits:
         self._made: dict[frozenset[str], Circuit] = {}
 
     def of(self, closed: frozenset[str]) -> Circuit:
-        """Give the circuit with these switches closed.
+        """Return the circuit with these switches closed.
 
         Raises
         ------
         PlantError
-            If an inverter is tied to another through ideal devices: nothing would decide how they share.
+            If ideal devices tie an inverter to another: their sharing would be undetermined.
         """
         if closed not in self._made:
             self._made[closed] = circuit_of(self._network, closed, self._loads)
@@ -37,13 +37,7 @@ class Circuits:
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:
-    """Make the circuit of a feeder with these switches closed; `loads` are those at their own nodes.
-
-    Raises
-    ------
-    PlantError
-        As `Circuits.of`.
-    """
+    """Make the circuit of a feeder with these switches closed; `loads` are at their own nodes."""
     merge = network.merge(closed)
     on = loads.on(merge)
     n, m = len(network.nodes), len(on)

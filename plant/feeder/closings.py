@@ -1,4 +1,4 @@
-"""Switches that join live islands: who may close now, who waits for synchronism, and what is told of it."""
+"""Switches that join live islands: those that may close now, those that wait for synchronism, and their events."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ class _Pending(NamedTuple):
     """A closing that waits for synchronism."""
 
     since: int
-    """Step at which it was to close."""
+    """Step of its scheduled closing."""
     last: int
     """Step at which it gives up."""
 
 
 class Closings:
-    """Judges the closings of a feeder's switches.
+    """Judge the closings of a feeder's switches.
 
     Parameters
     ----------
     switches
         The switches.
     sync
-        Measures across them.
+        Measures the differences across them.
     timeout
-        How many steps a switch waits for synchronism.
+        Longest wait of a switch for synchronism (steps).
     h
         Step (s).
 
     Attributes
     ----------
     joined : list of Closing
-        Those that have joined live islands, the latest last.
+        Closings that have joined live islands, the latest last.
     """
 
     def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:
@@ -46,7 +46,7 @@ class Closings:
         self.joined: list[Closing] = []
 
     def refusal(self, name: str) -> str:
-        """Why a switch (by its name) may not close now with a synchronism check; "" if it may."""
+        """Return why a switch (by its name) may not close now under a synchronism check; "" if it may."""
         difference = self._sync.across(name, self._switches.closed)
         if difference is None or difference.within:
             return ""
@@ -56,7 +56,7 @@ class Closings:
         )
 
     def check_waiting(self, step: int) -> list[PlantEvent]:
-        """Have those close at this step that are in step now; tells of those that give up."""
+        """Close the waiting switches that are in step now; return the events of those that give up."""
         events = []
         for name, waiting in list(self._waiting.items()):
             difference = self._sync.across(name, self._switches.closed)
@@ -71,7 +71,7 @@ class Closings:
         return events
 
     def judge(self, step: int) -> tuple[dict[str, str], list[PlantEvent]]:
-        """Hold back what is to wait among the operations of a step; notes on the others by switch, and what to tell."""
+        """Hold back closings that must wait, among the operations of a step; return notes by switch, and events."""
         closed = self._switches.closed
         due = self._switches.due(step)
         closing = [operation.switch for operation in due if operation.action == "close"]
@@ -79,7 +79,7 @@ class Closings:
         events: list[PlantEvent] = []
         for operation in due:
             name = operation.switch
-            self._waiting.pop(name, None)  # whoever operates it has thought anew
+            self._waiting.pop(name, None)  # a new operation replaces a waiting one
             if operation.action != "close" or name in closed:
                 continue
             difference = self._sync.across(name, closed, closing)

@@ -1,4 +1,4 @@
-"""Which inverters are on the network: who trips, who comes back, and what an agent that comes or goes changes."""
+"""Inverters in service: trips, returns, and the effect of agents that join and leave."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]
 """Takes an event: step, kind, subject, text."""
 
 Settle = Callable[[int, list[int]], None]
-"""Called after inverters were switched at a step: reads them anew, and tells of islands."""
+"""Called after inverters were switched at a step: reads them again, and reports islands."""
 
 
 class InService:
-    """Connects and disconnects the inverters of a feeder, as agents, protection and the network have it.
+    """Connect and disconnect the inverters of a feeder, by agents, protection and the network.
 
-    An inverter that trips comes back by itself when voltage and frequency at its terminals have been normal for the
-    delay. Where nothing feeds its island any more, all that tripped there come back at once when the last of them has
-    waited as long: a black start, of which a GFM must be part. There is no load shedding, so whoever starts an island
-    takes its whole load; an inverter that trips again and again is left off.
+    A tripped inverter returns by itself when voltage and frequency at its terminals have been normal for the
+    delay. In a de-energised island all tripped inverters return at once, when the last of them has waited as long: a
+    black start, which needs a GFM. There is no load shedding, so these inverters take the whole load of the island;
+    an inverter that trips repeatedly stays off.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ class InService:
         Their nominal voltages (V).
     dynamics
         The inverters and their network.
-    wanted
-        Which are to be on the network at the start.
+    connected
+        Inverters that are connected at the start.
     tell, settle
         See `Tell` and `Settle`.
     """
@@ -49,15 +49,16 @@ class InService:
         names: tuple[str, ...],
         V_nom: NDArray[np.float64],
         dynamics: Dynamics,
-        wanted: list[bool],
+        connected: list[bool],
         tell: Tell,
         settle: Settle,
     ) -> None:
         self._names, self._V_nom, self._dynamics = names, V_nom, dynamics
         self._tell, self._settle = tell, settle
-        self._wanted = np.array(wanted)
+        self._connected = np.array(connected)
+        """Inverters that should be connected: those with an agent, or without need of one."""
         self._joining: set[int] = set()
-        """Whose agent has come, and who waits for others to start the island with."""
+        """Inverters whose agent has joined, and which wait for others to start their island."""
         self._relays = Relays(settings, len(names), dynamics.h, dynamics.inverters.f_nom)
         self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, dynamics.inverters.f_nom)
 
@@ -67,19 +68,19 @@ class InService:
 
     @property
     def quiet(self) -> int:
-        """Steps within which nobody trips or comes back."""
+        """Number of steps within which no inverter trips or returns."""
         return min(self._relays.quiet, self._recovery.quiet)
 
     def connect(self, i: int, step: int, *, on: bool) -> None:
-        """Put an inverter on the network, at zero current and in step with it, or take it off, as its agent wants.
+        """Connect an inverter, at zero current and in step with the network, or disconnect it, for its agent.
 
-        One that has tripped waits on until it may come back. A GFM that comes into an island that nothing feeds, with
-        inverters that have tripped there, starts it together with them, as soon as they have waited long enough.
+        A tripped inverter waits until it may return. A GFM that joins a de-energised island with tripped inverters
+        starts it together with them, as soon as they have waited long enough.
         """
         name, recovery = self._names[i], self._recovery
-        if bool(self._wanted[i]) == on and not (on and recovery.tripped[i]):
+        if bool(self._connected[i]) == on and not (on and recovery.tripped[i]):
             return
-        self._wanted[i] = on
+        self._connected[i] = on
         here = np.flatnonzero(recovery.tripped & self._with(i)).tolist()
         if not on:
             recovery.forget(i)
@@ -92,7 +93,7 @@ class InService:
                 recovery.unlock(j)
             recovery.await_others(i)
             self._joining.add(i)
-            self._tell(step, "trip", name, f"{name} is to start its island, with what has tripped there")
+            self._tell(step, "trip", name, f"{name} starts its island, together with the inverters that have tripped")
         elif recovery.tripped[i]:
             recovery.unlock(i)
         else:
@@ -101,12 +102,12 @@ class InService:
             self._settle(step, [i])
 
     def watch(self, step: int, out: NDArray[np.float64]) -> None:
-        """Trip who is beyond its settings after these steps, and bring back who may come.
+        """Trip inverters beyond their settings after these steps, and bring back those that may return.
 
         Parameters
         ----------
         step
-            Where the plant stands; what is done acts from the next step on.
+            Present step of the plant; changes act from the next step on.
         out
             Readings of the steps since the last call, of `Dynamics.run`.
         """
@@ -140,27 +141,27 @@ class InService:
     def note_trips(self, step: int, which: list[int], before: int = 0) -> None:
         """Note that inverters have tripped at a step, `before` steps after the last `watch`.
 
-        They hold no load until they are back, whatever they are told.
+        They hold no load until they return, whatever their set-points.
         """
         locked = [self._names[i] for i in which if self._recovery.trip(i, before)]
         self._dynamics.inverters.set_points[which] = 0.0, 1.0, 0.0
         if locked:
-            text = f"{', '.join(locked)}: tripped {ATTEMPTS} times, off until the agent joins anew, or a GFM comes"
+            text = f"{', '.join(locked)}: tripped {ATTEMPTS} times, off until the agent joins again, or a GFM joins"
             self._tell(step, "trip", locked[0], text)
 
     def _with(self, i: int) -> NDArray[np.bool_]:
-        """Inverters in the same island, that one included."""
+        """Return the inverters in the same island, this one included."""
         island = self._dynamics.network.reduction.inverter_island
         same: NDArray[np.bool_] = island == island[i]
         return same
 
     def _fed(self, i: int) -> bool:
-        """Whether something feeds an inverter's island."""
+        """Whether an inverter's island is energised."""
         reduction = self._dynamics.network.reduction
         return bool(reduction.live[reduction.inverter_island[i]])
 
     def _returning(self) -> list[tuple[list[int], bool]]:
-        """Tripped inverters that come back now, by island, and whether that is a black start."""
+        """Return the tripped inverters that return now, by island, and whether that is a black start."""
         recovery, forming = self._recovery, self._dynamics.inverters.forming
         island = self._dynamics.network.reduction.inverter_island
         groups = []

@@ -1,4 +1,4 @@
-"""Who is in which island: by the inverters' names, and as the events that a run reports."""
+"""Islands by the names of their inverters, and as events of a run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GRID = "grid"
 
 
 class Islands:
-    """Names a feeder's islands, and reports them.
+    """Name a feeder's islands, and report their changes.
 
     Parameters
     ----------
@@ -26,11 +26,11 @@ class Islands:
         self._network = network
         self._inverters = tuple(unit.name for unit in network.inverters)
         self._dead: list[str] = []
-        self._told: dict[str, str] = {}
-        """What was told last of each island."""
+        self._reported: dict[str, str] = {}
+        """Last reported text of each island."""
 
     def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
-        """Each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
+        """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
         label = reduction.inverter_island.tolist()
         fed = [bool(reduction.has_source[k]) for k in label]
         first: dict[int, str] = {}
@@ -39,12 +39,9 @@ class Islands:
         return [first[k] for k in label], fed
 
     def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
-        """Tell at t (s) which inverters feed which island, and what is newly dead, with these switches closed.
-
-        An island that is as it was told last is not told again.
-        """
+        """Return the events at t (s) of changed islands and newly dead buses, with these switches closed."""
         names, _ = self.names(reduction)
-        told = {}
+        texts = {}
         for name in dict.fromkeys(names):
             members = [
                 unit
@@ -52,17 +49,17 @@ class Islands:
                 if of == name and online
             ]
             if members:
-                told[name] = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
+                texts[name] = f"{'the grid feeds' if name == GRID else 'island of'} {', '.join(members)}"
         events = [
             PlantEvent(t=t, kind="island", subject=name, text=text)
-            for name, text in told.items()
-            if self._told.get(name) != text
+            for name, text in texts.items()
+            if self._reported.get(name) != text
         ]
-        self._told = told
+        self._reported = texts
         return events + self.report_dead(t, closed, reduction)
 
     def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
-        """Tell at t (s) of the buses that nothing feeds any more, and of the inverters and loads on them."""
+        """Return the event at t (s) of newly dead buses, with their inverters and loads."""
         before = set(self._dead)
         self._dead = self._dead_buses(closed, reduction.live[reduction.label])
         new = [bus for bus in self._dead if bus not in before]
@@ -77,7 +74,7 @@ class Islands:
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 
     def _dead_buses(self, closed: frozenset[str], live: NDArray[np.bool_]) -> list[str]:
-        """Buses of which no node is live, in the feeder's order."""
+        """Return the buses without a live node, in the feeder's order."""
         alive = live[self._network.merge(closed).representative]
         fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]

@@ -1,4 +1,4 @@
-"""The plant: readings of the inverters, their set-points, switches, and the step of one control period."""
+"""The plant: readings and set-points of the inverters, switches, and the advance of one control period."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Plant:
         self.network, self.settings = network, settings
         self.inverters = tuple(unit.name for unit in network.inverters)
         self.tick = 0
-        """k: the plant stands at k T_c."""
+        """k: the plant is at k T_c."""
         self._row = {name: i for i, name in enumerate(self.inverters)}
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
@@ -140,10 +140,10 @@ class Plant:
         return readings
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Take set-points (W, V), in force from the next step until others come, within what the inverter can do.
+        """Take set-points (W, V), in force from the next step until the next ones, within the inverter's bounds.
 
-        A value beyond its bounds is limited, and one that is no finite number is left out; each is an event, once.
-        An inverter that has tripped takes none: it comes back at no load.
+        A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell.
+        A tripped inverter accepts none: it returns at no load.
         """
         i, t = self._row[name], time_of(self.tick, self._T_c)
         if not (isfinite(P_set) and isfinite(V_set)):
@@ -156,21 +156,21 @@ class Plant:
         self._events += self._set_points.held(name, t, "V_set", V_set, V * self._V_nom[i])
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        """Operate a switch now ("open" or "close"), by its name or alias; it acts from the next step on.
+        """Operate a switch now ("open" or "close"), by its name or alias, from the next step on.
 
-        A switch that closes joins two live islands as they stand, and a warning says how far they were apart; with
+        A closing switch joins two live islands as they are, and a warning gives their differences; with
         `synchronised` it closes only if they are in step.
 
         Returns
         -------
         bool
-            Whether it stood so already, or will by another command since the last step.
+            Whether it was in that state already, or will be by another command since the last step.
 
         Raises
         ------
         ValueError
-            If there is no such switch, or its sides are not in step; the message lists the switches, or says how far
-            its sides are apart.
+            If there is no such switch, or its sides are not in step; the message lists the switches, or the
+            differences of the sides.
         """
         known = self.network.switch_name(name)
         if synchronised and action == "close" and (refusal := self._closings.refusal(known)):
@@ -182,14 +182,14 @@ class Plant:
         return (known in closed) == (action == "close")
 
     def connect(self, name: str, on: bool) -> None:
-        """Put an inverter on the network, at zero current and in step with it, or take it off; see `InService`."""
+        """Connect an inverter at zero current and in step with the network, or disconnect it; see `InService`."""
         self._in_service.connect(self._row[name], self.tick * self._steps, on=on)
 
     def advance(self) -> None:
-        """Go to the next tick, and operate the switches of these steps.
+        """Advance to the next tick, and operate the switches of these steps.
 
-        An island whose network has no solution is de-energised, which is an event; the others go on. Protection acts
-        at the very step at which a clearing time is over: the steps are cut there.
+        An island whose network has no solution is de-energised, which is an event; the others continue. Protection
+        acts at the very step at which a clearing time ends: the steps are split there.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         self._events += self._closings.check_waiting(first)
@@ -250,7 +250,7 @@ class Plant:
         closed = self._switches.closed
         try:
             circuit = self._circuits.of(closed)
-        except PlantError as error:  # this network has no solution; the run goes on without the switching
+        except PlantError as error:  # this network has no solution; the run continues without the switching
             self._switches.closed = before
             names = ", ".join(event.subject for event in operated)
             self._events.append(PlantEvent(t=t, kind="warning", subject=names, text=f"{names} not operated: {error}"))
@@ -261,7 +261,7 @@ class Plant:
         self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
 
     def _settle(self, step: int, which: list[int]) -> None:
-        """Read inverters anew that were switched at a step, and report new islands."""
+        """Read inverters again that were switched at a step, and report new islands."""
         now = self._dynamics.readings()
         self._now[which] = now[which]
         if self._tell_trips(step):

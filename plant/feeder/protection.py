@@ -1,4 +1,4 @@
-"""Protection of inverters: when one trips, and when one that has tripped may enter service again. Pure.
+"""Protection of inverters: trips, and the return to service. Pure.
 
 Trips are those of IEEE 1547-2018, clause 6.4.1 (voltage) and 6.5.1 (frequency), with its default settings; entering
 service is clause 4.10. The quantities are those the clauses name: for undervoltage the lowest phase of the terminal,
@@ -26,10 +26,10 @@ F_ENTER = (59.5, 60.1)
 """The same for the frequency (Hz at 60 Hz)."""
 
 ATTEMPTS = 3
-"""An inverter that trips so many times within `SETTLED` of coming back stays off until its agent joins anew."""
+"""Trips, each within `SETTLED` of the last return, after which an inverter stays off until its agent joins again."""
 
 SETTLED = 60.0
-"""Time in service (s) after which earlier trips are forgotten."""
+"""Time in service (s) after which earlier trips do not count."""
 
 _WORDS = {"OV": "overvoltage", "UV": "undervoltage", "OF": "overfrequency", "UF": "underfrequency"}
 
@@ -38,15 +38,15 @@ class Tripped(NamedTuple):
     """An inverter whose protection has tripped."""
 
     inverter: int
-    """Which."""
+    """Its index."""
     function: str
     """Name of the function in the standard: "UV2"."""
     value: float
-    """What was measured last (pu or Hz)."""
+    """Last measured value (pu or Hz)."""
     threshold: float
     """Its setting (pu or Hz)."""
     time: float
-    """For how long it has been beyond it (s): the clearing time."""
+    """Time beyond the setting (s): the clearing time."""
 
     def __str__(self) -> str:
         """Cause of the trip, for a person.
@@ -81,7 +81,7 @@ class Relays:
     >>> sag, normal, on = np.array([[0.4]]), np.array([[1.0]]), np.array([True])
     >>> f = np.array([[60.0]])
     >>> trips = [relays.watch(f, sag, normal, on) for _ in range(8)]
-    >>> [len(found) for found in trips], str(trips[-1][0])
+    >>> [len(tripped) for tripped in trips], str(trips[-1][0])
     ([0, 0, 0, 0, 0, 0, 0, 1], 'undervoltage 0.40 pu for 0.16 s (UV2: 0.45 pu)')
     """
 
@@ -94,11 +94,11 @@ class Relays:
         self._of = np.array([("f", "low", "high").index(_quantity(name)) for name in chosen], np.int64)
         self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
         self._count = np.zeros((n, len(chosen)), np.int64)
-        """Steps for which each function's condition has held."""
+        """Number of steps for which each function's condition has held."""
 
     @property
     def quiet(self) -> int:
-        """Steps within which no function can trip."""
+        """Number of steps within which no function can trip."""
         return int(np.min(self._need - self._count, initial=2**31))
 
     def watch(self, f: Floats, V_low: Floats, V_high: Floats, on: Flags) -> list[Tripped]:
@@ -129,12 +129,12 @@ class Relays:
 
 
 class Recovery:
-    """Inverters that have tripped, and when they may enter service again.
+    """Tripped inverters, and their return to service.
 
     Parameters
     ----------
     delay
-        How long (s) voltage and frequency must have been normal at the terminals.
+        Time (s) for which voltage and frequency must have been normal at the terminals.
     n
         Number of inverters.
     h
@@ -147,7 +147,7 @@ class Recovery:
     tripped : bool[n]
         Inverters that are off because they tripped.
     locked : bool[n]
-        Those among them that have tripped too often: they do not come back by themselves.
+        Those among them that have tripped too often: they do not return by themselves.
     """
 
     def __init__(self, delay: float, n: int, h: float, f_nom: float) -> None:
@@ -159,28 +159,28 @@ class Recovery:
         self._was_dead = np.zeros(n, bool)
 
     def trip(self, i: int, before: int = 0) -> bool:
-        """Note that an inverter tripped, `before` steps after the last `watch`. Whether it has done so too often."""
+        """Note a trip, `before` steps after the last `watch`; return whether the inverter has tripped too often."""
         self._trips[i] = 1 if self._served[i] >= self._settled else self._trips[i] + 1
         self.tripped[i], self._waited[i], self._served[i] = True, -before, 0
         self.locked[i] = self._trips[i] >= ATTEMPTS
         return bool(self.locked[i])
 
     def enter(self, i: int) -> None:
-        """Note that an inverter has come back."""
+        """Note that an inverter has returned."""
         self.tripped[i] = self.locked[i] = False
         self._served[i] = 0
 
     def forget(self, i: int) -> None:
-        """Forget that an inverter tripped: it is off or on because its agent wants it."""
+        """Forget an inverter's trips: its agent has connected or disconnected it."""
         self.enter(i)
         self._trips[i] = 0
 
     def unlock(self, i: int) -> None:
-        """Let an inverter come back that has tripped too often, as its agent joins anew."""
+        """Let an inverter return that has tripped too often, because its agent joins again."""
         self.locked[i], self._trips[i] = False, 0
 
     def await_others(self, i: int) -> None:
-        """Let an inverter that comes, and need not wait itself, wait for those that have tripped."""
+        """Let a joining inverter, which need not wait itself, wait for the tripped ones."""
         self.tripped[i], self._waited[i] = True, self._need
         self.unlock(i)
 
@@ -190,19 +190,19 @@ class Recovery:
 
     @property
     def quiet(self) -> int:
-        """Steps within which no delay passes."""
+        """Number of steps within which no delay ends."""
         waits = (self._need - self._waited)[self.tripped & ~self.locked]
         return int(np.min(waits[waits > 0], initial=2**31))
 
     def watch(self, f: Floats, V_low: Floats, V_high: Floats, dead: Flags) -> None:
-        """Take what the terminals show since the last call.
+        """Take the readings of the terminals since the last call.
 
         Parameters
         ----------
         f, V_low, V_high
             Frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu): steps x inverters.
         dead
-            Inverters whose island nothing feeds: there the delay counts from the trip, as there is nothing to measure.
+            Inverters in a de-energised island: there the delay counts from the trip, because there is no voltage.
         """
         steps = len(f)
         self._served = np.where(self.tripped, 0, self._served + steps)
@@ -218,7 +218,7 @@ class Recovery:
 
 
 def _quantity(name: str) -> Literal["f", "low", "high"]:
-    """What a function looks at."""
+    """Return the quantity of a function."""
     if name[1] == "F":
         return "f"
     return "high" if name[0] == "O" else "low"

@@ -1,4 +1,4 @@
-"""Set-points beyond what an inverter can do: counted and reported by spells."""
+"""Count and report set-points beyond an inverter's bounds, by spells."""
 
 from __future__ import annotations
 
@@ -14,60 +14,61 @@ _UNIT = {"P_set": "kW", "V_set": "V"}
 
 @dataclass
 class _Spell:
-    """Set-points of one inverter that were limited one after another."""
+    """Consecutive limited set-points of one inverter."""
 
     count: int
     last: float
     """Time of the last one (s)."""
     farthest: float
-    """The one farthest from what was held (kW or V)."""
+    """The one farthest from the held value (kW or V)."""
     distance: float
-    """How far that was (kW or V)."""
+    """Distance of that one (kW or V)."""
 
 
 class SetPointLimits:
-    """Which inverters are told set-points beyond their bounds: an event when it begins, and one when it ends.
+    """Report set-points beyond an inverter's bounds: one event when a spell begins, and one when it ends.
 
     Examples
     --------
     >>> limits = SetPointLimits()
-    >>> [event.text for event in limits.held("inv1", 2.0, "P_set", told=10_000.0, held=1800.0)]
-    ['inv1 is told P_set 10000 kW, which is beyond its bound; it holds 1800 kW']
-    >>> limits.held("inv1", 2.02, "P_set", told=10_000.0, held=1800.0)
+    >>> [event.text for event in limits.held("inv1", 2.0, "P_set", set_point=10_000.0, held=1800.0)]
+    ['inv1 gets P_set 10000 kW, which is beyond its bound; it holds 1800 kW']
+    >>> limits.held("inv1", 2.02, "P_set", set_point=10_000.0, held=1800.0)
     []
-    >>> [event.text for event in limits.held("inv1", 3.5, "P_set", told=500.0, held=500.0)]
-    ['inv1 is told P_set within its bound again; 2 set-points were limited, the farthest 10000 kW']
+    >>> [event.text for event in limits.held("inv1", 3.5, "P_set", set_point=500.0, held=500.0)]
+    ['inv1 gets P_set within its bound again; 2 set-points were limited, the farthest 10000 kW']
     """
 
     def __init__(self) -> None:
         self._spells: dict[tuple[str, str], _Spell] = {}
         self._refused: set[str] = set()
 
-    def held(self, name: str, t: float, quantity: str, told: float, held: float) -> list[PlantEvent]:
-        """Compare what an inverter is told at t (s) with what it holds (kW or V); rounding does not count."""
-        key, unit, distance = (name, quantity), _UNIT[quantity], abs(told - held)
+    def held(self, name: str, t: float, quantity: str, set_point: float, held: float) -> list[PlantEvent]:
+        """Compare an inverter's set-point at t (s) with the held one (kW or V), apart from rounding."""
+        key, unit, distance = (name, quantity), _UNIT[quantity], abs(set_point - held)
         spell = self._spells.get(key)
-        if distance > 1e-9 * abs(told):
+        if distance > 1e-9 * abs(set_point):
             if spell is None:
-                self._spells[key] = _Spell(1, t, told, distance)
-                text = f"{name} is told {quantity} {told:g} {unit}, which is beyond its bound; it holds {held:g} {unit}"
+                self._spells[key] = _Spell(1, t, set_point, distance)
+                beyond = f"{name} gets {quantity} {set_point:g} {unit}, which is beyond its bound"
+                text = f"{beyond}; it holds {held:g} {unit}"
                 return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
             spell.count, spell.last = spell.count + 1, t
             if distance > spell.distance:
-                spell.farthest, spell.distance = told, distance
+                spell.farthest, spell.distance = set_point, distance
         elif spell is not None and t - spell.last >= SPELL:
             del self._spells[key]
             text = (
-                f"{name} is told {quantity} within its bound again; {spell.count} set-points were limited, "
+                f"{name} gets {quantity} within its bound again; {spell.count} set-points were limited, "
                 f"the farthest {spell.farthest:g} {unit}"
             )
             return [PlantEvent(t=t, kind="limit", subject=name, text=text)]
         return []
 
     def refused(self, name: str, t: float) -> list[PlantEvent]:
-        """Note set-points that are no finite numbers; the event comes once per inverter."""
+        """Note set-points that are not finite; report them once per inverter."""
         if name in self._refused:
             return []
         self._refused.add(name)
-        text = f"{name} is told set-points that are no finite numbers; it keeps those it has"
+        text = f"{name} gets set-points that are not finite numbers; it keeps the present ones"
         return [PlantEvent(t=t, kind="limit", subject=name, text=text)]

@@ -1,4 +1,4 @@
-"""Which switches are closed, and at which step which of them is operated."""
+"""The closed switches of a feeder, and the operations by step."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _PAST = {"open": "opened", "close": "closed"}
 
 
 class Operation(NamedTuple):
-    """A switch to be operated."""
+    """An operation of a switch."""
 
     switch: str
     """Its name."""
     action: str
-    """What to do: "open" or "close"."""
+    """"open" or "close"."""
     synchronised: bool = False
     """Whether to close only in step."""
 
@@ -45,7 +45,7 @@ class Switchboard:
     Raises
     ------
     ValueError
-        If an event names no switch; the message lists those there are.
+        If an event names no switch; the message lists all switches.
     """
 
     def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
@@ -57,37 +57,37 @@ class Switchboard:
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps at which switches are yet to be operated."""
+        """Steps with operations to come."""
         return self._at.keys()
 
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
-        """Have a switch operated at a step ("open" or "close"), by its name or alias.
+        """Schedule an operation ("open" or "close") of a switch, by its name or alias, at a step.
 
         Raises
         ------
         ValueError
-            If there is no such switch; the message lists those there are.
+            If there is no such switch; the message lists all switches.
         """
-        known = self._network.switch_name(name)  # before anything is noted of the step
+        known = self._network.switch_name(name)  # first, so that an error leaves the schedule as it is
         self._at.setdefault(step, []).append(Operation(known, action, synchronised))
 
     def due(self, step: int) -> tuple[Operation, ...]:
-        """Operations of a step."""
+        """Return the operations of a step."""
         return tuple(self._at.get(step, ()))
 
     def drop(self, step: int, operation: Operation) -> None:
-        """Leave out an operation of a step; what stands there else is operated all the same."""
+        """Remove an operation of a step; the others stay."""
         self._at[step].remove(operation)
         if not self._at[step]:
             del self._at[step]
 
     def shown(self, name: str) -> str:
-        """Name of a switch as people are told it, with its alias."""
+        """Return the name of a switch for people, with its alias."""
         alias = self._network.switches[name].alias
         return f"{alias} ({name})" if alias else name
 
     def foreseen(self) -> Iterator[frozenset[str]]:
-        """Switches that will be closed after each step with operations that are yet to come, in order of time."""
+        """Yield the closed switches after each step with operations to come, in order of time."""
         closed = self.closed
         for step in sorted(self._at):
             for operation in self._at[step]:
@@ -95,7 +95,7 @@ class Switchboard:
             yield closed
 
     def operate(self, step: int, notes: Mapping[str, str] = MappingProxyType({})) -> list[PlantEvent]:
-        """Operate the switches of a step, all at once, and forget it; tells of each what was done and is noted."""
+        """Operate the switches of a step, all at once; return an event of each, with its note."""
         t = time_of(step, self._h)
         events = []
         for name, action, _ in self._at.pop(step):

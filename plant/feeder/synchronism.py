@@ -1,4 +1,4 @@
-"""How far two live islands are apart across an open switch, and how far they may be when it closes.
+"""Differences of two live islands across an open switch, and the largest at which it may close.
 
 The limits are the synchronization parameter limits of IEEE Std 1547-2018, Table 5: of frequency, voltage and
 phase-angle difference for connecting an energized local system, by the aggregate rating of its units.
@@ -19,7 +19,7 @@ from plant.plant_config import SyncCheck
 from plant.trip_settings import F_BASE
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
-"""Up to which rating (VA): frequency (Hz), voltage (pu), angle (deg)."""
+"""Rating (VA) up to which these limits hold: frequency (Hz), voltage (pu), angle (deg)."""
 
 
 LOCKED = 0.01
@@ -48,7 +48,7 @@ class Difference:
 
     @property
     def way_out(self) -> str:
-        """What brings the two sides within the limits, as the start of a sentence.
+        """Advice that brings the two sides within the limits.
 
         Examples
         --------
@@ -86,7 +86,7 @@ class SynchronizationLimits:
 
 
 def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> SynchronizationLimits:
-    """Return the limits of IEEE 1547-2018, Table 5, for an aggregate rating (VA); those that `check` sets go before.
+    """Return the limits of IEEE 1547-2018, Table 5, for an aggregate rating (VA); limits set in `check` replace them.
 
     The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
@@ -104,7 +104,7 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
 
 
 class Synchronism:
-    """Measures across the open switches of a feeder.
+    """Measure differences across the open switches of a feeder.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class Synchronism:
         self._network, self._dynamics, self._check = network, dynamics, check
 
     def across(self, switch: str, closed: frozenset[str], others: Iterable[str] = ()) -> Difference | None:
-        """Difference across a switch (by its name) now; None if it does not part two live islands.
+        """Return the difference across a switch (by its name) now; None if it does not separate two live islands.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class Synchronism:
         closed
             Switches that are closed now.
         others
-            Switches that close with it. A dead side that one of them energizes counts as what energizes it.
+            Switches that close with it. A dead side that one of them energizes counts as the energizing island.
         """
         network, reduction = self._network, self._dynamics.network.reduction
         device, merge = network.switches[switch], network.merge(closed)
@@ -154,7 +154,7 @@ class Synchronism:
         )
 
     def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:
-        """The bus itself if it is live, else a live bus that these closed switches join to it; "" if there is none."""
+        """Return the bus if it is live, else a live bus that these closed switches join to it; "" if there is none."""
         network = self._network
         island = next(buses for buses in network.islands(closed) if bus in buses)
         for name in (bus, *(other.name for other in network.feeder.buses if other.name in island)):
@@ -163,7 +163,7 @@ class Synchronism:
         return ""
 
     def _rating(self, island: int) -> float:
-        """Rating (VA) of all inverters that feed an island; the substation has no bound."""
+        """Return the rating (VA) of all inverters that feed an island; infinite with the substation."""
         reduction, units = self._dynamics.network.reduction, self._dynamics.inverters
         if reduction.has_source[island]:
             return float("inf")

@@ -1,4 +1,4 @@
-"""What is told when an island had to be de-energised because its network has no solution: who tripped, and why."""
+"""The event of an island that is de-energised because its network has no solution: the tripped units and the cause."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from plant.network import Network
 from wire.messages import PlantEvent
 
 RECENT = 1.0
-"""Time (s) after a closing out of phase within which a collapse counts as its doing."""
+"""Time (s) after a closing out of phase within which a collapse counts as its effect."""
 
 SUBSTATION = "substation"
-"""Subject of the event that tells of the substation's trip."""
+"""Subject of the event of a substation's trip."""
 
 
 class Closing(NamedTuple):
     """A switch that has joined two live islands."""
 
     t: float
-    """When (s)."""
+    """Time (s)."""
     switch: str
     """Its name."""
     angle: float
@@ -30,7 +30,7 @@ class Closing(NamedTuple):
 
 
 def raise_for_trip(events: Iterable[PlantEvent]) -> None:
-    """Raise PlantError if a trip is among these events, for whoever wants numbers of a plant that is whole."""
+    """Raise PlantError if a trip is among these events, for callers that need a plant without trips."""
     for event in events:
         if event.kind == "trip":
             raise PlantError(f"at t = {event.t:g} s {event.text}")
@@ -39,20 +39,20 @@ def raise_for_trip(events: Iterable[PlantEvent]) -> None:
 def trip_event(
     t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
 ) -> PlantEvent:
-    """Tell who tripped, and whether by overload or by closing out of phase.
+    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase).
 
     Parameters
     ----------
     t
-        When (s).
+        Time (s).
     trip
-        What was taken off.
+        Disconnected units.
     network
         The feeder's network.
     closed
-        Switches closed then.
+        Switches closed at that time.
     closings
-        What had joined live islands until then.
+        Earlier closings that joined live islands.
     """
     names = [network.inverters[i].name for i in trip.inverters]
     buses = {network.inverters[i].bus for i in trip.inverters}
