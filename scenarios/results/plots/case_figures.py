@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,16 +12,16 @@ from scenarios.results import metrics
 from scenarios.results.history import Floats, History, Nameplates
 from scenarios.results.island_membership import RowMeasure, worst
 from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import mark_events
+from scenarios.results.plots.marks import finish
 from scenarios.results.plots.style import (
-    PAGE,
     SHARING,
     VOLTAGE,
     Bounds,
     case_styles,
     from_zero,
     legend_below,
-    time_axis,
+    name_panel,
+    nominal_line,
     words,
 )
 
@@ -75,25 +74,22 @@ terminals that are too high and too low cancel."""
 
 def overview(drawing: Drawing) -> Figure:
     """Draw the four measures that judge runs, of all cases, on one page."""
-    with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
-        axes = figure.subplots(2, 2, sharex=True)
-        for panel, name in zip(axes.flat, ("frequency", "MPSI", "V_error", "MQSI"), strict=True):
-            draw_measure(panel, drawing, name)
-            mark_events(panel, drawing, labelled=name in ("frequency", "MPSI"))
-        for panel in axes[0]:
-            panel.set_xlabel("")
-        legend_below(figure, axes[0, 0])
+    figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+    grid = figure.subplots(2, 2, sharex=True)
+    for panel, name in zip(grid.flat, ("frequency", "MPSI", "V_error", "MQSI"), strict=True):
+        draw_measure(panel, drawing, name)
+    finish(grid, drawing)
+    legend_below(figure, grid[0, 0])
     return figure
 
 
 def single(drawing: Drawing, name: str) -> Figure:
     """Draw one measure of all cases on a page of its own."""
     figure = Figure(figsize=(6.4, 3.2), layout="constrained")
-    axes = figure.subplots()
-    draw_measure(axes, drawing, name)
-    mark_events(axes, drawing, labelled=True)
-    legend_below(figure, axes)
+    grid = figure.subplots(squeeze=False)
+    draw_measure(grid[0, 0], drawing, name)
+    finish(grid, drawing)
+    legend_below(figure, grid[0, 0])
     return figure
 
 
@@ -102,13 +98,12 @@ def draw_measure(axes: Axes, drawing: Drawing, name: str) -> None:
     measure = MEASURES[name]
     nominal = drawing.f_nom if measure.nominal is None else measure.nominal
     drawn = curves(axes, drawing, worst(measure.of_row, nominal, drawing.island_intervals))
-    axes.set_title(measure.title, loc="left")
-    axes.set_ylabel(f"{measure.island_label}, worst island" if drawing.island_intervals else measure.label)
+    label = f"{measure.island_label}, worst island" if drawing.island_intervals else measure.label
+    name_panel(axes, measure.title, label)
     if measure.bounds is not None:
         from_zero(axes, drawn, measure.bounds)
     else:
-        axes.axhline(nominal, color="#000000", linewidth=0.6, zorder=1)
-        axes.ticklabel_format(axis="y", useOffset=False)
+        nominal_line(axes, nominal)
 
 
 def curves(axes: Axes, drawing: Drawing, measure: RowMeasure) -> list[Floats]:
@@ -119,5 +114,4 @@ def curves(axes: Axes, drawing: Drawing, measure: RowMeasure) -> list[Floats]:
         drawn.append(measure(history, drawing.nameplates_in(case)))
         label = words(drawing, case)
         axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=label)
-    time_axis(axes, drawing)
     return drawn

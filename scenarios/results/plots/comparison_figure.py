@@ -13,7 +13,7 @@ from scenarios.results.island_membership import worst
 from scenarios.results.plots.case_figures import MEASURES, PlotMeasure
 from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import BLACK, mark_events
-from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, time_axis
+from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, name_panel, time_axis
 
 WIDTH, HEIGHT = 7.4, 2.3
 """Size of a figure, and of each row of panels in it (inches)."""
@@ -43,8 +43,7 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
             panels = grid[2 * number : 2 * number + 2].flat
             for place, (panel, (name, label)) in enumerate(zip(panels, _PANELS, strict=True)):
                 title = MEASURES[name].title
-                panel.set_title(f"{words}: {title}" if words else title, loc="left")
-                panel.set_ylabel(label)
+                name_panel(panel, f"{words}: {title}" if words else title, label)
                 panel.ticklabel_format(axis="y", useOffset=False)
                 _draw(panel, drawings, MEASURES[name], labelled=place < COLUMNS)
         legend_below(figure, grid[0, 0])

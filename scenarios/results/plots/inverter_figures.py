@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,15 +12,16 @@ from scenarios.results import metrics
 from scenarios.results.island_membership import part_of
 from scenarios.results.plots.case_figures import curves, draw_measure
 from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import mark_events, note_above
+from scenarios.results.plots.marks import finish, mark_events, note_above
 from scenarios.results.plots.style import (
     MOVER,
     OTHER_STYLES,
-    PAGE,
     STAYERS,
     case_styles,
     case_title,
     legend_below,
+    name_panel,
+    nominal_line,
     time_axis,
     widths,
 )
@@ -29,41 +29,27 @@ from scenarios.results.plots.style import (
 
 def plug_and_play(drawing: Drawing) -> Figure:
     """Draw P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
-    with mpl.rc_context(PAGE):
-        count = len(drawing.histories)
-        figure = Figure(figsize=(max(3.7 * count, 5.2), 5.4), layout="constrained")
-        grid = figure.subplots(3, count, sharex=True, sharey="row", squeeze=False)
-        for (top, middle, bottom), (case, history) in zip(grid.T, drawing.histories.items(), strict=True):
-            alone = replace(drawing, histories={case: history})
-            present = history.present
-            for i, name in enumerate(drawing.nameplates.names):
-                colour, dashes, width = MOVER if not present[:, i].all() else STAYERS[drawing.nameplates.GFM[i]]
-                top.plot(
-                    history.t, history.P[:, i] / drawing.nameplates.s[i], dashes, color=colour, lw=width, label=name
-                )
-            top.set_title(case_title(drawing, case), loc="left")
-            curves(middle, alone, metrics.mean_frequency)
-            middle.axhline(drawing.f_nom, color="#000000", linewidth=0.6, zorder=1)
-            middle.ticklabel_format(axis="y", useOffset=False)
-            curves(bottom, alone, metrics.mean_voltage)
-            for panel in (top, middle, bottom):
-                time_axis(panel, alone)
-                mark_events(panel, drawing, labelled=panel is top)
-        for panel in grid[:-1].flat:
-            panel.set_xlabel("")
-        for panel, label in zip(
-            grid[:, 0], ("P (pu of rating)", "f, mean of the GFM (Hz)", "mean V (pu)"), strict=True
-        ):
-            panel.set_ylabel(label)
-        lines = {
-            line.get_color(): line for line in grid[0, 0].get_lines() if line.get_label() in drawing.nameplates.names
-        }
-        on = np.all([history.present.all(axis=0) for history in drawing.histories.values()], axis=0)
-        movers = ", ".join(name for name, stays in zip(drawing.nameplates.names, on.tolist(), strict=True) if not stays)
-        kinds = {MOVER[0]: movers, STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
-        shown = [(line, kinds[str(colour)]) for colour, line in lines.items()]
-        handles, labels = [line for line, _ in shown], [label for _, label in shown]
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    count, nameplates = len(drawing.histories), drawing.nameplates
+    figure = Figure(figsize=(max(3.7 * count, 5.2), 5.4), layout="constrained")
+    grid = figure.subplots(3, count, sharex=True, sharey="row", squeeze=False)
+    stays = np.all([history.present.all(axis=0) for history in drawing.histories.values()], axis=0)
+    for (top, middle, bottom), (case, history) in zip(grid.T, drawing.histories.items(), strict=True):
+        alone, absent = replace(drawing, histories={case: history}), ~history.present
+        for i, name in enumerate(nameplates.names):
+            colour, dashes, width = MOVER if absent[:, i].any() else STAYERS[nameplates.GFM[i]]
+            top.plot(history.t, history.P[:, i] / nameplates.s[i], dashes, color=colour, lw=width, label=name)
+        top.set_title(case_title(drawing, case), loc="left")
+        curves(middle, alone, metrics.mean_frequency)
+        nominal_line(middle, drawing.f_nom)
+        curves(bottom, alone, metrics.mean_voltage)
+    for panel, label in zip(grid[:, 0], ("P (pu of rating)", "f, mean of the GFM (Hz)", "mean V (pu)"), strict=True):
+        panel.set_ylabel(label)
+    lines = {line.get_color(): line for line in grid[0, 0].get_lines()}
+    movers = ", ".join(name for name, here in zip(nameplates.names, stays.tolist(), strict=True) if not here)
+    kinds = {MOVER[0]: movers, STAYERS[True][0]: "grid-forming", STAYERS[False][0]: "grid-following"}
+    shown = [(line, kinds[str(colour)]) for colour, line in lines.items()]
+    figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=len(shown))
+    finish(grid, drawing)
     return figure
 
 
@@ -113,34 +99,24 @@ def available_power(drawing: Drawing) -> Figure:
     first = drawing.limited[0]
     at = drawing.nameplates.names.index(first)
     others = np.array([name not in drawing.limited for name in drawing.nameplates.names])
-    with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(7.4, 4.8), layout="constrained")
-        grid = figure.subplots(2, 2, sharex=True)
-        top, beside, below, last = grid.flat
-        styles = case_styles(drawing.histories)
-        for case, history in drawing.histories.items():
-            colour, dashes, width = styles[case]
-            share = history.P / drawing.nameplates.s
-            ahead = history.P_set[:, at] / drawing.nameplates.s[at] - share[:, at]
-            for panel, y in ((top, share[:, at]), (beside, share[:, others].mean(axis=1)), (last, ahead)):
-                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width)
-        beside.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
-        draw_measure(below, drawing, "frequency")
-        _keep_in_view(below, drawing)
-        texts = (
-            (top, f"Power of {first}", "P (pu of rating)"),
-            (beside, "Power of the inverters that are not limited", "their mean, P (pu of rating)"),
-            (last, f"Set-point of {first} ahead of its power", "P_set - P (pu of rating)"),
-        )
-        for panel, title, label in texts:
-            panel.set_title(title, loc="left")
-            panel.set_ylabel(label)
-            time_axis(panel, drawing)
-        for panel in grid.flat:
-            mark_events(panel, drawing, labelled=panel in (top, beside))
-        for panel in grid[0]:
-            panel.set_xlabel("")
-        legend_below(figure, below)
+    figure = Figure(figsize=(7.4, 4.8), layout="constrained")
+    grid = figure.subplots(2, 2, sharex=True)
+    top, beside, below, last = grid.flat
+    for (colour, dashes, width), history in zip(
+        case_styles(drawing.histories).values(), drawing.histories.values(), strict=True
+    ):
+        share = history.P / drawing.nameplates.s
+        ahead = history.P_set[:, at] / drawing.nameplates.s[at] - share[:, at]
+        for panel, y in ((top, share[:, at]), (beside, share[:, others].mean(axis=1)), (last, ahead)):
+            panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width)
+    beside.axhline(1.0, color="#000000", linewidth=0.6, zorder=1)
+    draw_measure(below, drawing, "frequency")
+    _keep_in_view(below, drawing)
+    name_panel(top, f"Power of {first}", "P (pu of rating)")
+    name_panel(beside, "Power of the inverters that are not limited", "their mean, P (pu of rating)")
+    name_panel(last, f"Set-point of {first} ahead of its power", "P_set - P (pu of rating)")
+    finish(grid, drawing)
+    legend_below(figure, below)
     return figure
 
 
@@ -157,37 +133,27 @@ def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
 
 def microgrids(drawing: Drawing, case: str) -> Figure:
     """Draw P and Q in total, f and mean V of each part that becomes an island, over time."""
-    with mpl.rc_context(PAGE):
-        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
-        grid = figure.subplots(2, 2, sharex=True)
-        width = widths(len(drawing.islands))
-        for number, (name, members) in enumerate(drawing.islands.items()):
-            history, nameplates = part_of(drawing.histories[case], drawing.nameplates, members)
-            colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
-            values = (
-                history.P.sum(axis=1) / 1e3,
-                history.Q.sum(axis=1) / 1e3,
-                metrics.mean_frequency(history, nameplates),
-                metrics.mean_voltage(history, nameplates),
-            )
-            label = drawing.island_titles.get(name, f"island of {name}")
-            for panel, y in zip(grid.flat, values, strict=True):
-                panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
-        words = (
-            ("Real power", "P in total (kW)"),
-            ("Reactive power", "Q in total (kvar)"),
-            ("Frequency", "mean of its GFM, f (Hz)"),
-            ("Voltage", "mean of its inverters, V (pu)"),
+    figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+    grid = figure.subplots(2, 2, sharex=True)
+    width = widths(len(drawing.islands))
+    for number, (name, members) in enumerate(drawing.islands.items()):
+        history, nameplates = part_of(drawing.histories[case], drawing.nameplates, members)
+        colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
+        values = (
+            history.P.sum(axis=1) / 1e3,
+            history.Q.sum(axis=1) / 1e3,
+            metrics.mean_frequency(history, nameplates),
+            metrics.mean_voltage(history, nameplates),
         )
-        for panel, (title, label) in zip(grid.flat, words, strict=True):
-            panel.set_title(title, loc="left")
-            panel.set_ylabel(label)
-            panel.ticklabel_format(axis="y", useOffset=False)
-            time_axis(panel, drawing)
-            mark_events(panel, drawing, labelled=title in ("Real power", "Reactive power"))
-        for panel, nominal in ((grid[1, 0], drawing.f_nom), (grid[1, 1], 1.0)):
-            panel.axhline(nominal, color="#000000", linewidth=0.6, zorder=1)
-        for panel in grid[0]:
-            panel.set_xlabel("")
-        legend_below(figure, grid[0, 0], one_row=True)
+        label = drawing.island_titles.get(name, f"island of {name}")
+        for panel, y in zip(grid.flat, values, strict=True):
+            panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
+    name_panel(grid[0, 0], "Real power", "P in total (kW)")
+    name_panel(grid[0, 1], "Reactive power", "Q in total (kvar)")
+    name_panel(grid[1, 0], "Frequency", "mean of its GFM, f (Hz)")
+    name_panel(grid[1, 1], "Voltage", "mean of its inverters, V (pu)")
+    nominal_line(grid[1, 0], drawing.f_nom)
+    nominal_line(grid[1, 1], 1.0)
+    finish(grid, drawing)
+    legend_below(figure, grid[0, 0], one_row=True)
     return figure

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from scenarios.results.plots.drawing import Drawing, Mark
+from scenarios.results.plots.style import time_axis
+
+Panels = NDArray[Any]
+"""Panels of a figure, rows by columns."""
 
 TextSide = Literal["left", "center", "right"]
 """Which part of a text stands at the line."""
@@ -58,6 +63,16 @@ def mark_events(
             note_above(axes, text, mark.t, "data", side, colour=GREY if colour == BLACK else colour)
             lines = max(lines, text.count("\n") + 1)
     axes.set_title(axes.get_title(loc="left"), loc="left", pad=5.0 + 9.0 * lines)
+
+
+def finish(grid: Panels, drawing: Drawing) -> None:
+    """Give panels their axis of time and the marks of events: words above the top row, "time" below the bottom row."""
+    for row, panels in enumerate(grid):
+        for panel in panels:
+            time_axis(panel, drawing)
+            mark_events(panel, drawing, labelled=row == 0)
+            if row < len(grid) - 1:
+                panel.set_xlabel("")
 
 
 def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:

@@ -167,6 +167,18 @@ def time_axis(axes: Axes, drawing: Drawing) -> None:
     axes.set_xlim(0.0, max(float(history.t[-1]) for history in drawing.histories.values()))
 
 
+def name_panel(axes: Axes, title: str, label: str) -> None:
+    """Write the title above a panel and the label of its vertical axis."""
+    axes.set_title(title, loc="left")
+    axes.set_ylabel(label)
+
+
+def nominal_line(axes: Axes, value: float) -> None:
+    """Draw a fine line at a nominal value, and write numbers near it in full."""
+    axes.axhline(value, color="#000000", linewidth=0.6, zorder=1)
+    axes.ticklabel_format(axis="y", useOffset=False)
+
+
 def words(drawing: Drawing, case: str) -> str:
     """Return the name of a case and what it is, for legends and titles."""
     title = drawing.titles.get(case, "")

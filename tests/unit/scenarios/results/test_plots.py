@@ -11,11 +11,9 @@ from matplotlib.image import imread
 from plant.tables import read_feeder
 from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import IslandInterval
-from scenarios.results.plots.case_figures import overview
 from scenarios.results.plots.drawing import Drawing, Mark
-from scenarios.results.plots.inverter_figures import microgrids, powers
 from scenarios.results.plots.marks import GAP, LETTER, placed
-from scenarios.results.plots.run_figures import draw_all
+from scenarios.results.plots.run_figures import draw, draw_all
 from scenarios.results.plots.style import CASE_STYLES, Format, case_style, save
 from scenarios.schema import catalogue, load_scenario
 
@@ -62,7 +60,7 @@ def test_every_figure_of_the_paper_is_drawn(tmp_path: Path, cases: tuple[str, ..
 
 def test_a_case_has_one_colour_everywhere_and_no_two_share_it() -> None:
     """A reader who knows a case in one figure knows it in all, whichever cases are shown beside it."""
-    page = overview(drawing("IV", "II"))
+    page = draw(drawing("IV", "II"), "overview")
 
     for axes in page.axes:
         colours = {line.get_label(): line.get_color() for line in axes.get_lines() if " " in str(line.get_label())}
@@ -79,7 +77,7 @@ def catalogue_cases() -> list[list[str]]:
 @pytest.mark.parametrize("cases", [*catalogue_cases(), ["a", "b", "c", "d", "e", "f"]], ids=" ".join)
 def test_no_curve_hides_another_that_it_lies_upon(cases: list[str]) -> None:
     """Where all cases coincide, each is seen: every later curve is narrower than those below it."""
-    page = overview(drawing(*cases))
+    page = draw(drawing(*cases), "overview")
 
     for axes in page.axes:
         drawn = [line for line in axes.get_lines() if line.get_label().split(":")[0] in cases]
@@ -92,7 +90,7 @@ def test_no_curve_hides_another_that_it_lies_upon(cases: list[str]) -> None:
 def test_a_microgrid_is_no_mean_of_all_inverters() -> None:
     """Its frequency and voltage are means of its own inverters, and the axes say so."""
     islands = {"inv1": ("inv1", "inv2", "inv3"), "inv4": ("inv4", "inv5", "inv6")}
-    page = microgrids(replace(drawing("IV"), islands=islands), "IV")
+    page = draw(replace(drawing("IV"), islands=islands), "microgrids_IV")
 
     assert [axes.get_ylabel() for axes in page.axes[2:]] == ["mean of its GFM, f (Hz)", "mean of its inverters, V (pu)"]
 
@@ -102,9 +100,9 @@ def test_a_figure_has_the_same_bytes_each_time_it_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: Format
 ) -> None:
     """No date, no random name: a folder of figures can be compared byte by byte."""
-    (first,) = save(overview(drawing("I", "IV")), tmp_path / "first", "overview", [kind])
+    (first,) = save(draw(drawing("I", "IV"), "overview"), tmp_path / "first", "overview", [kind])
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1")  # what matplotlib takes for the time of writing, if it writes one
-    (second,) = save(overview(drawing("I", "IV")), tmp_path / "second", "overview", [kind])
+    (second,) = save(draw(drawing("I", "IV"), "overview"), tmp_path / "second", "overview", [kind])
 
     assert first.read_bytes() == second.read_bytes()
     assert [path.name for path in first.parent.iterdir()] == [f"overview.{kind}"]
@@ -112,7 +110,7 @@ def test_a_figure_has_the_same_bytes_each_time_it_is_written(
 
 def test_every_axis_says_its_quantity_and_events_are_marked() -> None:
     """Frequencies are in Hz, voltages in pu, time in s; both events have their line, their label, and what happens."""
-    page = overview(drawing("I"))
+    page = draw(drawing("I"), "overview")
 
     assert [axes.get_ylabel() for axes in page.axes] == [
         "mean of the GFM, f (Hz)",
@@ -131,7 +129,7 @@ def test_the_voltage_panel_shows_what_is_judged() -> None:
     history = it.histories["IV"]
     history.V[:, ::2] *= 1.02
     history.V[:, 1::2] *= 0.98
-    page = overview(it)
+    page = draw(it, "overview")
 
     line = next(line for line in page.axes[2].get_lines() if line.get_label() == "IV: made up")
     assert np.asarray(line.get_ydata()) == pytest.approx(0.02)
@@ -180,7 +178,7 @@ def test_where_there_are_islands_the_worst_is_drawn() -> None:
     }
     history = it.histories["IV"]
     history.f[history.t > 4.0] = 60.0 + np.repeat([-0.015, 0.03, -0.015], 3)
-    page = overview(replace(it, island_intervals=[IslandInterval(4.0, 7.0, islands)]))
+    page = draw(replace(it, island_intervals=[IslandInterval(4.0, 7.0, islands)]), "overview")
 
     line = next(line for line in page.axes[0].get_lines() if line.get_label() == "IV: made up")
     drawn = np.asarray(line.get_ydata())
@@ -200,7 +198,7 @@ def test_an_island_without_load_draws_no_dust() -> None:
     history = it.histories["IV"]
     history.P[history.t > 4.0] = 1e-6 * np.array([1, -1, 1, -1, 1, -1, 1, -1, 0.001])
     history.Q[history.t > 4.0] *= np.array([1, 100, -98, 1, 100, -98, 1, 1, 1])
-    page = overview(it)
+    page = draw(it, "overview")
 
     line = next(line for line in page.axes[1].get_lines() if line.get_label() == "IV: made up")
     drawn = np.asarray(line.get_ydata())
@@ -211,7 +209,7 @@ def test_an_island_without_load_draws_no_dust() -> None:
 
 def test_the_lowest_panel_of_every_column_has_its_times() -> None:
     """With three cases there is nothing below the second, so its own axis tells the time."""
-    panels = powers(drawing("ring", "path", "star"), GFM=False).axes
+    panels = draw(drawing("ring", "path", "star"), "power_GFL").axes
 
     assert [axes.get_xlabel() for axes in panels if axes.get_visible()] == ["", "time (s)", "time (s)"]
     assert [axes.xaxis.get_tick_params()["labelbottom"] for axes in panels if axes.get_visible()] == [False, True, True]
