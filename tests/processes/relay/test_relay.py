@@ -12,7 +12,7 @@ from contextlib import closing
 import pytest
 
 from netem.draws import Stream
-from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayError
+from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayCommandError, RelayError
 
 PATIENCE = 20.0
 """Longest wait (s) of a socket; on an idle machine none waits long."""
@@ -200,6 +200,23 @@ def wait_for(relay: Relay, what: str) -> None:
     """Ask the relay what it counted until it says so; pytest's time limit ends it otherwise."""
     while what not in relay.do("show"):
         pass
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("", "begins with one of delay, jitter"),
+        ("delay", "begins with one of delay"),
+        ("delay 0.1 0.2", "begins with one of delay"),
+        ("slow 3", "begins with one of delay"),
+        ("stall -1", "a duration is positive, got -1 s"),
+        ("loss much", '"much" is no number'),
+    ],
+)
+def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -> None:
+    """The error of a line that is no command lists the commands, or says what is wrong with the number."""
+    with Relay("udp/127.0.0.1:0", "udp/127.0.0.1:1") as relay, pytest.raises(RelayCommandError, match=complaint):
+        relay.do(line)
 
 
 def test_one_direction_can_be_changed_alone_and_a_bad_change_changes_nothing(target: socket.socket) -> None:

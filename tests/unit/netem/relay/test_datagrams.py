@@ -6,7 +6,6 @@ import pytest
 from scipy.stats import binom, kstest
 
 from netem.draws import Stream
-from netem.relay import Relay, RelayCommandError
 from netem.relay.direction import Direction, Faults, FaultsError
 from netem.relay.line import Line
 from netem.relay.packets import NEVER, Datagrams
@@ -75,23 +74,6 @@ def test_a_full_queue_drops_what_comes_and_the_rate_is_kept() -> None:
 
     assert 1000 * 0.5 <= len(delays) <= 1000 * 0.5 + 2000 / 100
     assert max(delays.values()) == pytest.approx(2000 / 1000.0, abs=0.11)
-
-
-@pytest.mark.parametrize(
-    ("line", "complaint"),
-    [
-        ("", "begins with one of delay, jitter"),
-        ("delay", "begins with one of delay"),
-        ("delay 0.1 0.2", "begins with one of delay"),
-        ("slow 3", "begins with one of delay"),
-        ("stall -1", "a duration is positive, got -1 s"),
-        ("loss much", '"much" is no number'),
-    ],
-)
-def test_a_line_that_is_not_understood_is_explained(line: str, complaint: str) -> None:
-    """The error of a line that is no command lists the commands, or says what is wrong with the number."""
-    with Relay("udp/127.0.0.1:0", "udp/127.0.0.1:1") as relay, pytest.raises(RelayCommandError, match=complaint):
-        relay.do(line)
 
 
 @pytest.mark.parametrize(
