@@ -88,7 +88,7 @@ class Prediction:
     ----------
     title : str
         Scenario and case.
-    fleet : InverterGroup
+    inverters : InverterGroup
         The inverters at the start, and who listens to whom.
     islands : list of (IslandStep, InverterGroup)
         Islands after each event.
@@ -99,13 +99,13 @@ class Prediction:
     def __init__(
         self,
         title: str,
-        fleet: InverterGroup,
+        inverters: InverterGroup,
         islands: list[tuple[IslandStep, InverterGroup]],
         plant: VarResponse | None,
     ) -> None:
         self.title = title
         """Scenario and case."""
-        self._fleet, self._islands, self._plant = fleet, islands, plant
+        self._inverters, self._islands, self._plant = inverters, islands, plant
 
     @cached_property
     def modes(self) -> pd.Series:
@@ -113,7 +113,7 @@ class Prediction:
 
         Empty where nobody runs a secondary law.
         """
-        found = asdict(modes(self._fleet)) if self._acts else {}
+        found = asdict(modes(self._inverters)) if self._acts else {}
         return pd.Series(found, name=self.title, dtype=float)
 
     @cached_property
@@ -124,7 +124,10 @@ class Prediction:
         """
         kinds = _LIMITS if self._acts else {}
         rows = {
-            words: {"continuous": delay_limit_closed(self._fleet, kind), "discrete": delay_limit(self._fleet, kind)}
+            words: {
+                "continuous": delay_limit_closed(self._inverters, kind),
+                "discrete": delay_limit(self._inverters, kind),
+            }
             for words, kind in kinds.items()
         }
         frame = pd.DataFrame.from_dict(rows, orient="index", columns=["continuous", "discrete"], dtype=float)
@@ -158,11 +161,11 @@ class Prediction:
 
     @property
     def _acts(self) -> bool:
-        return bool(self._fleet.acts.any())
+        return bool(self._inverters.acts.any())
 
     def __str__(self) -> str:
         """Return what the command `gridpeers predict` prints."""
-        return case_text(self.title, self._fleet, self._islands, self._plant)
+        return case_text(self.title, self._inverters, self._islands, self._plant)
 
     def __repr__(self) -> str:
         return f"<Prediction {self.title}>"

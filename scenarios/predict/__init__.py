@@ -1,17 +1,15 @@
-"""What theory says of a scenario before it is run: modes, settling times, limits of delay, times after an event.
-
-For experiments that draw predictions beside measurements:
+"""Predictions by theory, before a scenario is run: modes, settling times, limits of delay, times after an event.
 
     from scenarios.predict.inverter_group import inverter_group_of
     from scenarios.predict.times import LoadStep, predicted_times
     from scenarios.predict.delay_limits import delay_limit
     from scenarios.predict.closed_form import delay_limit_closed, modes
 
-    fleet = inverter_group_of(scenario, feeder, "IV")
-    predicted_times(fleet, link_delay_s=0.1, loss=0.3)     Times(restore_s, share_s, stable, note)
-    delay_limit(fleet, "local loop")                       s, exact for law and plant in discrete time
-    delay_limit_closed(fleet, "disagreement")              s, by the continuous equations
-    modes(fleet)                                           Modes(lambda_2, lambda_max, ...)
+    inverters = inverter_group_of(scenario, feeder, "IV")
+    predicted_times(inverters, link_delay_s=0.1, loss=0.3)     Times(restore_s, share_s, stable, note)
+    delay_limit(inverters, "local loop")                       s, exact for law and plant in discrete time
+    delay_limit_closed(inverters, "disagreement")              s, by the continuous equations
+    modes(inverters)                                           Modes(lambda_2, lambda_max, ...)
 
 Nothing is imported here, so that `gridpeers --help` does not wait for numpy. docs/theory.md has the equations, and
 how far they met the plant.

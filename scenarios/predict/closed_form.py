@@ -1,4 +1,4 @@
-r"""What follows from the graph alone, in continuous time: rates, settling times, step limits, limits of delay.
+r"""Theory from the graph alone, in continuous time: rates, settling times, step limits, limits of delay.
 
 With y = m_p P_set, K = diag(kappa), the Laplacian L, leaders g and the quasi-steady plant e = w y + const, the paper's
 (12), (13) are
@@ -27,10 +27,10 @@ ZERO = 1e-9
 """Rates and eigenvalues below this are zeros with rounding (1/s)."""
 
 DelayKind = Literal["neighbours", "disagreement", "local loop"]
-"""What comes late: the neighbours' values alone; own and neighbours' values alike; measurement or set-point."""
+"""Which values come late: the neighbours' alone; own and neighbours' values alike; measurement or set-point."""
 
 
-def laplacian(fleet: InverterGroup) -> Floats:
+def laplacian(inverters: InverterGroup) -> Floats:
     """Return Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only.
 
     Examples
@@ -38,20 +38,20 @@ def laplacian(fleet: InverterGroup) -> Floats:
     >>> laplacian(InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
-    A = fleet.A[np.ix_(fleet.acts, fleet.acts)]
+    A = inverters.A[np.ix_(inverters.acts, inverters.acts)]
     return np.asarray(np.diag(A.sum(axis=1)) - A)
 
 
-def groups(fleet: InverterGroup) -> tuple[tuple[str, ...], ...]:
-    """Return who is connected with whom by links, among those that run the law, in the order of the names.
+def groups(inverters: InverterGroup) -> tuple[tuple[str, ...], ...]:
+    """Return the connected parts of the graph of those that run the law, in the order of the names.
 
     Examples
     --------
     >>> groups(InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=np.diag([1.0, 0.0], k=1)))
     (('a', 'b'), ('c',))
     """
-    acting = [name for name, acts in zip(fleet.names, fleet.acts.tolist(), strict=True) if acts]
-    count, label = connected_components(fleet.A[np.ix_(fleet.acts, fleet.acts)], directed=False)
+    acting = [name for name, acts in zip(inverters.names, inverters.acts.tolist(), strict=True) if acts]
+    count, label = connected_components(inverters.A[np.ix_(inverters.acts, inverters.acts)], directed=False)
     return tuple(tuple(name for name, of in zip(acting, label.tolist(), strict=True) if of == k) for k in range(count))
 
 
@@ -108,8 +108,8 @@ def settling_in_ticks(spectral_radius: float, T_c: float) -> float:
     return settling(-math.log(spectral_radius) / T_c) if spectral_radius > 0.0 else 0.0
 
 
-def modes(fleet: InverterGroup) -> Modes:
-    """Return the modes of a fleet's secondary law by the continuous equations.
+def modes(inverters: InverterGroup) -> Modes:
+    """Return the modes of the secondary law of some inverters, by the continuous equations.
 
     Raises
     ------
@@ -133,21 +133,21 @@ def modes(fleet: InverterGroup) -> Modes:
     >>> round(found.lambda_2, 6), round(found.frequency_rate, 6), round(found.slowest_rate, 6)
     (9.0, 4.0, 4.0)
     """
-    acts = fleet.acts
+    acts = inverters.acts
     if not acts.any():
         raise ValueError("nobody runs the secondary law, so it has no modes; take a case with secondary control")
-    L, kappa = laplacian(fleet), fleet.kappa[acts]
+    L, kappa = laplacian(inverters), inverters.kappa[acts]
     lambdas = np.sort(np.linalg.eigvals(L).real)
     sharing = np.sort(np.linalg.eigvals(kappa[:, None] * L).real)
-    combined = kappa[:, None] * (L + np.outer(fleet.leads[acts], fleet.weight[acts]))
+    combined = kappa[:, None] * (L + np.outer(inverters.leads[acts], inverters.weight[acts]))
     rates = np.sort(np.linalg.eigvals(combined).real)
     alone = len(kappa) == 1
     return Modes(
-        links=round(float(fleet.A[np.ix_(acts, acts)].sum()) / 2.0),
+        links=round(float(inverters.A[np.ix_(acts, acts)].sum()) / 2.0),
         lambda_2=math.inf if alone else _zeroed(lambdas[1]),
         lambda_max=_zeroed(lambdas[-1]),
         kappa=float(kappa.mean()),
-        frequency_rate=float(fleet.weight[acts].sum() * fleet.leads.sum() / (1.0 / kappa).sum()),
+        frequency_rate=float(inverters.weight[acts].sum() * inverters.leads.sum() / (1.0 / kappa).sum()),
         sharing_rate=math.inf if alone else _zeroed(sharing[1]),
         slowest_rate=float(min((rate for rate in rates if abs(rate) > ZERO), default=0.0)),
         fastest_rate=_zeroed(rates[-1]),
@@ -159,7 +159,7 @@ def _zeroed(value: float) -> float:
     return 0.0 if abs(value) < ZERO else float(value)
 
 
-def delay_limit_closed(fleet: InverterGroup, kind: DelayKind) -> float:
+def delay_limit_closed(inverters: InverterGroup, kind: DelayKind) -> float:
     """Return the longest delay (s) with which the continuous law is stable, the same on every link.
 
     - "neighbours": infinite on every graph (Atay 2013 without leaders; with them docs/theory.md).
@@ -175,11 +175,11 @@ def delay_limit_closed(fleet: InverterGroup, kind: DelayKind) -> float:
     >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)
     (0.0145, 0.3927)
     """
-    found = modes(fleet)
+    found = modes(inverters)
     if kind == "neighbours":
         return math.inf
     if kind == "disagreement":
-        rate = float(np.linalg.eigvals(fleet.kappa[fleet.acts][:, None] * laplacian(fleet)).real.max())
+        rate = float(np.linalg.eigvals(inverters.kappa[inverters.acts][:, None] * laplacian(inverters)).real.max())
     else:
         rate = found.frequency_rate
     return math.inf if rate <= ZERO else math.pi / (2.0 * rate)

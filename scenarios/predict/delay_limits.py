@@ -16,13 +16,13 @@ ANGLES = 600
 
 
 def delay_limit(
-    case: InverterGroup, kind: DelayKind | str, *, plant: PlantModel = "lagged", longest_s: float = 3.0
+    inverters: InverterGroup, kind: DelayKind | str, *, plant: PlantModel = "lagged", longest_s: float = 3.0
 ) -> float:
     """Return the longest delay (s), the same for all, up to which the loop in discrete time is stable.
 
     Parameters
     ----------
-    case : InverterGroup
+    inverters : InverterGroup
         From `inverter_group_of`.
     kind : str
         "neighbours": agent to agent, own value fresh. "disagreement": own value as late as the neighbours'. "local
@@ -52,22 +52,22 @@ def delay_limit(
     }
     if kind not in ticks:
         raise ValueError(f'no kind of delay "{kind}"; kinds are {", ".join(ticks)}')
-    if not Loop(fleet=case, plant=plant).stable:
+    if not Loop(inverters=inverters, plant=plant).stable:
         return math.nan
-    if kind != "local loop" and not case.heard.any():
+    if kind != "local loop" and not inverters.heard.any():
         return math.inf
     first = 1.0
     if kind == "neighbours":  # long delays make large matrices: begin where the sweep says that something happens
-        first = max(1.0, 0.9 * first_crossing(case, plant=plant) - 1.0)
+        first = max(1.0, 0.9 * first_crossing(inverters, plant=plant) - 1.0)
     unmoved = 1 if kind != "local loop" else 0  # every state takes one period in any case
-    last = round(longest_s / case.T_c)
+    last = round(longest_s / inverters.T_c)
     for n in range(math.floor(min(first, last + 1.0)), last + 1):
-        if not Loop(fleet=case, ticks=ticks[kind](n), plant=plant).stable:
-            return (n - 1 + unmoved) * case.T_c
+        if not Loop(inverters=inverters, ticks=ticks[kind](n), plant=plant).stable:
+            return (n - 1 + unmoved) * inverters.T_c
     return math.inf
 
 
-def first_crossing(case: InverterGroup, *, plant: PlantModel = "lagged") -> float:
+def first_crossing(inverters: InverterGroup, *, plant: PlantModel = "lagged") -> float:
     """Return shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
 
     With own values apart from the neighbours' the loop is F(z) y = z^{-n} S y. A mode can stand on the unit circle, z =
@@ -78,9 +78,9 @@ def first_crossing(case: InverterGroup, *, plant: PlantModel = "lagged") -> floa
     ----------
     Chen, Latchman, IEEE Trans. Autom. Control 40(9), 1995: frequency sweeping tests, in continuous time.
     """
-    acts, n, held = case.acts, case.n, response(case, plant)
-    a, b = Loop(fleet=case).gains
-    share = (a / np.maximum(case.degree, 1.0))[:, None] * case.heard
+    acts, n, held = inverters.acts, inverters.n, response(inverters, plant)
+    a, b = Loop(inverters=inverters).gains
+    share = (a / np.maximum(inverters.degree, 1.0))[:, None] * inverters.heard
     shortest, before = math.inf, np.zeros(int(acts.sum()))
     for theta in np.geomspace(1e-3, math.pi, ANGLES):
         z = np.exp(1j * theta)

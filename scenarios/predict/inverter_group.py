@@ -1,9 +1,9 @@
-"""What a prediction is made for: the inverters of one island under one rule of control, as arrays."""
+"""The inverters of one island under one rule of control, as arrays: predictions are made for them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,8 @@ class InverterGroup:
     Three alike, one of them a leader, on a path:
 
     >>> A = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    >>> fleet = InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
-    >>> fleet.kappa.round(2).tolist(), fleet.weight.round(2).tolist()
+    >>> inverters = InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
+    >>> inverters.kappa.round(2).tolist(), inverters.weight.round(2).tolist()
     ([14.29, 14.29, 14.29], [0.33, 0.33, 0.33])
     """
 
@@ -75,7 +75,7 @@ class InverterGroup:
 
     @property
     def leads(self) -> Flags:
-        """Who integrates the frequency error: GFM that run the law."""
+        """Inverters that integrate the frequency error: GFM that run the law."""
         leads: Flags = self.GFM & self.acts
         return leads
 
@@ -101,19 +101,10 @@ class InverterGroup:
         return np.asarray(self.heard.sum(axis=1))
 
     def part(self, which: NDArray[np.bool_]) -> InverterGroup:
-        """Return the fleet of some of the inverters, e.g. of those of an island; who is not in it is not heard."""
+        """Return some of the inverters, e.g. those of an island; the others are not heard."""
         at = np.flatnonzero(which)
         arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
-        return InverterGroup(
-            names=tuple(self.names[i] for i in at.tolist()),
-            A=self.A[np.ix_(at, at)],
-            gains=self.gains,
-            f_nom=self.f_nom,
-            T_c=self.T_c,
-            gfm=self.gfm,
-            gfl=self.gfl,
-            **arrays,
-        )
+        return replace(self, names=tuple(self.names[i] for i in at.tolist()), A=self.A[np.ix_(at, at)], **arrays)
 
 
 def inverter_group_of(
@@ -135,15 +126,15 @@ def inverter_group_of(
     case : str
         Name of the case.
     roster : Collection[str], optional
-        Who takes part in the run; the graph's rule is applied to these. Those of the start, if left out.
+        Inverters that take part in the run; the graph's rule is applied to these. Those of the start, if left out.
     island : Collection[str], optional
-        Who stands in the island; the others are not heard. All of the roster, if left out.
+        Inverters of the island; the others are not heard. All of the roster, if left out.
 
     Examples
     --------
     >>> from scenarios.schema import load_scenario
-    >>> fleet = inverter_group_of(*load_scenario("islanding"), "IV")
-    >>> fleet.n, fleet.A.sum(), fleet.leads.sum()
+    >>> inverters = inverter_group_of(*load_scenario("islanding"), "IV")
+    >>> inverters.n, inverters.A.sum(), inverters.leads.sum()
     (9, np.float64(72.0), np.int64(3))
     """
     rule = scenario.cases[case]
@@ -160,7 +151,7 @@ def inverter_group_of(
     )
     without = without_agent(scenario, case)
     GFM = np.array([row.kind == "GFM" for row in rows.values()], bool)
-    fleet = InverterGroup(
+    inverters = InverterGroup(
         names=tuple(rows),
         GFM=GFM,
         A=_adjacency(control, rows, without),
@@ -175,7 +166,7 @@ def inverter_group_of(
         gfm=scenario.plant.gfm,
         gfl=scenario.plant.gfl,
     )
-    return fleet if island is None else fleet.part(np.array([name in island for name in rows], bool))
+    return inverters if island is None else inverters.part(np.array([name in island for name in rows], bool))
 
 
 def _adjacency(control: Control, rows: Mapping[str, InverterRow], without: Collection[str]) -> Floats:

@@ -38,7 +38,7 @@ AT_REST = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Ticks:
-    """Delays in control periods, and losses; a number holds for all, a mapping for whom it names (0 for the rest)."""
+    """Delays in control periods, and losses; a number holds for all, a mapping for those that it names (others: 0)."""
 
     link: int | Mapping[LinkEnds, int] = 0
     """Of neighbours' states beyond the one period they always take, by (src, dst)."""
@@ -54,7 +54,7 @@ class Ticks:
 
 @dataclass(frozen=True)
 class Path:
-    """What happened, at the ticks after the load's step."""
+    """Frequency, powers and set-points at the ticks after the load's step."""
 
     t: Floats
     """Time since the step (s)."""
@@ -82,18 +82,18 @@ class _Delays:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """Law and plant of one fleet under given delays.
+    """Law and plant of some inverters under given delays.
 
     Examples
     --------
     >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
-    >>> Loop(fleet=nine).spectral_radius < 1.0
+    >>> Loop(inverters=nine).spectral_radius < 1.0
     True
-    >>> Loop(fleet=nine, ticks=Ticks(measurement=40)).spectral_radius < 1.0
+    >>> Loop(inverters=nine, ticks=Ticks(measurement=40)).spectral_radius < 1.0
     False
     """
 
-    fleet: InverterGroup
+    inverters: InverterGroup
     ticks: Ticks = field(default_factory=Ticks)
     plant: PlantModel = "lagged"
     muted: int = 0
@@ -102,7 +102,7 @@ class Loop:
     @cached_property
     def _delays(self) -> _Delays:
         """The delays of every link and inverter, checked."""
-        fleet, names, ticks = self.fleet, self.fleet.names, self.ticks
+        inverters, names, ticks = self.inverters, self.inverters.names, self.ticks
         found = _Delays(
             link=[[_of(ticks.link, (src, dst)) for src in names] for dst in names],
             measurement=[_of(ticks.measurement, name) for name in names],
@@ -116,7 +116,10 @@ class Loop:
         if wrong:
             raise ValueError(f"loss is a probability from 0 to below 1, got {wrong[0]:g}; write 0.3 for 30 %")
         found.lossy += [
-            (i, j) for i in range(fleet.n) for j in range(fleet.n) if fleet.heard[i, j] and found.loss[i][j] > 0.0
+            (i, j)
+            for i in range(inverters.n)
+            for j in range(inverters.n)
+            if inverters.heard[i, j] and found.loss[i][j] > 0.0
         ]
         found.depth = 1 + max(ticks.own, *found.setpoint, *(n for row in found.link for n in row))
         return found
@@ -125,16 +128,16 @@ class Loop:
     def _heard(self) -> Floats:
         """Links that carry something, without those that are muted."""
         if not self.muted:
-            return self.fleet.heard
-        return np.where(np.array(self._delays.link) < self.muted, self.fleet.heard, 0.0)
+            return self.inverters.heard
+        return np.where(np.array(self._delays.link) < self.muted, self.inverters.heard, 0.0)
 
     @property
     def gains(self) -> tuple[Floats, Floats]:
         """Law's factors a_i (part of the way to the neighbours' mean) and g_i b_i (of the frequency error)."""
-        fleet = self.fleet
-        pairs = zip(fleet.kappa.tolist(), self._heard.sum(axis=1).tolist(), strict=True)
-        a = np.array([towards(kappa, d, fleet.T_c) for kappa, d in pairs])
-        return a, np.where(fleet.leads, 1.0 - np.exp(-fleet.kappa * fleet.T_c), 0.0)
+        inverters = self.inverters
+        pairs = zip(inverters.kappa.tolist(), self._heard.sum(axis=1).tolist(), strict=True)
+        a = np.array([towards(kappa, d, inverters.T_c) for kappa, d in pairs])
+        return a, np.where(inverters.leads, 1.0 - np.exp(-inverters.kappa * inverters.T_c), 0.0)
 
     @cached_property
     def _built(self) -> tuple[Floats, Floats, Floats]:
@@ -142,8 +145,8 @@ class Loop:
 
         The state: y(k-1), ..., y(k-H); x(k); e(k-1), ..., e(k-M); held values; the load.
         """
-        fleet, plant = self.fleet, response(self.fleet, self.plant)
-        delays, n, states = self._delays, self.fleet.n, len(plant.A)
+        inverters, plant = self.inverters, response(self.inverters, self.plant)
+        delays, n, states = self._delays, self.inverters.n, len(plant.A)
         link, measurement, setpoint, loss = delays.link, delays.measurement, delays.setpoint, delays.loss
         H, M = delays.depth, max(delays.measurement)
         x0 = H * n
@@ -174,7 +177,7 @@ class Loop:
                 for j in np.flatnonzero(audible[i]).tolist():
                     heard = held[i, j] if (i, j) in held else y(1 + link[i][j], j)
                     row = row + (a[i] * audible[i, j] / degree[i]) * heard
-            if fleet.leads[i]:
+            if inverters.leads[i]:
                 row = row - b[i] * (one[e0 + measurement[i] - 1] if measurement[i] else e_now)
             new.append(row)
         now = np.array([y(setpoint[i], i) if setpoint[i] else new[i] for i in range(n)])
@@ -195,7 +198,7 @@ class Loop:
         matrix = self.matrix
         frozen = np.zeros(matrix.shape[0], bool)
         frozen[-1] = True
-        frozen[: self._delays.depth * self.fleet.n] = np.tile(~self.fleet.acts, self._delays.depth)
+        frozen[: self._delays.depth * self.inverters.n] = np.tile(~self.inverters.acts, self._delays.depth)
         keep = np.flatnonzero(~frozen)
         return np.asarray(matrix[np.ix_(keep, keep)])
 
@@ -205,7 +208,7 @@ class Loop:
 
         One for each further group that nothing connects with the leaders' frequency; delays do not change it.
         """
-        free = Loop(fleet=self.fleet, plant="quasi-steady").free_map
+        free = Loop(inverters=self.inverters, plant="quasi-steady").free_map
         singular = np.linalg.svd(np.eye(len(free)) - free, compute_uv=False)
         return int((singular < AT_REST).sum())
 
@@ -241,11 +244,11 @@ class Loop:
         The measurement of the event's own tick is taken before it, so the first that tells of it is the next one.
         """
         matrix, e_row, power_rows = self._built
-        plant, fleet = response(self.fleet, self.plant), self.fleet
-        n, states, H, lossy = fleet.n, len(plant.A), self._delays.depth, self._delays.lossy
+        plant, inverters = response(self.inverters, self.plant), self.inverters
+        n, states, H, lossy = inverters.n, len(plant.A), self._delays.depth, self._delays.lossy
         z = np.zeros(matrix.shape[0])
         z[: H * n] = np.tile(start, H)
-        x = plant.rest(start, float(fleet.weight @ start))
+        x = plant.rest(start, float(inverters.weight @ start))
         z[H * n : H * n + states] = plant.A @ x + plant.B @ start + plant.E * load
         if lossy:
             z[-1 - len(lossy) : -1] = start[[j for _, j in lossy]]
@@ -258,7 +261,7 @@ class Loop:
             e[k], powers[k] = e_row @ z, power_rows @ z
             z = steps.get(k, step) @ z  # this is tick k + 1, and mute are links with n >= k
             set_points[k] = z[:n]
-        t: Floats = np.arange(1.0, ticks + 1.0) * fleet.T_c
+        t: Floats = np.arange(1.0, ticks + 1.0) * inverters.T_c
         return Path(t, e, powers, set_points)
 
 

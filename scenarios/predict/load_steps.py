@@ -1,8 +1,8 @@
-"""What an event asks of each island: its load before and after, from the scenario's own plant on droop alone.
+"""The load of each island before and after an event, from the scenario's own plant on droop alone.
 
-Without agents and messages the plant runs through the events once (a second or so); what its inverters deliver at the
-end of each window is the load that control has to share. It is the load at the voltages of droop, a percent or two off
-what is drawn once the voltage is restored.
+Without agents and messages the plant runs through the events once (a second or so). At the end of each window its
+inverters deliver the load that control has to share. It is the load at the voltages of droop, a percent or two off the
+load at restored voltages.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class IslandStep:
     t_s: float
     """When (s)."""
     roster: tuple[str, ...]
-    """Everybody on the network then."""
+    """All inverters on the network then."""
     members: tuple[str, ...]
-    """Who stands in the island."""
+    """Inverters of the island."""
     load: LoadStep | None
-    """What they carry before and after; None if they come from several islands."""
+    """Their load before and after; None if they come from several islands."""
 
 
 class LoadError(RuntimeError):

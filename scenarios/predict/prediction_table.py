@@ -31,7 +31,7 @@ TextRow = tuple[str, str, str, str]
 
 
 def case_text(
-    title: str, fleet: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: VarResponse | None
+    title: str, inverters: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: VarResponse | None
 ) -> str:
     """Return everything that is predicted of one case.
 
@@ -39,48 +39,51 @@ def case_text(
     ----------
     title : str
         Heads the table.
-    fleet : InverterGroup
+    inverters : InverterGroup
         Everybody on the network at the start.
     steps : sequence of (IslandStep, InverterGroup)
         Islands after each event, and the inverters in them.
     plant : VarResponse, optional
         For voltage and vars.
     """
-    if not fleet.acts.any():
+    if not inverters.acts.any():
         words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
         return "\n".join([title, *_wrapped(words, "  ")])
-    found = modes(fleet)
-    lines = [title, *_wrapped(_words(fleet, found), "  ")]
-    lines += _aligned([("", "continuous", "our law", ""), *_rows(fleet, found)])
+    found = modes(inverters)
+    lines = [title, *_wrapped(_words(inverters, found), "  ")]
+    lines += _aligned([("", "continuous", "our law", ""), *_rows(inverters, found)])
     for step, island in steps:
         lines += _event(step, island, whole=set(step.members) == set(step.roster))
-    lines += _vars(fleet, plant)
+    lines += _vars(inverters, plant)
     return "\n".join(lines)
 
 
-def _words(fleet: InverterGroup, found: Modes) -> str:
-    apart, leaders = groups(fleet), [name for name, leads in zip(fleet.names, fleet.leads, strict=True) if leads]
-    acting = int(fleet.acts.sum())
-    text = f"{acting} of {fleet.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
-    text += f"kappa {found.kappa:.3g} 1/s; T_c {fleet.T_c:g} s. "
+def _words(inverters: InverterGroup, found: Modes) -> str:
+    apart, leaders = (
+        groups(inverters),
+        [name for name, leads in zip(inverters.names, inverters.leads, strict=True) if leads],
+    )
+    acting = int(inverters.acts.sum())
+    text = f"{acting} of {inverters.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
+    text += f"kappa {found.kappa:.3g} 1/s; T_c {inverters.T_c:g} s. "
     if not leaders:
         text += "Nobody leads, so nobody corrects the frequency. "
     if len(apart) > 1:
         text += f"The graph is not connected; its {len(apart)} parts ({' | '.join(' '.join(part) for part in apart)}) "
         text += "agree on power within themselves only, so sharing among all never comes. "
-    if idle := int((fleet.shares & ~fleet.acts).sum()):
+    if idle := int((inverters.shares & ~inverters.acts).sum()):
         text += f"The other {idle} with an agent keep their set-points and take no part in sharing. "
-    if agentless := [name for name, shares in zip(fleet.names, fleet.shares, strict=True) if not shares]:
+    if agentless := [name for name, shares in zip(inverters.names, inverters.shares, strict=True) if not shares]:
         text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
     return text.rstrip()
 
 
-def _rows(fleet: InverterGroup, found: Modes) -> list[TextRow]:
-    loop = Loop(fleet=fleet)
-    slowest = settling_in_ticks(loop.spectral_radius, fleet.T_c) if loop.stable else math.inf
+def _rows(inverters: InverterGroup, found: Modes) -> list[TextRow]:
+    loop = Loop(inverters=inverters)
+    slowest = settling_in_ticks(loop.spectral_radius, inverters.T_c) if loop.stable else math.inf
     kinds: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
-    limits = {kind: delay_limit(fleet, kind) for kind in kinds}
-    closed = {kind: delay_limit_closed(fleet, kind) for kind in kinds}
+    limits = {kind: delay_limit(inverters, kind) for kind in kinds}
+    closed = {kind: delay_limit_closed(inverters, kind) for kind in kinds}
     return [
         ("links", f"{found.links}", "", "undirected, among those that run the law"),
         ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
@@ -109,8 +112,8 @@ def _rows(fleet: InverterGroup, found: Modes) -> list[TextRow]:
             _limit(limits["local loop"]),
             "f as measured, or P_set, late",
         ),
-        ("loss 50 %", "", _s(equivalent_delay(fleet.T_c, 0.5), ""), "held: as so much more delay on the links"),
-        ("loss 90 %", "", _s(equivalent_delay(fleet.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
+        ("loss 50 %", "", _s(equivalent_delay(inverters.T_c, 0.5), ""), "held: as so much more delay on the links"),
+        ("loss 90 %", "", _s(equivalent_delay(inverters.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
     ]
 
 
@@ -136,16 +139,16 @@ def _sentence(times: Times) -> str:
     return f"not restored: {times.note}"
 
 
-def _vars(fleet: InverterGroup, plant: VarResponse | None) -> list[str]:
+def _vars(inverters: InverterGroup, plant: VarResponse | None) -> list[str]:
     if plant is None:
         return ["  Voltage and vars: left out by --no-vars."]
-    if not all(name in plant.names for name in fleet.names):
+    if not all(name in plant.names for name in inverters.names):
         return ["  Voltage and vars: not predicted with spare inverters."]
-    radius, limit = var_spectral_radius(fleet, plant), var_delay_limit(fleet, plant)
+    radius, limit = var_spectral_radius(inverters, plant), var_delay_limit(inverters, plant)
     if radius >= 1.0:
         text = f"unstable on a plant without lags, spectral radius {radius:.4f}"
     else:
-        slowest = settling_in_ticks(radius, fleet.T_c)
+        slowest = settling_in_ticks(radius, inverters.T_c)
         text = f"slowest mode to 2 % in {slowest:.2f} s; stable up to {_limit(limit)} of delay of measurement "
         text += "or set-point (on a plant without lags; right to about one control period)"
         text = text.replace("up to any of delay", "with any delay up to 1 s")

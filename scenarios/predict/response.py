@@ -60,26 +60,26 @@ class Response:
         return np.asarray(np.linalg.solve(np.eye(len(self.A)) - self.A, self.B @ u + self.E * load))
 
 
-def response(fleet: InverterGroup, plant: PlantModel = "lagged") -> Response:
-    """Return the plant of a fleet, over one control period with set-points held.
+def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response:
+    """Return the plant of some inverters, over one control period with set-points held.
 
     Raises
     ------
     ValueError
         If no inverter is grid-forming: such an island has no voltage.
     """
-    if not fleet.GFM.any():
-        raise ValueError(f"no GFM among {', '.join(fleet.names)}: their island has no voltage; give it one")
-    return _quasi_steady(fleet) if plant == "quasi-steady" else _lagged(fleet)
+    if not inverters.GFM.any():
+        raise ValueError(f"no GFM among {', '.join(inverters.names)}: their island has no voltage; give it one")
+    return _quasi_steady(inverters) if plant == "quasi-steady" else _lagged(inverters)
 
 
-def _follows(fleet: InverterGroup) -> Floats:
-    """1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
-    return np.where(fleet.GFM | fleet.gfl.frequency_watt, 1.0, 0.0)
+def _follows(inverters: InverterGroup) -> Floats:
+    """Return 1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
+    return np.where(inverters.GFM | inverters.gfl.frequency_watt, 1.0, 0.0)
 
 
-def _quasi_steady(fleet: InverterGroup) -> Response:
-    n, w, follows = fleet.n, fleet.weight, _follows(fleet)
+def _quasi_steady(inverters: InverterGroup) -> Response:
+    n, w, follows = inverters.n, inverters.weight, _follows(inverters)
     stiffness = float(w @ follows)
     D, F = w / stiffness, -1.0 / stiffness
     return Response(
@@ -95,9 +95,9 @@ def _quasi_steady(fleet: InverterGroup) -> Response:
     )
 
 
-def _lagged(fleet: InverterGroup) -> Response:
-    n, w, gfl = fleet.n, fleet.weight, fleet.gfl
-    forming, following = np.flatnonzero(fleet.GFM), np.flatnonzero(~fleet.GFM)
+def _lagged(inverters: InverterGroup) -> Response:
+    n, w, gfl = inverters.n, inverters.weight, inverters.gfl
+    forming, following = np.flatnonzero(inverters.GFM), np.flatnonzero(~inverters.GFM)
     w_F = float(w[forming].sum())
     u, delta, zeta, phi, first = 0, 1, 2, 3, 4
     size = first + following.size
@@ -108,7 +108,7 @@ def _lagged(fleet: InverterGroup) -> Response:
 
     A, B, E = np.zeros((size, size)), np.zeros((size, n)), np.zeros(size)
     A[u, u], A[u, powers], E[u] = -1.0, -w[following], 1.0
-    A[u], E[u] = A[u] / fleet.gfm.T_p, E[u] / fleet.gfm.T_p
+    A[u], E[u] = A[u] / inverters.gfm.T_p, E[u] / inverters.gfm.T_p
     A[delta], B[delta] = C, D
     A[delta, delta] -= gfl.k_pPLL
     A[delta, zeta] -= 1.0
@@ -120,7 +120,7 @@ def _lagged(fleet: InverterGroup) -> Response:
 
     whole = np.zeros((size + n + 1, size + n + 1))
     whole[:size] = np.hstack([A, B, E[:, None]])
-    held = expm(whole * fleet.T_c)[:size]
+    held = expm(whole * inverters.T_c)[:size]
 
     C_p, D_p = np.zeros((n, size)), np.zeros((n, n))
     C_p[forming], D_p[forming] = -C, -D

@@ -1,4 +1,4 @@
-"""What experiments draw beside their measurements: times to restore and to share.
+"""Times to restore the frequency and to share power after an event, by theory.
 
 All of it comes from `scenarios.predict.linear_model`, law and plant in discrete time, and is exact for that model.
 Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used from
@@ -9,9 +9,9 @@ t_k + d.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -30,7 +30,7 @@ HORIZON = 120.0
 
 @dataclass(frozen=True, kw_only=True)
 class LoadStep:
-    """What the inverters of an island carry, mean p (pu of the ratings), before and after an event."""
+    """Load of an island's inverters, mean p (pu of the ratings), before and after an event."""
 
     start_pu: float = 0.647
     """At the start all stand at it, at nominal frequency. The paper's start."""
@@ -39,7 +39,7 @@ class LoadStep:
     islanding: bool = True
     """Whether the event makes the island, as islanding does; then late states of before are left out at first."""
     joining: tuple[str, ...] = ()
-    """Who comes with the event, at no load."""
+    """Inverters that come with the event, at no load."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,44 +62,8 @@ class Times:
         return None if both[0] is None or both[1] is None else max(both[0], both[1])
 
 
-def ticks_of(
-    fleet: InverterGroup,
-    *,
-    link_delay_s: float | Mapping[LinkEnds, float] = 0.0,
-    measurement_delay_s: float | Mapping[str, float] = 0.0,
-    setpoint_delay_s: float | Mapping[str, float] = 0.0,
-    loss: float | Mapping[LinkEnds, float] = 0.0,
-) -> Ticks:
-    """Return the delays in seconds as control periods of a fleet.
-
-    Raises
-    ------
-    ValueError
-        If a delay is negative or a loss no probability.
-
-    Examples
-    --------
-    >>> alone = InverterGroup(names=("a",), GFM=np.array([True]), A=np.zeros((1, 1)))
-    >>> found = ticks_of(alone, link_delay_s=0.03, measurement_delay_s=0.03)
-    >>> found.link, found.measurement
-    (1, 2)
-    """
-
-    def whole(delay: float, least: int = 0) -> int:
-        if not (math.isfinite(delay) and delay >= 0.0):
-            raise ValueError(f"a delay must be 0 s or more, got {delay:g} s")
-        return max(least, math.ceil(delay / fleet.T_c - 1e-9)) - least
-
-    return Ticks(
-        link=_each(link_delay_s, lambda delay: whole(delay, 1)),
-        measurement=_each(measurement_delay_s, whole),
-        setpoint=_each(setpoint_delay_s, whole),
-        loss=loss,
-    )
-
-
 def predicted_times(
-    case: InverterGroup,
+    inverters: InverterGroup,
     *,
     link_delay_s: float | Mapping[LinkEnds, float] = 0.0,
     measurement_delay_s: float | Mapping[str, float] = 0.0,
@@ -112,7 +76,7 @@ def predicted_times(
 
     Parameters
     ----------
-    case : InverterGroup
+    inverters : InverterGroup
         From `inverter_group_of(scenario, feeder, case)`.
     link_delay_s : float or Mapping[(src, dst), float], optional
         Delay of the states from agent to agent (s); links that a mapping leaves out have none.
@@ -137,42 +101,47 @@ def predicted_times(
     (True, False)
     """
     step = LoadStep() if load is None else load
-    ticks = ticks_of(
-        case,
-        link_delay_s=link_delay_s,
-        measurement_delay_s=measurement_delay_s,
-        setpoint_delay_s=setpoint_delay_s,
+    T_c = inverters.T_c
+    ticks = Ticks(
+        link=_in_ticks(link_delay_s, T_c, least=1),
+        measurement=_in_ticks(measurement_delay_s, T_c),
+        setpoint=_in_ticks(setpoint_delay_s, T_c),
         loss=loss,
     )
-    loop = Loop(fleet=case, ticks=ticks, plant=plant)
+    loop = Loop(inverters=inverters, ticks=ticks, plant=plant)
     if not loop.stable:
         return Times(restore_s=None, share_s=None, stable=False, note="unstable: oscillations grow")
     # until the slowest mode has fallen to 1e-5, but no longer than anybody would wait
     slowest = max(loop.spectral_radius, 1e-3)
-    count = math.ceil(math.log(1e-5) / math.log(slowest)) + sum(loop.matrix.shape) // max(case.n, 1)
-    count = min(max(count, round(2.0 / case.T_c)), round(HORIZON / case.T_c))
-    nominal = step.load_pu * float(case.weight @ case.m_p)
-    start = np.where([name in step.joining for name in case.names], 0.0, step.start_pu * case.m_p)
+    count = math.ceil(math.log(1e-5) / math.log(slowest)) + sum(loop.matrix.shape) // max(inverters.n, 1)
+    count = min(max(count, round(2.0 / inverters.T_c)), round(HORIZON / inverters.T_c))
+    nominal = step.load_pu * float(inverters.weight @ inverters.m_p)
+    start = np.where([name in step.joining for name in inverters.names], 0.0, step.start_pu * inverters.m_p)
     path = loop.run(count, start, nominal, islanding=step.islanding)
-    restore = _for_good(path.t, np.abs(path.e) * case.f_nom < F_BAND)
-    share = _for_good(path.t, sharing_index(path, case) < MPSI_BAND)
-    short = _beyond_limits(case, path)
+    restore = _for_good(path.t, np.abs(path.e) * inverters.f_nom < F_BAND)
+    share = _for_good(path.t, sharing_index(path, inverters) < MPSI_BAND)
+    short = _beyond_limits(inverters, path)
     if short:
         return Times(restore_s=None, share_s=None, stable=True, note=short)
-    return Times(restore_s=restore, share_s=share, stable=True, note=_note(case, restore, share))
+    return Times(restore_s=restore, share_s=share, stable=True, note=_note(inverters, restore, share))
 
 
-def sharing_index(path: Path, case: InverterGroup) -> Floats:
+def sharing_index(path: Path, inverters: InverterGroup) -> Floats:
     """Return MPSI of each tick, (16), over the inverters that have an agent; nan where nobody has one."""
-    if not case.shares.any():
+    if not inverters.shares.any():
         return np.full(path.t.shape, np.nan)
-    power, weight = path.power[:, case.shares], case.weight[case.shares]
+    power, weight = path.power[:, inverters.shares], inverters.weight[inverters.shares]
     eta = power @ (weight / weight.sum())
     return np.asarray(np.mean(np.abs(power / eta[:, None] - 1.0), axis=1))
 
 
-def _each(value: float | Mapping[Key, float], rule: Callable[[float], int]) -> int | dict[Key, int]:
-    return {key: rule(number) for key, number in value.items()} if isinstance(value, Mapping) else rule(value)
+def _in_ticks(delay: float | Mapping[Key, float], T_c: float, least: int = 0) -> Any:
+    """Return a delay (s), or several by name, in control periods beyond the `least` that every message takes."""
+    if isinstance(delay, Mapping):
+        return {key: _in_ticks(each, T_c, least) for key, each in delay.items()}
+    if not (math.isfinite(delay) and delay >= 0.0):
+        raise ValueError(f"a delay must be 0 s or more, got {delay:g} s")
+    return max(least, math.ceil(delay / T_c - 1e-9)) - least
 
 
 def _for_good(t: Floats, holds: Flags) -> float | None:
@@ -181,29 +150,31 @@ def _for_good(t: Floats, holds: Flags) -> float | None:
     return None if first >= t.size else round(float(t[first]), 9)
 
 
-def _beyond_limits(case: InverterGroup, path: Path) -> str:
-    """Return what those who run the law would have to carry in the end, if that is beyond their limits; else empty."""
-    acts, s, gains = case.acts, case.s, case.gains
+def _beyond_limits(inverters: InverterGroup, path: Path) -> str:
+    """Return the final load of those that run the law, in words, if it is beyond their limits; else empty."""
+    acts, s, gains = inverters.acts, inverters.s, inverters.gains
     if not acts.any():
         return ""
-    highest = np.minimum(gains.P_set_max, np.where(case.GFM, case.gfm.P_max, case.gfl.P_max))
-    needed = float((path.power[-1] / case.m_p * s)[acts].sum() / s[acts].sum())
+    highest = np.minimum(gains.P_set_max, np.where(inverters.GFM, inverters.gfm.P_max, inverters.gfl.P_max))
+    needed = float((path.power[-1] / inverters.m_p * s)[acts].sum() / s[acts].sum())
     limit = float((highest * s)[acts].sum() / s[acts].sum())
     if needed <= limit:
         return ""
     return f"those that run the law would have to carry {needed:.2f} pu each, their limit is {limit:.2f} pu"
 
 
-def _note(case: InverterGroup, restore: float | None, share: float | None) -> str:
+def _note(inverters: InverterGroup, restore: float | None, share: float | None) -> str:
     if restore is not None and share is not None:
         return ""
-    if not case.acts.any():
+    if not inverters.acts.any():
         return "no secondary control: droop alone keeps its error"
-    if restore is None and not case.leads.any():
+    if restore is None and not inverters.leads.any():
         return "no leader: nobody corrects the frequency"
-    idle = case.shares & ~case.acts
+    idle = inverters.shares & ~inverters.acts
     if share is None and idle.any():
-        return f"{int(idle.sum())} of {int(case.shares.sum())} with an agent run no secondary law: their power stays"
-    if share is None and len(groups(case)) > 1:
-        return f"the graph falls into {len(groups(case))} groups, which do not agree on a share"
+        return (
+            f"{int(idle.sum())} of {int(inverters.shares.sum())} with an agent run no secondary law: their power stays"
+        )
+    if share is None and len(groups(inverters)) > 1:
+        return f"the graph falls into {len(groups(inverters))} groups, which do not agree on a share"
     return f"not within {HORIZON:g} s"

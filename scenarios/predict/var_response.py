@@ -74,22 +74,22 @@ class VarResponse:
         """Dv / dV_set (pu per pu), N x N, with the plant at rest."""
         return np.asarray(self.v.sum(axis=0))
 
-    def columns_of(self, fleet: InverterGroup) -> list[int]:
-        """Return the places of a fleet's inverters in rows and columns.
+    def columns_of(self, inverters: InverterGroup) -> list[int]:
+        """Return the places of some inverters in rows and columns.
 
         Raises
         ------
         ValueError
             If an inverter is not among them.
         """
-        unknown = [name for name in fleet.names if name not in self.names]
+        unknown = [name for name in inverters.names if name not in self.names]
         if unknown:
             raise ValueError(f"no response of {', '.join(unknown)}; there are {', '.join(self.names)}")
-        return [self.names.index(name) for name in fleet.names]
+        return [self.names.index(name) for name in inverters.names]
 
 
 def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
-    """Return the response of the plant on droop alone, as it is at the end of the first event's window.
+    """Return the response of the plant on droop alone at the end of the first event's window.
 
     Raises
     ------
@@ -126,14 +126,14 @@ def _advance(plant: Plant, ticks: int) -> None:
     raise_for_trip(plant.take_events())
 
 
-def var_spectral_radius(fleet: InverterGroup, plant: VarResponse, *, local: int = 0) -> float:
+def var_spectral_radius(inverters: InverterGroup, plant: VarResponse, *, local: int = 0) -> float:
     """Return the largest magnitude of an eigenvalue (1) of the law for voltage and vars; below 1 it is stable.
 
     Eigenvalues of set-points that the law never moves are left out.
 
     Parameters
     ----------
-    fleet : InverterGroup
+    inverters : InverterGroup
         Its inverters must be among those of the response.
     plant : VarResponse
         From `var_response`.
@@ -155,12 +155,12 @@ def var_spectral_radius(fleet: InverterGroup, plant: VarResponse, *, local: int 
     >>> var_spectral_radius(pair, plant) < 1.0 < var_spectral_radius(pair, plant, local=50)
     True
     """
-    at, free = plant.columns_of(fleet), np.ix_(fleet.acts, fleet.acts)
+    at, free = plant.columns_of(inverters), np.ix_(inverters.acts, inverters.acts)
     S, H = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)]
-    a, b = _factors(fleet)
-    z = fleet.m_q[:, None] * S
+    a, b = _factors(inverters)
+    z = inverters.m_q[:, None] * S
     own = (a[:, None] * z + b[:, None] * H)[free]
-    others = (a[:, None] * _mean_of_neighbours(fleet) @ z)[free]
+    others = (a[:, None] * _mean_of_neighbours(inverters) @ z)[free]
     n, depth = len(own), local + 2
     blocks = np.zeros((depth, n, n))
     blocks[0] += np.eye(n)
@@ -173,36 +173,40 @@ def var_spectral_radius(fleet: InverterGroup, plant: VarResponse, *, local: int 
     return float(np.abs(values[np.argsort(np.abs(values - 1.0))][unmoved:]).max(initial=0.0))
 
 
-def var_delay_limit(fleet: InverterGroup, plant: VarResponse, *, longest_s: float = 1.0) -> float:
+def var_delay_limit(inverters: InverterGroup, plant: VarResponse, *, longest_s: float = 1.0) -> float:
     """Return the longest delay (s) of measurements or set-points up to which the law for voltage and vars is stable.
 
     A multiple of T_c; infinite if none up to `longest_s` makes it unstable, not a number if it is unstable without.
     """
-    for n in range(round(longest_s / fleet.T_c) + 1):
-        if var_spectral_radius(fleet, plant, local=n) >= 1.0 - 1e-12:
-            return (n - 1) * fleet.T_c if n else math.nan
+    for n in range(round(longest_s / inverters.T_c) + 1):
+        if var_spectral_radius(inverters, plant, local=n) >= 1.0 - 1e-12:
+            return (n - 1) * inverters.T_c if n else math.nan
     return math.inf
 
 
-def _factors(fleet: InverterGroup) -> tuple[Floats, Floats]:
+def _factors(inverters: InverterGroup) -> tuple[Floats, Floats]:
     """Return the factors of z - z_bar and of v - 1 of each inverter, by the law itself, alpha in full."""
-    gains, T, each = fleet.gains, fleet.T_c, zip(fleet.GFM, fleet.leads, fleet.degree.tolist(), strict=True)
+    gains, T, each = (
+        inverters.gains,
+        inverters.T_c,
+        zip(inverters.GFM, inverters.leads, inverters.degree.tolist(), strict=True),
+    )
     weights = [(gains.alpha * leads, gains.beta_GFM if GFM else gains.beta_GFL, d) for GFM, leads, d in each]
     a, b = np.array([V_factors(alpha, beta, d, k_q=gains.k_q, T=T) for alpha, beta, d in weights]).T
     return a, b
 
 
-def _mean_of_neighbours(fleet: InverterGroup) -> Floats:
+def _mean_of_neighbours(inverters: InverterGroup) -> Floats:
     """Return D^-1 A of those that run the law."""
-    return np.asarray(fleet.heard / np.maximum(fleet.degree, 1.0)[:, None])
+    return np.asarray(inverters.heard / np.maximum(inverters.degree, 1.0)[:, None])
 
 
-def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
+def var_growth(inverters: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
     """Return the rate (1/s) at which the law for voltage and vars grows over late links; negative where it decays.
 
     Parameters
     ----------
-    fleet : InverterGroup
+    inverters : InverterGroup
         Its inverters must be among those of the response.
     plant : VarResponse
         From `var_response`.
@@ -224,15 +228,15 @@ def var_growth(fleet: InverterGroup, plant: VarResponse, *, link_delay_s: float 
     >>> var_growth(pair, VarResponse(names=("a", "b"), q=at_once, v=0.1 * np.abs(at_once))) < 0.0
     True
     """
-    at = plant.columns_of(fleet)
-    n, K, T = fleet.n, len(plant.q), fleet.T_c
+    at = plant.columns_of(inverters)
+    n, K, T = inverters.n, len(plant.q), inverters.T_c
     late = max(0, math.ceil(link_delay_s / T - 1e-9) - 1)  # a state takes one period in any case
     z_of, v_of = (
         np.moveaxis(x[:, at][:, :, at] * by, 0, 1).reshape(n, K * n)
-        for x, by in ((plant.q, fleet.m_q[None, :, None]), (plant.v, 1.0))
+        for x, by in ((plant.q, inverters.m_q[None, :, None]), (plant.v, 1.0))
     )
-    a, b = (np.where(fleet.acts, factor, 0.0) for factor in _factors(fleet))
-    mean = _mean_of_neighbours(fleet)
+    a, b = (np.where(inverters.acts, factor, 0.0) for factor in _factors(inverters))
+    mean = _mean_of_neighbours(inverters)
     ticks = round(FOLLOWED / T)
     V, z = np.zeros((K + ticks + 1, n)), np.zeros((K + ticks + 1, n))
     V[K] = np.random.default_rng(1).normal(size=n)

@@ -81,7 +81,7 @@ def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[F
     cut = cut_between(inverters, groups_of(runs, case))
     expires = runs.scenario.cases[case].handling.max_age > 0.0
     ticks = Ticks() if expires else Ticks(loss=dict.fromkeys(cut, LOST))
-    loop = Loop(fleet=without(inverters, cut) if expires else inverters, ticks=ticks)
+    loop = Loop(inverters=without(inverters, cut) if expires else inverters, ticks=ticks)
     nominal = load.load_pu * float(inverters.weight @ inverters.m_p)
     path = loop.run(round(length / inverters.T_c), load.start_pu * inverters.m_p, nominal, islanding=load.islanding)
     return path.t, (runs.feeder.f_nom * (1.0 + path.e), sharing_index(path, inverters))

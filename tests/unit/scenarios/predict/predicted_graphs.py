@@ -49,7 +49,7 @@ def scenario_of(
     return msgspec.structs.replace(scenario, cases={"x": case}, events=scenario.events[:1], time=time), feeder
 
 
-def fleet(graph: str, *, kappa: float | None = None) -> InverterGroup:
+def inverters(graph: str, *, kappa: float | None = None) -> InverterGroup:
     """All nine inverters on a graph."""
     return inverter_group_of(*scenario_of(graph, kappa=kappa), "x")
 

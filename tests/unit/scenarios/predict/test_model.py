@@ -14,7 +14,7 @@ from scenarios.predict.delay_limits import delay_limit, first_crossing
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop, Ticks
 from scenarios.results.history import Floats
-from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, fleet
+from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, inverters
 
 UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9)
 START, LOAD = 0.00647, 0.0088
@@ -52,9 +52,9 @@ def _of(value: object, key: object) -> int:
 
 
 def drawn(seed: int) -> tuple[InverterGroup, Ticks]:
-    """A fleet on some graph with unequal ratings and droops, and a delay of its own for every link and inverter."""
+    """A inverters on some graph with unequal ratings and droops, and a delay of its own for every link and inverter."""
     rng = np.random.default_rng(seed)
-    case = fleet(list(GRAPHS)[seed % len(GRAPHS)])
+    case = inverters(list(GRAPHS)[seed % len(GRAPHS)])
     gains = Gains(k_p=case.gains.k_p, P_set_min=-1e9, P_set_max=1e9)
     case = dataclasses.replace(case, gains=gains, m_p=rng.uniform(0.005, 0.02, 9), s=rng.uniform(1.0, 3.0, 9))
     ticks = Ticks(
@@ -71,7 +71,7 @@ def test_the_model_is_the_law(seed: int) -> None:
     case, ticks = drawn(seed)
     e, y = plainly(case, ticks, 60)
 
-    path = Loop(fleet=case, ticks=ticks, plant="quasi-steady").run(60, np.full(9, START), LOAD)
+    path = Loop(inverters=case, ticks=ticks, plant="quasi-steady").run(60, np.full(9, START), LOAD)
 
     assert path.e == pytest.approx(e, abs=1e-12)
     assert path.set_point == pytest.approx(y, abs=1e-12)
@@ -79,11 +79,11 @@ def test_the_model_is_the_law(seed: int) -> None:
 
 def test_lossy_links_follow_the_mean() -> None:
     """The mean of 200 runs with a third of all messages lost is the model's at every tick, to 5 standard errors."""
-    case = dataclasses.replace(fleet("reduced"), gains=Gains(P_set_min=-1e9, P_set_max=1e9))
+    case = dataclasses.replace(inverters("reduced"), gains=Gains(P_set_min=-1e9, P_set_max=1e9))
     ticks, rng = Ticks(loss=1.0 / 3.0, link=1), np.random.default_rng(1)
     runs = np.array([plainly(case, ticks, 25, rng)[1] for _ in range(200)])
 
-    mean = Loop(fleet=case, ticks=ticks, plant="quasi-steady").run(25, np.full(9, START), LOAD).set_point
+    mean = Loop(inverters=case, ticks=ticks, plant="quasi-steady").run(25, np.full(9, START), LOAD).set_point
 
     error = runs.std(axis=0) / np.sqrt(len(runs))
     assert (np.abs(runs.mean(axis=0) - mean) <= 5.0 * error + 1e-12).all()
@@ -91,7 +91,7 @@ def test_lossy_links_follow_the_mean() -> None:
 
 def _swing(case: InverterGroup, ticks: Ticks, plant: str) -> float:
     """By what factor the swing of the set-points grows in 72 s, from 4 s on, when the transient has passed."""
-    path = Loop(fleet=case, ticks=ticks, plant=plant).run(4000, np.full(9, START), LOAD)  # type: ignore[arg-type]
+    path = Loop(inverters=case, ticks=ticks, plant=plant).run(4000, np.full(9, START), LOAD)  # type: ignore[arg-type]
     around = np.abs(path.set_point - LOAD).max(axis=1)
     return float(around[-200:].max() / around[200:400].max())
 
@@ -101,7 +101,7 @@ def _swing(case: InverterGroup, ticks: Ticks, plant: str) -> float:
 @pytest.mark.parametrize("kind", ["disagreement", "local loop"])
 def test_just_below_the_limit_a_swing_decays_and_just_above_it_grows(graph: str, kind: str, plant: str) -> None:
     """The limits by eigenvalues are those of a simulation in time, to the control period."""
-    case = fleet(graph)
+    case = inverters(graph)
     n = round(delay_limit(case, kind, plant=plant) / case.T_c)  # type: ignore[arg-type]
     below, above = (n - 1, n) if kind == "disagreement" else (n, n + 1)
 
@@ -114,10 +114,10 @@ def test_just_below_the_limit_a_swing_decays_and_just_above_it_grows(graph: str,
 
 def test_a_late_set_point_is_as_bad_as_a_late_measurement() -> None:
     """The loop has the same eigenvalues wherever the same delay sits in it."""
-    case = fleet("ring")
+    case = inverters("ring")
 
-    late_f = Loop(fleet=case, ticks=Ticks(measurement=7)).spectral_radius
-    late_P = Loop(fleet=case, ticks=Ticks(setpoint=7)).spectral_radius
+    late_f = Loop(inverters=case, ticks=Ticks(measurement=7)).spectral_radius
+    late_P = Loop(inverters=case, ticks=Ticks(setpoint=7)).spectral_radius
 
     assert late_P == pytest.approx(late_f, abs=1e-9)
 
@@ -125,8 +125,8 @@ def test_a_late_set_point_is_as_bad_as_a_late_measurement() -> None:
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) -> None:
     """With own values fresh all graphs but one are stable at any delay, and so say the eigenvalues at some of them."""
-    case = fleet(graph)
-    radii = [Loop(fleet=case, ticks=Ticks(link=n)).spectral_radius for n in (0, 8, 26)]
+    case = inverters(graph)
+    radii = [Loop(inverters=case, ticks=Ticks(link=n)).spectral_radius for n in (0, 8, 26)]
 
     assert math.isinf(first_crossing(case)) == (graph != "star")
     assert (max(radii) < 1.0) == (graph != "star")
@@ -134,21 +134,21 @@ def test_late_neighbours_destabilise_a_star_around_a_leader_alone(graph: str) ->
 
 def test_the_star_around_a_leader_has_a_limit() -> None:
     """A swing of its set-points decays with the delay of the limit and grows with one control period more."""
-    case = fleet("star")
+    case = inverters("star")
     n = round(delay_limit(case, "neighbours") / case.T_c) - 1
 
     assert n * case.T_c == pytest.approx(0.46)
-    assert Loop(fleet=case, ticks=Ticks(link=n)).spectral_radius < 1.0
-    assert Loop(fleet=case, ticks=Ticks(link=n + 1)).spectral_radius > 1.0
+    assert Loop(inverters=case, ticks=Ticks(link=n)).spectral_radius < 1.0
+    assert Loop(inverters=case, ticks=Ticks(link=n + 1)).spectral_radius > 1.0
 
 
 def test_what_the_law_never_moves_is_counted() -> None:
     """Each part of the graph beyond the first keeps one difference for ever; it is no instability."""
-    apart = dataclasses.replace(fleet("full"), A=np.kron(np.eye(3), 1.0 - np.eye(3)))
+    apart = dataclasses.replace(inverters("full"), A=np.kron(np.eye(3), 1.0 - np.eye(3)))
 
-    assert Loop(fleet=apart).resting == 2
-    assert Loop(fleet=apart).stable
-    assert Loop(fleet=fleet("path")).resting == 0
+    assert Loop(inverters=apart).resting == 2
+    assert Loop(inverters=apart).stable
+    assert Loop(inverters=inverters("path")).resting == 0
 
 
 @pytest.mark.parametrize(
@@ -162,4 +162,4 @@ def test_what_the_law_never_moves_is_counted() -> None:
 def test_impossible_delays_and_losses_are_refused(ticks: Ticks, said: str) -> None:
     """A problem of an experiment is told and not computed with."""
     with pytest.raises(ValueError, match=said):
-        _ = Loop(fleet=fleet("path"), ticks=ticks).matrix
+        _ = Loop(inverters=inverters("path"), ticks=ticks).matrix

@@ -11,7 +11,7 @@ from scenarios.predict.load_steps import load_steps
 from scenarios.predict.times import LoadStep, predicted_times
 from scenarios.predict.var_response import VarResponse, var_delay_limit, var_response
 from scenarios.schema import load_scenario
-from tests.unit.scenarios.predict.predicted_graphs import fleet, on_the_plant, scenario_of
+from tests.unit.scenarios.predict.predicted_graphs import inverters, on_the_plant, scenario_of
 
 T_C = 0.02
 ALL_BUT_9 = [f"inv{i}" for i in range(1, 9)]
@@ -40,7 +40,7 @@ def test_the_load_of_islanding_is_found_on_droop_alone(event: LoadStep) -> None:
 @pytest.mark.parametrize("graph", ["full", "reduced", "ring", "star", "path"])
 def test_with_the_voltage_left_alone_the_predicted_time_to_restore_is_the_plants(graph: str, event: LoadStep) -> None:
     """Two control periods or 8 % is all that the linear model misses on the plant with its limits and angles."""
-    predicted = predicted_times(fleet(graph), load=event).report_s
+    predicted = predicted_times(inverters(graph), load=event).report_s
     measured = on_the_plant(graph, still_voltage=True, end_s=4.0).restored
 
     assert predicted is not None
@@ -50,18 +50,18 @@ def test_with_the_voltage_left_alone_the_predicted_time_to_restore_is_the_plants
 @pytest.mark.parametrize("graph", ["full", "reduced"])
 def test_late_links_slow_the_plant_as_predicted(graph: str, event: LoadStep) -> None:
     """With 120 ms from agent to agent the time to restore more than doubles, and is predicted to 5 %."""
-    predicted = predicted_times(fleet(graph), link_delay_s=0.12, load=event).report_s
+    predicted = predicted_times(inverters(graph), link_delay_s=0.12, load=event).report_s
     measured = on_the_plant(graph, link=5, still_voltage=True, end_s=4.0).restored
 
     assert predicted is not None
-    assert predicted > 2.0 * (predicted_times(fleet(graph), load=event).report_s or 0.0)
+    assert predicted > 2.0 * (predicted_times(inverters(graph), load=event).report_s or 0.0)
     assert measured == pytest.approx(predicted, rel=0.05)
 
 
 @pytest.mark.parametrize("graph", ["full", "ring"])
 def test_the_voltage_law_delays_it_a_little(graph: str, event: LoadStep) -> None:
     """Load rises while the voltage comes back, which the model does not know: later, by less than 0.08 s."""
-    predicted = predicted_times(fleet(graph), load=event).report_s
+    predicted = predicted_times(inverters(graph), load=event).report_s
     measured = on_the_plant(graph, end_s=4.0).restored
 
     assert predicted is not None
@@ -71,7 +71,7 @@ def test_the_voltage_law_delays_it_a_little(graph: str, event: LoadStep) -> None
 
 def test_the_plant_swings_beyond_the_limit_of_a_late_frequency_and_not_below() -> None:
     """Two control periods around the predicted limit part a swing that dies from one that stays."""
-    limit = round(delay_limit(fleet("reduced"), "local loop") / T_C)
+    limit = round(delay_limit(inverters("reduced"), "local loop") / T_C)
     below = on_the_plant("reduced", measurement=limit - 1, frequency_only=True, end_s=9.0)
     above = on_the_plant("reduced", measurement=limit + 2, frequency_only=True, end_s=9.0)
 
@@ -81,7 +81,7 @@ def test_the_plant_swings_beyond_the_limit_of_a_late_frequency_and_not_below() -
 
 def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
     """Agent-agent delay alone destabilises it beyond the predicted limit; around a follower the same delay does not."""
-    ticks = round(delay_limit(fleet("star"), "neighbours") / T_C) + 10
+    ticks = round(delay_limit(inverters("star"), "neighbours") / T_C) + 10
     leader = on_the_plant("star", link=ticks, end_s=16.0)
     follower = on_the_plant("star around inv2", link=ticks, end_s=16.0)
 
@@ -92,11 +92,11 @@ def test_a_star_around_a_leader_swings_when_its_links_are_too_slow() -> None:
 @pytest.mark.parametrize("graph", ["full", "path"])
 def test_vars_are_the_first_to_suffer_from_a_late_plant(graph: str, answers: VarResponse) -> None:
     """The voltage stays calm a period below the predicted limit of the var law and swings two periods above it."""
-    limit = round(var_delay_limit(fleet(graph), answers) / T_C)
+    limit = round(var_delay_limit(inverters(graph), answers) / T_C)
     calm = on_the_plant(graph, setpoint=limit - 1, end_s=9.0)
     wild = on_the_plant(graph, setpoint=limit + 2, end_s=9.0)
 
-    assert limit * T_C < delay_limit(fleet(graph), "local loop")
+    assert limit * T_C < delay_limit(inverters(graph), "local loop")
     assert calm.V[-50:].max() - calm.V[-50:].min() < 0.001
     assert wild.V[-50:].max() - wild.V[-50:].min() > 0.01
 
