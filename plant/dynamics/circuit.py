@@ -1,6 +1,6 @@
-"""The electrical circuit the dynamics see: one admittance matrix, loads, sources, terminals.
+"""The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals.
 
-Made by `plant.network` for every set of closed switches; tests make their own small ones.
+`plant.feeder.circuits` makes one for every set of closed switches; tests make their own small ones.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ class Circuit:
     """
 
     Y: sp.csc_array
-    """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that stand
-    for no bus (merged into another) are empty."""
+    """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that are merged
+    into another are empty."""
     sources: NDArray[np.int64]
     """Nodes held by an ideal source; may be empty."""
     source_voltage: NDArray[np.complex128]
@@ -40,18 +40,18 @@ class Circuit:
     """Nominal phasor of each branch (V): where the first solution starts."""
 
     def __deepcopy__(self, memo: object) -> Circuit:
-        """Nothing in it is ever written: copies of a plant share it, and what was factored for it."""
+        """Return itself: it is never written, so copies of a plant share it, and its factorisation."""
         return self
 
     def without_source(self) -> Circuit:
-        """The same network with its substation disconnected."""
+        """Return the same network with its substation disconnected."""
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 
     def components(self) -> tuple[int, NDArray[np.int64]]:
-        """Electrical islands: number and label of each node.
+        """Return the number of electrical islands and the label of each node.
 
         The three terminals of an inverter belong together even where the phases of the network are
-        not coupled, for one controller moves all three.
+        not coupled, because one controller moves all three.
         """
         incidence = abs(self.C)
         link = abs(self.Y) + incidence @ incidence.T

@@ -1,10 +1,10 @@
-"""The one error of the plant's numbers."""
+"""Errors of the plant's numbers."""
 
 from __future__ import annotations
 
 
 class PlantError(RuntimeError):
-    """The plant has no solution: the message says where, and what to try."""
+    """The plant has no solution; the message says where, and what to try."""
 
 
 class NoSolutionError(PlantError):
@@ -13,7 +13,7 @@ class NoSolutionError(PlantError):
     Attributes
     ----------
     islands : tuple of int
-        Which, as the network's reduction numbers them.
+        Their numbers in the network's reduction.
     """
 
     def __init__(self, islands: tuple[int, ...]) -> None:

@@ -1,7 +1,7 @@
-"""The operating point a run starts from: an exact equilibrium of network and inverters (section 7).
+"""The initial operating point of a run: an exact equilibrium of network and inverters (section 7).
 
-Inverters stand on their real power; reactive power is either given or follows from a given V_set through the
-droop (4), (8). An island without a source has one GFM (its swing) hold its terminal first, and is then released.
+The real power of each inverter is given; its reactive power is either given too, or follows from a given V_set through
+the droop (4), (8). In an island without a source one GFM (its swing) first holds its terminal, and is then released.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ class OperatingPoint:
 
 
 class _PowerFlow:
-    """Fixed point between the network and inverters that keep their power."""
+    """Fixed point between the network and inverters of constant power."""
 
     def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
-        # the filters of GFM stay in the network, for their EMF is balanced, not their current; a GFL is a pure current
+        # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
         self.reduction = Reduction(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
@@ -50,7 +50,7 @@ class _PowerFlow:
         return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
 
     def voltages(self, J: Complex) -> Complex:
-        """Terminal voltages (V) for injections J (A)."""
+        """Return the terminal voltages (V) for injections J (A)."""
         m = self.V_b.size
         x = np.concatenate([self.V_b.real, self.V_b.imag])
         I_b, V = np.empty(m, complex), np.empty(J.shape, complex)
@@ -66,7 +66,7 @@ class _PowerFlow:
         return V
 
     def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
-        """Injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
+        """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, y = self.units, self.y[:, None]
         S = ((P + 1j * Q) * units.S_b)[:, None]
         keep = (frozen | ~self.reduction.online)[:, None]
@@ -76,16 +76,16 @@ class _PowerFlow:
             V_1 = aligned_sum(V)[:, None] / 3.0
             V_1 = np.where(V_1 == 0.0, 1.0, V_1)
             own = np.sum(V * np.conj(y * V), axis=1, keepdims=True)
-            wanted = np.where(keep, J, np.conj((S + own) / (3.0 * V_1)) * PHASES)
-            change = float(np.max(np.abs(wanted - J) / scale[:, None], initial=0.0))
-            J = wanted
+            updated = np.where(keep, J, np.conj((S + own) / (3.0 * V_1)) * PHASES)
+            change = float(np.max(np.abs(updated - J) / scale[:, None], initial=0.0))
+            J = updated
             if iteration == 3:
                 self.net = self._linearise()
             if change < 1e-13 or (iteration > 100 and change < 1e-11):
                 return J, self.voltages(J)
         raise PlantError(
             f"no initial operating point: injections still change by {change:.1e} pu after 500 iterations; "
-            "the inverters may be asked for more than the network can carry; try another P_set0 or V_set0"
+            "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
         )
 
 
@@ -98,14 +98,14 @@ def equilibrium(
     *,
     swing_voltage: Complex = PHASES,
 ) -> OperatingPoint:
-    """Operating point of section 7.
+    """Return the operating point of section 7.
 
     Parameters
     ----------
     circuit
         The network at the start.
     units
-        The inverters; those that are not connected have no part in it.
+        The inverters; disconnected ones take no part.
     P
         Real power of each (pu); ignored for a swing.
     Q
@@ -113,7 +113,7 @@ def equilibrium(
     V_set
         Voltage set-point of each (pu), from which Q follows by droop; None to keep Q.
     swing_voltage
-        The three phasors that a swing holds (pu of nominal).
+        Phasors that a swing holds on its three phases (pu of nominal).
 
     Raises
     ------
@@ -143,7 +143,7 @@ def equilibrium(
         J, V, Q = _by_droop(flow, J, P, Q, V_set, swing)
 
     if swing.any():
-        # what the swings had to deliver becomes their EMF; then their buses are released
+        # the swings' powers determine their EMF; then their buses are released
         node_voltage = flow.reduction.all_voltages(J, flow.I_b, held.source_voltage)
         drawn = circuit.Y @ node_voltage + circuit.C[:, flow.reduction.branches] @ flow.I_b
         S = np.sum(V * np.conj(drawn[circuit.terminals]), axis=1)
@@ -158,18 +158,18 @@ def equilibrium(
 
 
 def stand_at(units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None) -> None:
-    """Give the inverters the set-points and the controllers' states with which they rest at an operating point.
+    """Set the inverters' set-points and controller states so that they rest at an operating point.
 
     Parameters
     ----------
     units
         The inverters; written.
     point
-        Where they are to rest.
+        Operating point.
     online
-        Those that deliver; the others keep `P` and `V_set` as set-points and their states.
+        Inverters that deliver; the others keep their states, with `P` and `V_set` as set-points.
     P, V_set
-        What the point was found with (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
+        Real powers and set-points of the point (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
         V_set := v, Q_set := q; else all the reactive power comes from the droop.
     """
     S = np.sum(point.V * np.conj(point.I), axis=1) / units.S_b
@@ -202,17 +202,17 @@ def _by_droop(
         trial[free] = q
         J, V = flow.solve(J, P, trial, swing)
         v = np.mean(np.abs(V), axis=1) / units.V_b
-        wanted = np.clip((V_set - v) / units.m_q, -limit, limit)
-        return np.asarray((wanted - trial)[free] * units.m_q[free])
+        by_droop = np.clip((V_set - v) / units.m_q, -limit, limit)
+        return np.asarray((by_droop - trial)[free] * units.m_q[free])
 
-    found = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
-    if not found.success and float(np.max(np.abs(found.fun))) > 1e-10:
+    solution = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
+    if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:
         raise PlantError(
-            f"no initial operating point: V_set0 cannot be met by droop, mismatch {np.max(np.abs(found.fun)):.1e} pu; "
-            "try another V_set0"
+            "no initial operating point: V_set0 cannot be met by droop, "
+            f"mismatch {np.max(np.abs(solution.fun)):.1e} pu; try another V_set0"
         )
     Q = Q.copy()
-    Q[free] = found.x
+    Q[free] = solution.x
     J, V = flow.solve(J, P, Q, swing)
     return J, V, Q
 

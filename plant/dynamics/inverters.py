@@ -1,4 +1,4 @@
-"""The inverters of a circuit as arrays: what each is, and the state that steps and switching change."""
+"""The inverters of a circuit as arrays: their parameters, and the state that steps and switching change."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Inverter:
     """One inverter at a circuit's terminal."""
 
     name: str
-    """For messages."""
+    """Name, for messages."""
     kind: Literal["GFM", "GFL"]
     S_b: float
     """Rating, base of its per-unit quantities (VA)."""
@@ -32,7 +32,7 @@ class Inverter:
     m_q: float
     """Q-V droop (pu per pu)."""
     parameters: GfmParameters | GflParameters
-    """Of its kind."""
+    """Parameters of its kind."""
     f_nom: float = F_NOM
     """Nominal frequency (Hz), base of its per-unit frequency; one for all inverters of a circuit."""
 
@@ -43,16 +43,16 @@ class Inverters:
     Parameters
     ----------
     units
-        What each is.
+        Description of each.
     connected
-        Which are switched on; all by default.
+        Whether each is switched on; by default all are.
 
     Attributes
     ----------
     f_nom : float
         Nominal frequency (Hz).
     forming : bool[n]
-        Which are GFM.
+        Whether each is a GFM.
     gfm, gfm_at, gfm_state
         Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
     gfl, gfl_at, gfl_state
@@ -104,7 +104,7 @@ class Inverters:
         return len(self.units)
 
     def theta(self) -> Real:
-        """Angle of every GFM's internal voltage (rad); 0 for a GFL."""
+        """Return the angle of every GFM's internal voltage (rad); 0 for a GFL."""
         theta = np.zeros(len(self))
         theta[self.gfm_at] = self.gfm_state["theta"]
         return theta
@@ -129,10 +129,10 @@ class Inverters:
             gfl_model.settle(self.gfl[k], self.gfl_state[k], self.V[i], self.I[i], S, v)
 
     def hold(self, i: int, P_set: float, V_set: float) -> tuple[float, float]:
-        """Take set-points (pu) from the next step on, within the inverter's bounds; returns those that are held.
+        """Take set-points (pu) from the next step on, within the inverter's bounds; return the held ones.
 
-        A GFL's P_set is clipped in place, as in GridLAB-D (section 4.4): what exceeds its rating is gone before the
-        droop (7) is added, and cannot hide a later over-frequency.
+        A GFL's P_set is clipped in place, as in GridLAB-D (section 4.4): the part beyond its rating is removed before
+        the droop (7) is added, and cannot hide a later over-frequency.
         """
         P_set = float(min(max(P_set, -self.P_set_lim[i]), self.P_set_lim[i]))
         V_set = float(min(max(V_set, self.V_set_min[i]), self.V_set_max[i]))
@@ -145,19 +145,19 @@ class Inverters:
         Raises
         ------
         ValueError
-            If the inverter is grid-forming: its power is what the network takes, not what a reference says.
+            If the inverter is grid-forming: the network determines its power, not a reference.
         """
         if self.forming[i]:
             raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
         self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
 
     def readings(self, online: NDArray[np.bool_]) -> Real:
-        """Present f (Hz), P (W), Q (var), V (V) from the last solution, n x 4, before any step was taken.
+        """Return f (Hz), P (W), Q (var), V (V) of the last solution, n x 4, before the first step.
 
         Parameters
         ----------
         online
-            Inverters that deliver; of the others f is nominal, or 0 where there is no voltage, and P and Q are 0.
+            Inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[~online] = 0.0
@@ -170,7 +170,7 @@ class Inverters:
 
 
 def _pack(unit: Inverter) -> NDArray[np.void]:
-    """Give one unit's record as its kind's compiled pass wants it."""
+    """Return the record of one unit for the compiled pass of its kind."""
     if isinstance(unit.parameters, GfmParameters):
         return gfm_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)
     return gfl_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)

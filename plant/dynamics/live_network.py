@@ -1,4 +1,4 @@
-"""The network of a run: the present switch state's reduction, with the load law's tangent where it was last solved."""
+"""The network of a run: the present switch state, reduced, with the tangent of the loads at its last solution."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from plant.dynamics.newton import solve_islands
 from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
 
 TOLERANCE = 1e-11
-"""Largest change of a voltage in a network solution's last iteration (pu of the highest nominal)."""
+"""Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
 
 KEPT = 64
-"""Factored networks that are kept, 1 MB each: enough for all that is scheduled, bounded in a run of many switchings."""
+"""Number of factored networks to keep, 1 MB each: enough for all scheduled ones, and a bound for many switchings."""
 
 
 class LiveNetwork:
@@ -31,9 +31,9 @@ class LiveNetwork:
     Attributes
     ----------
     reduction : Reduction
-        Of the present circuit and the inverters connected to it.
+        Reduction of the present circuit and its connected inverters.
     net : Reduced
-        Its arrays for the inner loop, linearised; there after the first `solve`.
+        Its arrays for the inner loop, linearised; set by the first `solve`.
     x : float64[2 m]
         [Re; Im] of the live branches' voltages (V), each in its island's frame: the next solution's first guess.
     V_branch : complex128
@@ -53,10 +53,10 @@ class LiveNetwork:
         self.reduction = self.reduced(circuit)
         self.V_branch = circuit.V_branch.astype(complex)
         self.source_voltage = self.reduction.circuit.source_voltage
-        """Phasors of the ideal sources that are connected (V)."""
+        """Phasors of the connected ideal sources (V)."""
 
     def reduced(self, circuit: Circuit) -> Reduction:
-        """Factor a circuit, once: called ahead of a scheduled event, it takes the work out of the event's step."""
+        """Factor a circuit, once; call it ahead of a scheduled event to save this work in the event's step."""
         units = self._inverters
         if not self.substation_on:
             if circuit not in self._unsourced:
@@ -70,7 +70,7 @@ class LiveNetwork:
         return self._reductions[key]
 
     def change(self, circuit: Circuit) -> None:
-        """Take another circuit, or the same with other inverters connected; it is yet to be solved."""
+        """Take another circuit, or the same with other connected inverters; call `solve` next."""
         dead = np.ones(self.V_branch.size, bool)
         dead[self.reduction.branches] = False
         self.V_branch[dead] = 0.0
@@ -79,12 +79,12 @@ class LiveNetwork:
         self.source_voltage = self.reduction.circuit.source_voltage
 
     def guess(self) -> None:
-        """Start the next solution from the last voltages, or from nominal ones where there was hardly any."""
+        """Start the next solution from the last voltages, or from nominal ones where these were almost 0."""
         nominal = self.circuit.V_branch * np.exp(1j * self._island_angle())
         self.V_branch = np.where(np.abs(self.V_branch) > 0.1 * np.abs(nominal), self.V_branch, nominal)
 
     def solve(self) -> None:
-        """Linearise where the present injections lead, by Newton's method with a fresh tangent each time.
+        """Linearise at the solution of the present injections, by Newton's method with a fresh tangent each time.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class LiveNetwork:
         self.V_branch[branches] = V_b
 
     def renew(self) -> None:
-        """Linearise anew where the present injections lead from the present voltages, in the middle of a step.
+        """Linearise again at the solution of the present injections, starting from the present voltages.
 
         Raises
         ------
@@ -128,12 +128,12 @@ class LiveNetwork:
         self._linearise(self._branch_voltages())
 
     def note(self) -> None:
-        """Note the branch voltages to which the steps since the last solution have led."""
+        """Note the present branch voltages."""
         if self.x.size:
             self.V_branch[self.reduction.branches] = self._branch_voltages()
 
     def _solve_islands(self, guess: Complex) -> Complex:
-        """Voltages of the live branches (V) from a guess, or NoSolutionError."""
+        """Return the voltages of the live branches (V) from a guess; raise NoSolutionError if islands have none."""
         V_b, failed = solve_islands(self.reduction, self._inverters.J, self.source_voltage, guess)
         if failed:
             raise NoSolutionError(failed)
@@ -144,7 +144,7 @@ class LiveNetwork:
         self.x = np.concatenate([V_b.real, V_b.imag])
 
     def _branch_voltages(self) -> Complex:
-        """Present voltages of the live branches (V), back in the common frame."""
+        """Return the present voltages of the live branches (V) in the common frame."""
         m = self.x.size // 2
         leader = self.reduction.leader
         angle = np.where(leader >= 0, self._inverters.theta()[leader] - self.net.theta_lin, 0.0)
@@ -152,7 +152,7 @@ class LiveNetwork:
         return turned
 
     def _island_angle(self) -> Real:
-        """Angle (rad) by which each branch's island is turned, 0 where it has a source or no GFM."""
+        """Return the angle (rad) of each branch's island frame; 0 where the island has a source or no GFM."""
         theta = self._inverters.theta()
         angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
         C = self.circuit.C.tocsc()

@@ -1,12 +1,12 @@
-r"""Branch voltages of one island by Newton's method, for where the frozen tangent of the inner loop does not lead.
+r"""Branch voltages of one island by Newton's method, where the inner loop's frozen tangent leads to no solution.
 
-Solves :math:`F(V) = V - E + Z I_b(V) = 0`, E being the voltages without load, with a fresh tangent each iteration and
-steps shortened until F shrinks. Where that fails the load is raised from nothing to all of it (continuation): this
-follows the solution of high voltage up to the largest load that has one. So None means that the island has no
-solution that it could have come to, not that an iteration gave up.
+The module solves :math:`F(V) = V - E + Z I_b(V) = 0`, E being the voltages without load, with a fresh tangent each
+iteration and steps shortened until F shrinks. Where that fails, it raises the load from nothing to all of it
+(continuation): this follows the solution of high voltage up to the largest load that has one. So None means that the
+island has no solution that it could reach, not that an iteration gave up.
 
-F has the sign of its Jacobian's determinant on that branch from no load on; the solutions of low voltage, at which no
-network can stand, have the other one.
+The determinant of F's Jacobian keeps its sign on that branch from no load on; the solutions of low voltage, at which no
+network can operate, have the other sign.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from plant.dynamics.blas import one_thread
 from plant.dynamics.reduction import Complex, Real, Reduction, tangent
 
 ITERATIONS = 40
-"""Of Newton's method; it takes 4 to 10."""
+"""Most iterations of Newton's method; it takes 4 to 10."""
 SHORTEST_STEP = 2.0**-10
 """Smallest part of a Newton step, and of the load in the continuation."""
 TOLERANCE = 2e-12
-"""Largest last step (pu of the branch's nominal voltage): under that of the inner loop, which goes on from here."""
+"""Largest last step (pu of the branch's nominal voltage): below that of the inner loop, which continues from here."""
 NOISE = 1e-12
-"""Residual (pu) below which it need not shrink: it is rounding."""
+"""Residual (pu) that counts as rounding: below it the residual need not shrink."""
 
 
 def solve_islands(
     reduction: Reduction, J: Complex, source_voltage: Complex, guess: Complex
 ) -> tuple[Complex, tuple[int, ...]]:
-    """Voltages of the live branches (V), each island on its own, and the islands that have no solution.
+    """Return the voltages of the live branches (V), each island on its own, and the islands without solution.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def solve_islands(
     source_voltage
         Phasors of the ideal sources (V).
     guess
-        Where to begin (V); kept for an island without solution.
+        Initial guess (V); kept for an island without solution.
     """
     at_branches, at_terminals = reduction.without_load(J, source_voltage)
     V_b, failed = guess.copy(), []
@@ -49,11 +49,11 @@ def solve_islands(
         rows = reduction.branches[own]
         circuit = reduction.circuit
         island = Island(reduction.Z_bb[np.ix_(own, own)], circuit.S[rows], circuit.I0[rows], circuit.V_branch[rows])
-        found = island.solve(at_branches[own], guess[own])
-        if found is None or not np.isfinite(at_terminals[np.tile(reduction.inverter_island == k, 3)]).all():
+        solution = island.solve(at_branches[own], guess[own])
+        if solution is None or not np.isfinite(at_terminals[np.tile(reduction.inverter_island == k, 3)]).all():
             failed.append(k)
         else:
-            V_b[own] = found
+            V_b[own] = solution
     return V_b, tuple(failed)
 
 
@@ -75,37 +75,37 @@ class Island:
 
     @one_thread()
     def solve(self, E: Complex, guess: Complex) -> Complex | None:
-        """Branch voltages (V) for the voltages without load E (V), or None if there are none.
+        """Return the branch voltages (V) for the voltages without load E (V); None if there is no solution.
 
         Parameters
         ----------
         E
             Voltages without load (V).
         guess
-            Where to begin (V), e.g. the last voltages.
+            Initial guess (V), e.g. the last voltages.
         """
         if not np.isfinite(E).all():
             return None
-        with np.errstate(all="ignore"):  # a trial beyond all bounds is not finite, and is not taken
-            found = self._newton(E, guess, 1.0)
-            return self._raise_load(E) if found is None else found
+        with np.errstate(all="ignore"):  # a trial beyond all bounds is not finite, and is rejected
+            solution = self._newton(E, guess, 1.0)
+            return self._raise_load(E) if solution is None else solution
 
     def _raise_load(self, E: Complex) -> Complex | None:
-        """Continuation in the load, by steps that are halved where they fail."""
+        """Raise the load by continuation; halve a step that fails."""
         V, part, step = E, 0.0, 0.25
         while part < 1.0:
-            found = self._newton(E, V, min(1.0, part + step))
-            if found is None:
+            solution = self._newton(E, V, min(1.0, part + step))
+            if solution is None:
                 step /= 2.0
                 if step < SHORTEST_STEP:
                     return None
             else:
-                V, part = found, min(1.0, part + step)
+                V, part = solution, min(1.0, part + step)
                 step *= 2.0
         return V
 
     def _newton(self, E: Complex, guess: Complex, part: float) -> Complex | None:
-        """Solution with this part of the load, on the branch of high voltage; None if none is found."""
+        """Return the solution with this part of the load, on the branch of high voltage; None if it finds none."""
         V = guess
         F, size = self._residual(E, V, part)
         for _ in range(ITERATIONS):

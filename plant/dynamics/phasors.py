@@ -1,4 +1,4 @@
-"""Three phases as one: the balanced set of phasors, and how much of it is in any three phasors."""
+"""The balanced set of three phasors, and its part in any three phasors."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ PHASES = np.array([1.0, A120.conjugate(), A120])
 """Balanced set of phasors, phase A at 0."""
 
 _ONTO_A = np.array([1.0, A120, A120**2])
-"""What turns a balanced set's phases onto phase A."""
+"""Factors that turn the phases of a balanced set onto phase A."""
 
 
 def aligned_sum(V: Complex) -> Complex:
-    """Sum of the phasors in the last axis (A, B, C), each turned onto phase A: three times their positive sequence.
+    """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-r"""What the inner loop needs of the network: small dense matrices, made once per switch state.
+r"""The network in the form of the inner loop: small dense matrices, made once per switch state.
 
 With the filters' admittances in Y, the network seen from the load branches (voltages V_b, currents I_b)
 and from the inverter terminals (voltages V_G, injections J) is
@@ -8,11 +8,11 @@ and from the inverter terminals (voltages V_G, injections J) is
 
 Splitting the load law into its tangent at a point V_lin and the remainder, I_b = i_c + A V_b + B V_b^* + N(V_b), and
 solving for V_b gives x = P J + x_c - Q N(x) on real vectors x = [Re V_b; Im V_b]. N is of second order in the
-deviation from V_lin, so the fixed point converges by about two decades an iteration, where the plain current
+deviation from V_lin, so the fixed point converges by about two decades an iteration; the plain current
 injection gains less than one.
 
-An island without a source turns away from nominal; loads do not care (I_b turns with V_b). So each such island is
-solved in a frame that turns with its first GFM, and the tangent stays good for the whole run.
+An island without a source rotates away from nominal, but loads do not depend on the angle (I_b rotates with V_b). So
+each such island is solved in a frame that rotates with its first GFM, and the tangent stays good for the whole run.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Reduced(NamedTuple):
     inverter_island: NDArray[np.int64]
     """Island of each inverter."""
     leader: NDArray[np.int64]
-    """For each island the inverter whose angle turns its frame; -1: the frame stands still."""
+    """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
     theta_lin: Real
     """That inverter's angle at the point of linearisation (rad)."""
 
@@ -150,21 +150,21 @@ class Reduction:
                 self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = 1.0
 
     def __deepcopy__(self, memo: object) -> Reduction:
-        """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
+        """Return itself: it is never written, so copies of a plant share it, like its circuit."""
         return self
 
     def without_load(self, J: Complex, source_voltage: Complex) -> tuple[Complex, Complex]:
-        """What injections J (n_inv x 3, A) and ideal sources (V) would give at branches and terminals (V)."""
+        """Return voltages (V) of branches and terminals from injections J (n_inv x 3, A) and sources (V), no load."""
         s_b, s_G = self.source_parts(source_voltage)
         return self._T_bG @ J.T.ravel() + s_b, self._Z_GG @ J.T.ravel() + s_G
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
+        """Return the terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
         V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ self._branch_currents(V_b)
         return V_G.reshape(3, -1).T
 
     def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Voltage of every node (V) from the same; 0 in dead islands."""
+        """Return the voltage of every node (V) from the same; 0 in dead islands."""
         return self.all_voltages(J, self._branch_currents(V_b), source_voltage)
 
     def _branch_currents(self, V_b: Complex) -> Complex:
@@ -173,12 +173,12 @@ class Reduction:
         return I_b
 
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
-        """What the ideal sources alone give at the branches and at the terminals (V)."""
+        """Return the voltages (V) that the ideal sources alone give at the branches and at the terminals."""
         return self._b_S @ source_voltage, self._G_S @ source_voltage
 
     @one_thread()
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        """Inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
+        """Return the inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Reduction:
 
     @one_thread()
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Voltage of every node (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents (A)."""
+        """Return every node's voltage (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents I_b (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         Z_G, Z_C, Z_S = self._columns
         V[self._unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
@@ -225,18 +225,18 @@ class Reduction:
 
 
 def tangent(S: Complex, I0: Complex, V: Complex) -> tuple[Complex, Complex]:
-    """Tangent of the load law at voltages V (V): the factors (S) of a change of V and of its conjugate."""
+    """Return the tangent of the load law at voltages V (V): the factors (S) of a change of V and of its conjugate."""
     magnitude = np.abs(V)
     return I0 / (2.0 * magnitude), -np.conj(S) / np.conj(V) ** 2 - I0 * V / (2.0 * magnitude * np.conj(V))
 
 
 def _linear(M: Complex) -> Real:
-    """Real form of V -> M V on [Re; Im]."""
+    """Return the real form of V -> M V on [Re; Im]."""
     return np.block([[M.real, -M.imag], [M.imag, M.real]])
 
 
 def _conjugate_linear(M: Complex) -> Real:
-    """Real form of V -> M V^* on [Re; Im]."""
+    """Return the real form of V -> M V^* on [Re; Im]."""
     return np.block([[M.real, M.imag], [M.imag, -M.real]])
 
 

@@ -29,14 +29,14 @@ class Dynamics:
     h
         Step (s).
     connected
-        Which inverters are switched on at the start; all by default.
+        Whether each inverter is switched on at the start; by default all are.
 
     Attributes
     ----------
     inverters : Inverters
         Their state; set-points may be written between runs.
     network : LiveNetwork
-        What is between them.
+        Network between them.
 
     Notes
     -----
@@ -60,7 +60,7 @@ class Dynamics:
     ) -> OperatingPoint:
         """Start from the equilibrium at real powers `P` (pu), and at reactive powers `Q` or set-points `V_set` (pu).
 
-        With `Q` the droops are shifted so that they give it, as GridLAB-D does: V_set := v + m_q q for a
+        With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a
         GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop.
 
         Raises
@@ -77,32 +77,32 @@ class Dynamics:
         return point
 
     def connect(self, circuit: Circuit) -> None:
-        """Go on with another network; see `plant.dynamics.switching.connect`."""
+        """Continue with another network; see `plant.dynamics.switching.connect`."""
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
-        """Connect an inverter or take it off; see `switch_inverters`."""
+        """Connect or disconnect an inverter; see `switch_inverters`."""
         self.switch_inverters((i,), on)
 
     def switch_inverters(self, which: Sequence[int], on: bool) -> None:
-        """Connect inverters or take them off, all at once; see `plant.dynamics.switching.switch_inverters`."""
+        """Connect or disconnect inverters, all at once; see `plant.dynamics.switching.switch_inverters`."""
         self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
-        """Take all that feeds these islands off the network; see `plant.dynamics.switching.deenergise`."""
+        """Disconnect all sources of these islands; see `plant.dynamics.switching.deenergise`."""
         self._trips += switching.deenergise(self.inverters, self.network, islands, step)
 
     def take_trips(self) -> list[switching.Trip]:
-        """What was tripped since the last call because its island has no solution."""
+        """Take out the trips since the last call of islands without solution."""
         trips, self._trips = self._trips, []
         return trips
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; returns steps x n_inv x `kernel.step.READING`, all finite.
+        """Advance by `steps` steps; return steps x n_inv x `kernel.step.READING`, all finite.
 
-        Where the frozen tangent does not lead to a solution it is renewed, as often as need be. An island that has
-        none is de-energised before the step, which the others then take. With 0 steps the inner loop is only compiled
-        or loaded.
+        Where the frozen tangent leads to no solution it is renewed, as often as necessary. An island without
+        solution is de-energised before the step, and the others take the step. With 0 steps the inner loop is only
+        compiled or loaded.
         """
         network = self.network
         out = np.zeros((steps, len(self.inverters), READING))
@@ -112,7 +112,7 @@ class Dynamics:
             solution = 2 * step + what
             if what == 2:
                 islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
-            elif solution == renewed:  # just renewed, and yet not solved: rounding near the largest load there is
+            elif solution == renewed:  # just renewed, but not solved: rounding near the largest possible load
                 islands = set(np.flatnonzero(network.reduction.live).tolist())
             else:
                 try:
@@ -163,14 +163,14 @@ class Dynamics:
         units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
 
     def voltages(self) -> Complex:
-        """Present voltages of the circuit's nodes (V), 0 in dead islands and at nodes without any admittance."""
+        """Return the voltages of the circuit's nodes (V); 0 in dead islands and at nodes without any admittance."""
         network = self.network
         return network.reduction.node_voltages(
             self.inverters.J, network.V_branch[network.reduction.branches], network.source_voltage
         )
 
     def frequency(self, island: int) -> float:
-        """Frequency (Hz) of an island: nominal at a source, else the mean over its GFM by rating; 0 if it is dead."""
+        """Return an island's frequency (Hz): nominal at a source, else its GFM's mean by rating; 0 if it is dead."""
         units, reduction = self.inverters, self.network.reduction
         if reduction.has_source[island]:
             return units.f_nom
@@ -182,5 +182,5 @@ class Dynamics:
         return units.f_nom + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
-        """Present f (Hz), P (W), Q (var), V (V) from the last solution, n_inv x 4, before any step was taken."""
+        """Return f (Hz), P (W), Q (var), V (V) of the last solution, n_inv x 4, before the first step."""
         return self.inverters.readings(self.network.reduction.online)

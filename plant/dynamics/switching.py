@@ -1,4 +1,4 @@
-"""What happens to the inverters when the network changes: who stops, who starts again, and in step with what."""
+"""Changes of the network: the inverters that stop, and those that start again, in step with the voltage there."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from plant.dynamics.phasors import PHASES, aligned_sum
 
 
 class Trip(NamedTuple):
-    """Inverters, and perhaps the substation, that had to be taken off because their island has no solution."""
+    """Inverters, and perhaps the substation, disconnected because their island has no solution."""
 
     step: int
-    """Steps of the present `Dynamics.run` that were done before."""
+    """Number of steps of the present `Dynamics.run` before it."""
     inverters: tuple[int, ...]
-    """Those taken off."""
+    """Disconnected inverters."""
     substation: bool
     """Whether the substation was disconnected too."""
     V_min: float
-    """Lowest terminal voltage among them before (pu); inf where only the substation was left."""
+    """Their lowest terminal voltage before (pu); inf where only the substation was left."""
 
 
 def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Trip]:
-    """Go on with another network: factor it and find its first solution with the present injections.
+    """Continue with another network: factor it and find its first solution with the present injections.
 
     Inverters that lose their source of voltage stop; those that regain it start at zero current,
-    in step with the voltage they find. An island without solution is de-energised; returns what was tripped for it.
+    in step with the voltage there. An island without solution is de-energised; return its trips.
     """
     before = network.reduction.online
     trips: list[Trip] = []
@@ -58,26 +58,26 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Tr
 
 
 def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> list[Trip]:
-    """Take all inverters of these islands off the network; where there are none, the substation.
+    """Disconnect all inverters of these islands; where there are none, the substation.
 
-    An island that the substation feeds thus first loses its inverters only: the grid may well feed it without them.
-    Inverters come back by `switch_inverters`, the substation does not.
+    An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
+    `switch_inverters` reconnects inverters; the substation stays off.
 
     Parameters
     ----------
     units, network
         The inverters and the network between them.
     islands
-        As the present reduction numbers them.
+        Their numbers in the present reduction.
     step
-        Steps of the present run that were done before; told again in the trips.
+        Number of steps of the present run before; the trips repeat it.
     """
     trip = _trip(units, network, islands, step)
     return [trip, *(later._replace(step=step) for later in connect(units, network, network.circuit))]
 
 
 def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> Trip:
-    """Mark as taken off what feeds these islands; the network is yet to be changed."""
+    """Mark the sources of these islands as disconnected; the network itself changes later."""
     reduction = network.reduction
     numbers = list(islands)
     lost = reduction.online & np.isin(reduction.inverter_island, numbers)
@@ -90,11 +90,11 @@ def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: 
 
 
 def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int], on: bool) -> list[Trip]:
-    """Take inverters off the network all at once, or put them back at zero current, in step with the voltage there.
+    """Disconnect inverters all at once, or reconnect them at zero current, in step with the voltage there.
 
-    Back, the set-points of each are those at which it rests there: V_set the terminal's voltage, and the P_set whose
-    droop gives no power at the island's frequency. What comes next is a matter of control alone.
-    Returns what had to be tripped because its island has no solution without them, or with them.
+    A reconnected inverter gets the set-points at which it rests: V_set is the terminal's voltage, and P_set the value
+    whose droop gives no power at the island's frequency. Control decides the rest.
+    Return the trips of islands that have no solution afterwards.
     """
     moved = [i for i in which if on != bool(units.connected[i])]
     if not moved:
@@ -109,7 +109,7 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
     for i, w in speed.items() if on else ():
         if units.forming[i]:
             units.gfm_state["w"][units.gfm_at == i] = w
-        else:  # its PLL has found the island's frequency before the contactor closes
+        else:  # its PLL has locked to the island's frequency before the contactor closes
             follower = units.gfl_at == i
             units.gfl_state["w_i"][follower] = w
             units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
@@ -117,7 +117,7 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
 
 
 def _black_start(units: Inverters, i: int) -> None:
-    """A GFM that comes back: in step with the voltage it finds, or at its set-point where there is none."""
+    """Start a returning GFM in step with the voltage there, or at its set-point without voltage."""
     V_1 = complex(aligned_sum(units.V[i])) / 3.0
     if abs(V_1) < 0.1 * units.V_b[i]:
         V_1 = complex(units.set_points[i, 1] * units.V_b[i])
@@ -126,11 +126,11 @@ def _black_start(units: Inverters, i: int) -> None:
 
 
 def _island_speed(units: Inverters, network: LiveNetwork, i: int) -> float:
-    """Speed (rad/s, relative to nominal) of the island that inverter i stands in; 0 with a source or dead."""
+    """Return the speed (rad/s, relative to nominal) of inverter i's island; 0 with a source or if dead."""
     leader = network.reduction.leader[network.reduction.inverter_island[i]]
     return 0.0 if leader < 0 else float(units.gfm_state["w"][units.gfm_at == leader][0])
 
 
 def _mean_voltage(units: Inverters, i: int) -> float:
-    """Mean terminal voltage of inverter i (pu)."""
+    """Return the mean terminal voltage of inverter i (pu)."""
     return float(np.mean(np.abs(units.V[i]))) / float(units.V_b[i])

@@ -18,8 +18,8 @@ class LoadBranches:
 
     .. math:: I = (S / V)^* + I_0 \, V / |V|
 
-    so that the constant-current part keeps magnitude and power factor whatever the angle. Constant-impedance loads
-    are not here, but in `Network.admittance`.
+    so the constant-current part keeps magnitude and power factor at any angle. `Network.admittance` has the
+    constant-impedance loads.
 
     References
     ----------
@@ -41,13 +41,13 @@ class LoadBranches:
     a_from: NDArray[np.float64]
     """Ratio of the voltage at the branch's beginning to that of node `n_from`: 1 unless merged."""
     a_to: NDArray[np.float64]
-    """The same at its end; 0 at ground, where index -1 would pick up the last node's voltage."""
+    """The same at its end; 0 at ground, where index -1 would read the last node's voltage."""
 
     def __len__(self) -> int:
         return len(self.n_from)
 
     def on(self, merge: Merge) -> LoadBranches:
-        """Give the same loads, connected to the representatives of their nodes."""
+        """Return the same loads, connected to the representatives of their nodes."""
         return LoadBranches(
             n_from=merge.representative[self.n_from],
             n_to=np.where(self.n_to < 0, -1, merge.representative[self.n_to]),
@@ -60,11 +60,11 @@ class LoadBranches:
         )
 
     def voltages(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Voltages across the branches (V) from the nodes' voltages (V, line-to-ground)."""
+        """Return the voltages across the branches (V) from the nodes' voltages (V, line-to-ground)."""
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
 
     def branch_currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Currents through the branches (A). A branch without voltage, in a dead island, takes none."""
+        """Return the currents through the branches (A). A branch without voltage, in a dead island, takes none."""
         across = self.voltages(V)
         magnitude = np.abs(across)
         alive = magnitude > 0.0
@@ -73,11 +73,11 @@ class LoadBranches:
         return np.asarray(np.where(alive, current, 0.0), dtype=np.complex128)
 
     def powers(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Powers taken by the branches (VA)."""
+        """Return the powers taken by the branches (VA)."""
         return np.asarray(self.voltages(V) * np.conj(self.branch_currents(V)), dtype=np.complex128)
 
     def currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Currents that the loads draw from the nodes (A), positive into the load.
+        """Return the currents that the loads draw from the nodes (A), positive into the load.
 
         Parameters
         ----------

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Merge:
-    r"""Which nodes an ideal device makes one of, and at what ratio.
+    r"""Nodes merged by ideal devices, with their ratios.
 
     A closed switch or a regulator has no impedance, so it has no admittance either. Instead, each group of nodes
     tied by such devices keeps one unknown, the voltage of its representative r:
@@ -34,21 +34,21 @@ class Merge:
 
     @property
     def representatives(self) -> NDArray[np.int64]:
-        """The nodes that represent their groups, ascending."""
+        """Nodes that represent their groups, ascending."""
         return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
 
     def expand(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Give every node its voltage (V) from the voltages at the representatives (the other entries are unused)."""
+        """Return every node's voltage (V) from the voltages at the representatives (the other entries are unused)."""
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
 
     def gather(self, current: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Bring currents at all nodes (A) to the representatives; the other entries become zero."""
+        """Sum the currents of all nodes (A) at the representatives; the other entries become zero."""
         gathered = np.zeros(len(current), dtype=np.complex128)
         np.add.at(gathered, self.representative, self.ratio * current)
         return gathered
 
     def matrix(self) -> sp.csc_array:
-        """T with V = T V_rep and I_rep = T' I (n x n, columns of nodes that represent nothing are empty)."""
+        """Return T with V = T V_rep and I_rep = T' I (n x n; columns of nodes that represent nothing are empty)."""
         n = len(self.representative)
         return sp.csc_array((self.ratio, (np.arange(n), self.representative)), shape=(n, n))
 
@@ -63,12 +63,12 @@ def merge_nodes(names: Sequence[str], ties: Iterable[tuple[int, int, float]], pr
     ties : iterable of (from, to, ratio)
         Ideal devices: V_to = ratio * V_from.
     preferred : sequence of int
-        Nodes that shall represent their group if they can, the most wanted first; else it is the first node.
+        Nodes that represent their groups by preference, the most preferred first; else the first node does.
 
     Raises
     ------
     ValueError
-        If two ways between the same nodes have different ratios: an ideal short circuit.
+        If two paths between the same nodes have different ratios: an ideal short circuit.
     """
     n = len(names)
     neighbours: list[list[tuple[int, float]]] = [[] for _ in range(n)]

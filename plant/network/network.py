@@ -25,23 +25,22 @@ DELTA_PAIRS = (("A", "B"), ("B", "C"), ("C", "A"))
 
 
 class Network:
-    """A feeder's nodes, switches and admittances. Pure: every method is a function of the tables and of `closed`.
+    """Nodes, switches and admittances of a feeder. Pure: every method is a function of the tables and of `closed`.
 
     Nodes are (bus, phase), buses in the order of the feeder's table, phases A, B, C. All voltages are line-to-ground
     phasors (V RMS) in one frame at nominal frequency; all reactances are those at nominal frequency.
 
-    Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); what they tie keeps
+    Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); tied nodes keep
     one unknown. In `admittance` only representatives have entries.
 
     Parameters
     ----------
     feeder : Feeder
-        Tables, as `plant.tables.read_feeder` gives them.
+        Tables from `plant.tables.read_feeder`.
     line_charging : bool, optional
-        Whether the lines' shunt capacitance is taken in. The published solution of the standard feeder has it.
-
+        Whether to include the lines' shunt capacitance. The published solution of the standard feeder has it.
     spares : iterable of str, optional
-        Names of the feeder's spare inverters that are there; ValueError if there is no such spare.
+        Names of the spare inverters in this run; ValueError for an unknown one.
 
     Attributes
     ----------
@@ -54,7 +53,7 @@ class Network:
     switches : dict of str to Switch
         By name ("13-152"); `switch_name` finds the name.
     closed0 : frozenset of str
-        Names of the switches that are closed at first.
+        Names of the switches that are closed at the start.
     source_nodes : int64[3] or int64[0]
         Nodes of the substation, if there is one. They always represent themselves.
     source_voltage : complex128[3] or complex128[0]
@@ -94,7 +93,7 @@ class Network:
         ]
 
     def index(self, bus: str, phase: str) -> int:
-        """Position of a node in all vectors; KeyError if there is none."""
+        """Return the position of a node in all vectors; raise KeyError if there is no such node."""
         return self._index[bus, phase]
 
     def has(self, bus: str, phases: str) -> bool:
@@ -107,7 +106,7 @@ class Network:
         Raises
         ------
         ValueError
-            If no switch is called so.
+            If no switch has this name.
         """
         known = {name: switch.name for switch in self.switches.values() for name in switch.names}
         if text not in known:
@@ -117,17 +116,17 @@ class Network:
         return known[text]
 
     def merge(self, closed: frozenset[str]) -> Merge:
-        """Tell which nodes are one when these switches are closed, and at what ratio (regulators).
+        """Return the nodes that these closed switches and the regulators merge, with their ratios.
 
         The substation's nodes represent their groups, then the inverters' nodes, else the first node of a group.
         """
         return merge_nodes(self._node_names(), self._ties(closed), self._wanted)
 
     def admittance(self, closed: frozenset[str]) -> sp.csc_array:
-        """Admittance matrix (S) with these switches closed, between representatives.
+        """Return the admittance matrix (S) with these switches closed, between representatives.
 
-        Lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
-        their representative are empty, as is the matrix outside of the islands' blocks.
+        It has lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
+        their representative are empty, and so is the matrix outside of the islands' blocks.
 
         Returns
         -------
@@ -140,11 +139,11 @@ class Network:
         return Y
 
     def loads(self) -> LoadBranches:
-        """Give the loads of constant power and current, at their own nodes (`LoadBranches.on` moves them)."""
+        """Return the loads of constant power and current, at their own nodes (`LoadBranches.on` moves them)."""
         return self._load_branches([load for load in self.feeder.loads if load.model != "Z"])
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
-        """Buses that are connected through branches and closed switches, in the order of each set's first bus."""
+        """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
         feeder = self.feeder
         ends = [(line.from_bus, line.to_bus) for line in feeder.lines]
         ends += [(transformer.from_bus, transformer.to_bus) for transformer in feeder.transformers]
@@ -217,7 +216,7 @@ class Network:
     def _impedance_loads(self) -> sp.csc_array:
         branches = self._load_branches([load for load in self.feeder.loads if load.model == "Z"])
         parts = []
-        # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
+        # _load_branches returns a Z load with its nominal power in S, like a constant-power load.
         for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.S, branches.V_nom, strict=True):
             y = S.conjugate() / V**2
             if n_to < 0:
@@ -255,7 +254,7 @@ class Network:
 
 
 def _chosen(feeder: Feeder, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
-    """Give the spare inverters of these names, in the table's order."""
+    """Return the spare inverters of these names, in the table's order."""
     known = {row.name: row for row in feeder.spares}
     for name in spares:
         if name not in known:

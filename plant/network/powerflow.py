@@ -1,4 +1,4 @@
-"""A plain power flow of what the substation feeds: for tests, documentation and starting values."""
+"""A plain power flow of the nodes that the substation feeds: for tests, documentation and starting values."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from plant.network.loads import LoadBranches
 from plant.network.network import Network
 
 Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
-"""From the voltages of all nodes (V) to the currents fed into them (A)."""
+"""Function from the voltages of all nodes (V) to the currents fed into them (A)."""
 
 MOST_ITERATIONS = 200
-"""A feeder that can carry its loads takes about 10; one that cannot diverges long before."""
+"""Most iterations: a feeder that can carry its loads takes about 10, one that cannot diverges long before."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class PowerFlow:
     S_capacitors: complex
     """Power taken by capacitor banks (VA); their imaginary part is negative."""
     iterations: int
-    """How often the network was solved."""
+    """Number of network solutions."""
 
 
 def solve_power_flow(
@@ -48,7 +48,7 @@ def solve_power_flow(
     injection: Injection | None = None,
     tolerance: float = 1e-10,
 ) -> PowerFlow:
-    r"""Solve what the substation reaches, by a fixed point.
+    r"""Solve the nodes that the substation reaches, by a fixed point.
 
     .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
 
@@ -59,7 +59,7 @@ def solve_power_flow(
     closed : frozenset of str
         Names of the closed switches.
     loads : LoadBranches, optional
-        Loads of constant power and current; those of the network if left out.
+        Loads of constant power and current; by default the network's own.
     shunt : complex128[n], optional
         Admittances to ground added at the nodes (S): filters of inverters.
     injection : callable, optional
@@ -77,7 +77,7 @@ def solve_power_flow(
     ValueError
         If the feeder has no source.
     ArithmeticError
-        If it does not converge: mostly a load that the feeder cannot carry.
+        If it does not converge, mostly because the feeder cannot carry the load.
     """
     if not len(network.source_nodes):
         raise ValueError(f'feeder "{network.feeder.name}" has no source; a power flow needs one, give source.csv')
@@ -114,7 +114,7 @@ def solve_power_flow(
 
 
 def _reached(Y: sp.csc_array, source: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Nodes connected to the source through the matrix, without the source's own."""
+    """Return the nodes connected to the source through the matrix, without the source's own."""
     _, label = connected_components(sp.csr_array(abs(Y)), directed=False)
     reached = np.isin(label, label[source])
     reached[source] = False

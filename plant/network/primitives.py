@@ -12,7 +12,7 @@ DELTA = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 
 
 def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArray[np.complex128]:
-    r"""Nodal admittance of a line (S), a pi of series impedance and halves of the shunt capacitance.
+    r"""Return the nodal admittance of a line (S), a pi of series impedance and halves of the shunt capacitance.
 
     .. math:: Y = \begin{pmatrix} z^{-1} + y/2 & -z^{-1} \\ -z^{-1} & z^{-1} + y/2 \end{pmatrix}
 
@@ -23,7 +23,7 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
     config : LineConfig
         Its impedance and susceptance per length.
     charging : bool
-        Whether the shunt capacitance is taken in.
+        Whether to include the shunt capacitance.
 
     Returns
     -------
@@ -42,10 +42,10 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
 
 
 def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> NDArray[np.complex128]:
-    """Nodal admittance of a three-phase transformer (S) at its nominal ratio.
+    """Return the nodal admittance of a three-phase transformer (S) at its nominal ratio.
 
-    A delta-delta transformer passes no zero sequence, so nothing decides the mean of the three voltages at `to_bus`,
-    and the matrix would be singular there. A zero-sequence admittance to ground at `to_bus` puts this mean to zero.
+    A delta-delta transformer passes no zero sequence, so the mean of the three voltages at `to_bus` is undetermined,
+    and the matrix would be singular there. A zero-sequence admittance to ground at `to_bus` sets this mean to zero.
     It carries no current, hence changes nothing, as long as nothing else at `to_bus` is connected to ground; loads
     behind a delta winding must be delta loads.
 
