@@ -216,7 +216,7 @@ class Reduction:
 
     @one_thread()
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return every node's voltage (V), 0 in dead islands, from injections J (n_inv x 3, A) and branch currents I_b (A)."""
+        """Return every node's voltage (V), 0 in dead islands, for injections J (n_inv x 3, A) and currents I_b (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         Z_G, Z_C, Z_S = self._columns
         V[self._unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
