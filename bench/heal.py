@@ -1,8 +1,8 @@
-"""How long a cut between hosts takes to heal, whenever it heals, and whether those who were not cut off notice it.
+"""Measure how long a cut between hosts takes to heal, and whether agents that were not cut off notice it.
 
 Two hosts (network namespaces): the plant and six agents of the paper's feeder on one, three on the other. The other is
 cut off for 1.7 to 3.2 s, again and again: around the 2 s after which Zenoh gives a silent link up, the worst time to
-heal, as one side may have given up and the other not.
+heal, as one end may have given up and the other not.
 
     .venv/bin/python bench/heal.py [--repeat 40] [--seed 1]
 """
@@ -26,7 +26,7 @@ from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.hosts import Hosts
 
 AWAY = ("inv7", "inv8", "inv9")
-"""Who is on the other host: one grid-forming, two grid-following."""
+"""Agents on the other host: one grid-forming, two grid-following."""
 
 SHORTEST, LONGEST = 1.7, 3.2
 """Of a cut (s)."""

@@ -76,11 +76,11 @@ class Budget:
         self.fleet, self.hosts = fleet, hosts
         self.samples: dict[str, list[float]] = defaultdict(list)
         self.tokens: dict[str, int] = defaultdict(int)
-        """How often the token was still there when the last neighbour noticed."""
+        """Number of times that the token was still there when the last neighbour noticed."""
         self.halves: dict[str, int] = defaultdict(int)
-        """How often somebody who was back heard not all of the others again."""
+        """Number of times that an agent that was back did not hear all others again."""
         self.deaf: dict[str, int] = defaultdict(int)
-        """How often the observer's own link was dead afterwards, and he opened a new session."""
+        """Number of times that the observer's own link was dead afterwards, and it opened a new session."""
         self._open = False
 
     def once(self) -> None:

@@ -80,7 +80,7 @@ class Watched:
         self.telemetry: Telemetry | None = None
         self.events: list[PlantEvent] = []
         self.tokens: dict[str, float] = {}
-        """When the token of each agent that is present came (s, monotonic)."""
+        """Time (s, monotonic) at which the token of each present agent came."""
         self.used: dict[str, tuple[str, ...]] = {}
         """By agent, the neighbours in its sums."""
         self.turns: list[tuple[float, str, str, bool]] = []
@@ -92,7 +92,7 @@ class Watched:
         self._offsets: deque[float] = deque(maxlen=250)
         self._commands = 0
         self._reports: dict[str, float] = {}
-        """When the last status of each agent came."""
+        """Time at which the last status of each agent came."""
         self._client = RunClient(RunAddress(run=RUN, connect=(endpoint,)), listen=(listen,))
         self.keys = self._client.keys
         for key in (self.keys.telemetry, self.keys.measurement(self.names[0]), self.keys.state(self.names[0])):
@@ -179,7 +179,7 @@ class Watched:
         )
 
     def turned(self, name: str, into: bool) -> tuple[float, float]:
-        """Wait until somebody is in the sums of all others, or of none; when the first and the last turned."""
+        """Wait until an agent is in the sums of all others, or of none; return the times of the first and the last."""
         others = [other for other in self.names if other != name]
         self.until(
             lambda: all((name in self.used.get(other, ())) == into for other in others),
@@ -200,7 +200,7 @@ class Watched:
         return found[0].t
 
     def restored(self, names: Sequence[str], since: float) -> float:
-        """Wait until f and sharing of the judged inverters have held for `HOLD` s; when that began (s)."""
+        """Wait until f and sharing of the judged inverters have held for `HOLD` s; return when that began (s)."""
         begin = [since]
 
         def held() -> bool:
@@ -222,7 +222,7 @@ class Watched:
     # ---------------------------------------------------------------- doing
 
     def signal(self, name: str, number: int) -> float:
-        """Send a signal to an agent's process; when."""
+        """Send a signal to an agent's process; return the time."""
         self.children[name].signal(number)
         return monotonic()
 

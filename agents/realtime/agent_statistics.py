@@ -1,4 +1,4 @@
-"""What an agent under real time has done since its start, and its report of it. Pure."""
+"""Counts of an agent under real time since its start, and its status message. Pure."""
 
 from __future__ import annotations
 

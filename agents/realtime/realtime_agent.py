@@ -42,19 +42,7 @@ take what was sent last with it."""
 
 
 class RealtimeAgent(AgentNode):
-    """One agent under real time, on one session after the other if need be.
-
-    Parameters
-    ----------
-    config : AgentConfig
-        Who it is and the run's rule.
-    instance : str
-        Which process this is, unique in the run; part of the agent's token.
-    links : Links, optional
-        What the links to it do to its messages.
-    law : Law, optional
-        What decides its set-points; the paper's if left out.
-    """
+    """One agent under real time, on one session after the other if need be; parameters as of `AgentNode`."""
 
     def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
         if config.speed <= 0.0:
@@ -67,7 +55,7 @@ class RealtimeAgent(AgentNode):
         self.session_broken = False
         """Whether it closes only to begin again with a new session."""
         self.statistics = AgentStatistics()
-        """What it has done."""
+        """Its counts."""
         self._plant_epoch = 0
         """Epoch of the plant that was followed last; 0 before the first."""
         self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
@@ -77,7 +65,7 @@ class RealtimeAgent(AgentNode):
         self._give_up: float | None = None
         self._health = SessionHealth(config.name)
         self._leaving = ""
-        """Why it leaves, once the plant has been told."""
+        """Reason why it leaves, once it has sent `Leave`."""
         self._ran = False
         """Whether it has ticked in the present epoch of the plant."""
         self._left = 0
@@ -97,9 +85,9 @@ class RealtimeAgent(AgentNode):
         self.members.clear()
         self.states.clear()
         self._missing_agents: tuple[str, ...] = ()
-        """For whom the plant said last that it waits."""
+        """Agents that the plant waits for, as it said last."""
         self._run_time = 0.0
-        """That of the last measurement that came off the wire (s)."""
+        """Run time of the last measurement that came off the wire (s)."""
         self._neighbours: tuple[str, ...] = ()
         """In-neighbours among the agents that have been met."""
         self._used_neighbours: tuple[str, ...] = ()
@@ -304,7 +292,7 @@ class RealtimeAgent(AgentNode):
             return  # what the dead plant said last would still look fresh
         measurement = self.states.measured(at, self._config.max_age)
         if measurement is None:
-            self._hold("no measurement of late; holds")
+            self._hold("no recent measurement; holds")
             return
         if self.phase != "running":
             self.phase = "running"

@@ -1,7 +1,7 @@
 """Detect a broken Zenoh session: agents that should be heard but are not, or an agent that nobody hears. Pure.
 
-The plant tells whom it hears: a neighbour that the agent does not hear, or not the agent itself, shows that the session
-fails (`wire.session_patience`).
+Each measurement lists the agents that the plant hears. If a neighbour on that list is silent here, or the agent itself
+is not on it, the session fails (`wire.session_patience`).
 
 Times are s of wall time on the agent's clock.
 """
@@ -15,11 +15,11 @@ from wire.messages import PLANT
 from wire.session_patience import SessionPatience
 
 SILENT = 1.0
-"""Time (s) without a message of the plant, or of a neighbour whom it hears, after which that one is silent."""
+"""Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""
 
 
 class SessionHealth:
-    """Whether the agent's session brings what it should, one session after the other.
+    """Judge whether the agent's session brings the messages that it should, one session after the other.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ class SessionHealth:
         self._ran = False
         """Whether the agent has ever been in touch with a plant; before that, silence proves nothing."""
         self._plant_seen = -inf
-        """When the plant was last known to be there, though it measures nothing yet."""
+        """Time (s) at which the plant was last known to be there, though it measures nothing yet."""
         self._patience = SessionPatience()
         self._begin()
 
     def _begin(self) -> None:
         """Begin with a session of which nothing is known."""
         self._came: dict[str, float] = {}
-        """When the last message of each sender came off the wire."""
+        """Time (s) at which the last message of each sender came off the wire."""
         self._crossed: dict[str, tuple[str, float]] = {}
         """By sender: the owner of the other key under which its messages came, and the time of the last."""
 
@@ -64,11 +64,11 @@ class SessionHealth:
         self._came[name] = now
 
     def has_come(self, name: str) -> bool:
-        """Whether a message has come from somebody."""
+        """Return whether a message has come from a sender."""
         return name in self._came
 
     def forget(self, name: str) -> None:
-        """Forget somebody, as its process is gone."""
+        """Forget a sender, as its process is gone."""
         self._came.pop(name, None)
 
     def plant_seen(self, now: float) -> None:
@@ -87,14 +87,14 @@ class SessionHealth:
     def problem(
         self, roster: Sequence[str] | None, *, met: Collection[str], neighbours: Collection[str], now: float
     ) -> str:
-        """Say why a new session is needed; empty if it is not.
+        """Return the reason why a new session is needed; "" if none is.
 
         Parameters
         ----------
         roster : Sequence[str] or None
-            Whom the plant hears, as the last measurement says; None if there is no recent one.
+            Agents that the plant hears, as the last measurement says; None if there is no recent one.
         met, neighbours : Collection[str]
-            Agents whose nameplate is known, and those of them whom the agent listens to.
+            Agents whose nameplate is known, and those of them that the agent listens to.
         now : float
             s on the own clock.
         """
@@ -114,7 +114,7 @@ class SessionHealth:
     def _silent(
         self, roster: Sequence[str] | None, met: Collection[str], neighbours: Collection[str], now: float
     ) -> tuple[str, ...]:
-        """Give the plant, or neighbours that the plant hears, or the agent itself, if the plant does not hear it."""
+        """Return the silent names: the plant, neighbours that it hears, or the agent itself, if it is unheard there."""
         if self._ran and now - max(self._came.get(PLANT, -inf), self._plant_seen) > SILENT:
             return (PLANT,)
         if roster is None:

@@ -1,7 +1,7 @@
-"""When an agent ticks within the plant's control period. Pure.
+"""Timer of an agent's ticks within the plant's control period. Pure.
 
-An agent has a clock of its own, and nobody tells it when to tick. Ticking just as its next measurement comes would be
-the worst time: now before it and now after, and what it decides then misses the plant's step, so that its loop is one
+An agent has a clock of its own. The worst time to tick is just as its next measurement comes, now before it and now
+after: its set-points then miss the plant's step, so that its loop is one
 period longer. With the paper's gains the vars of a returning inverter then ring for a second. So an agent keeps to the
 middle half of the period between two measurements, as an inverter's controller keeps clear of its own sampling.
 """
@@ -14,7 +14,7 @@ EARLIEST, LATEST = 0.25, 0.75
 """Bounds of the middle half."""
 
 CONVINCED = 5
-"""So many measurements in a row come at a bad time before the ticks are moved: one may just have been late."""
+"""Measurements in a row that come at a bad time before the ticks are moved: one may just have been late."""
 
 
 class TickTimer:
@@ -59,7 +59,7 @@ class TickTimer:
         self._measured = at
 
     def take(self, now: float) -> int:
-        """Note that a tick is done now; number of ticks that were skipped for it."""
+        """Note that a tick is done now; return the number of ticks that were skipped for it."""
         skipped = self._timer.take(now)
         if self._measured is not None and self._keeps_clear:
             self._keep_clear(self._measured)

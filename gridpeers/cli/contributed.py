@@ -1,4 +1,4 @@
-"""Commands that come from outside of the command line: those of the papers, and of installed distributions.
+"""Commands from outside of the command line: those of the papers, and of installed distributions.
 
 A command is a function that typer can read. It is added by an entry point of the group "gridpeers.commands".
 """

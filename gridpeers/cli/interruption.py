@@ -1,4 +1,4 @@
-"""A command that is ended from outside closes as after Ctrl-C, and its exit code says by what."""
+"""End a command by a signal as Ctrl-C does; the exit code names the signal."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ def interruptible() -> Iterator[None]:
 
 
 def exit_code(error: KeyboardInterrupt) -> int:
-    """Exit code of a command that was ended so."""
+    """Return the exit code of a command that a signal ended."""
     return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED

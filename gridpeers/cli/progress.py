@@ -1,4 +1,4 @@
-"""How far a run has come: a bar per case on a terminal, a line per finished case elsewhere."""
+"""Show the progress of a run: a bar per case on a terminal, a line per finished case elsewhere."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COMPILING = "still starting: the first run ever compiles the plant's inner loop,
 
 @contextmanager
 def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
-    """Give the function to tell how far each case is; its first call for a case, at t = 0, is the start.
+    """Yield the function that takes the progress of each case; its first call for a case, at t = 0, is the start.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
 
 @contextmanager
 def explained(explain: Callable[[], None]) -> Iterator[Tell]:
-    """Explain a start that takes long; it is over when time has moved, as the plant's first step is compiled last."""
+    """Explain a start that takes long; it ends when time moves, as the plant's first step is compiled last."""
     timer = threading.Timer(PATIENCE, explain)
     timer.daemon = True
     begun = False

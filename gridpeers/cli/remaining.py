@@ -1,4 +1,4 @@
-"""How far many runs together have come, and how long they still take: a bar on a terminal, lines elsewhere."""
+"""Show the progress of many runs together and the time left: a bar on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from scenarios.duration import duration
 
 Tell = Callable[[str, float], None]
-"""Told what is being done, what is within it behind a comma, and how much of all is done."""
+"""Takes the present work, with its part behind a comma, and the amount of all that is done."""
 
 MEMORY = 300.0
 """Window of a bar's estimate of the time left (s); runs differ in how long they take."""
@@ -20,14 +20,14 @@ MEMORY = 300.0
 
 @contextmanager
 def remaining(console: Console, total: float) -> Iterator[Tell]:
-    """Give the function to tell how far all is; its first call says how much was done before.
+    """Yield the function that takes the progress; its first call gives the amount that was done before.
 
     Parameters
     ----------
     console : Console
         Where to.
     total : float
-        How much there is to do, in whatever unit: runs, seconds simulated.
+        Amount of work, in any unit: runs, seconds simulated.
     """
     if not console.is_terminal:
         yield _lines(console, total)
@@ -57,7 +57,7 @@ def remaining(console: Console, total: float) -> Iterator[Tell]:
 
 
 def _lines(console: Console, total: float) -> Tell:
-    """A line for everything that begins, and for every tenth of all."""
+    """Print a line for each piece of work that begins, and for each tenth of all."""
     began = before = 0.0
     told: tuple[str, int] | None = None
 

@@ -1,4 +1,4 @@
-"""What was typed wrong, in one line as all other problems, with the nearest word; typer has three lines for it."""
+"""Errors of the command line in one line each, with the nearest word; typer prints three lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _UsageError: type[BaseException] = BadParameter.__mro__[1]
 
 
 class Commands(TyperGroup):
-    """Commands whose mistyped words are told in one line."""
+    """Commands that report mistyped words in one line."""
 
     def make_context(self, *words: Any, **extra: Any) -> Any:
         """Read the options before the command."""
@@ -48,7 +48,7 @@ def _told() -> Iterator[None]:
 
 
 def _line(error: Any) -> str:
-    """A problem in one line: where, what, and what would be right."""
+    """Return a problem in one line: where it is, what it is, and what would be right."""
     message = error.format_message().rstrip(".")
     path = error.ctx.command_path if error.ctx is not None else "gridpeers"
     param, kind = getattr(error, "param", None), type(error).__name__
@@ -68,14 +68,14 @@ def _line(error: Any) -> str:
 
 
 def _name(param: Any) -> str:
-    """What the help calls an option or an argument."""
+    """Return the name of an option or an argument in the help."""
     if param.param_type_name == "option":
         return str(max(param.opts, key=len))
     return param.metavar if param.metavar and param.metavar.isupper() else str(param.name).upper()
 
 
 def _wrong_value(error: Any, message: str) -> str:
-    """What is wrong with a value that was typed."""
+    """Return the problem of a value that was typed."""
     value, *choices = re.findall(r"'([^']*)'", message.partition(": ")[2]) or [""]
     ctx: dict[str, Any] = {}
     if details := getattr(error.__cause__, "errors", None):  # typer has values checked by pydantic since 0.29

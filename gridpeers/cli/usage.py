@@ -1,4 +1,4 @@
-"""What all commands have in common: exit codes, a scenario by its name, and the one way to end with an error."""
+"""Shared parts of all commands: exit codes, a scenario by its name, and the one way to end with an error."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> 
 
 
 def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioModel:
-    """The scenario with the cases and the seed of the command line."""
+    """Return the scenario with the cases and the seed of the command line."""
     import msgspec
 
     from gridpeers.runs.choices import with_cases
@@ -67,11 +67,11 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
 
 
 INSTALL = "install gridpeers with its dependencies: pip install -e ."
-"""What to do when a package is not there that everybody needs."""
+"""Advice when a package that all commands need is missing."""
 
 
 def require(modules: dict[str, str], install: str = INSTALL) -> None:
-    """End with a clear line when a package is not installed that something needs, and with what to do."""
+    """End with a clear line, and with advice, if a package is not installed that a part of gridpeers needs."""
     from importlib.util import find_spec
 
     packages = {"zenoh": "eclipse-zenoh"}
@@ -82,7 +82,7 @@ def require(modules: dict[str, str], install: str = INSTALL) -> None:
 
 
 def fail(lines: list[str], code: int) -> NoReturn:
-    """End the command with lines on standard error; what cannot be printed in them is spelt out."""
+    """End the command with lines on standard error; characters that cannot be printed are escaped."""
     from wire.printable import printable
 
     for line in lines:

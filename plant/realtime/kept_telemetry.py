@@ -1,11 +1,11 @@
-"""What the plant has published for recorders of late, to be published again to one that was out of reach. Pure."""
+"""The latest messages for recorders, kept to be published again for one that was out of reach. Pure."""
 
 from __future__ import annotations
 
 from collections import deque
 
 KEPT = 4_000_000
-"""Bytes that are kept: over two minutes of nine inverters at real time, and a small part of what the process takes."""
+"""Bytes that are kept: over two minutes of nine inverters at real time, a small part of the process's memory."""
 
 AT_ONCE = 20
 """Messages that are published again in one control period, so that the plant keeps its pace."""
@@ -14,8 +14,8 @@ AT_ONCE = 20
 class KeptTelemetry:
     """The latest messages on the key of telemetry, in their order.
 
-    Messages are numbered by the next or same Telemetry: what comes between two of them counts to the later one. While
-    something is published again, what is new waits for its turn: a recorder gets all in order.
+    Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
+    While messages are published again, new ones wait for their turn: a recorder gets all in order.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class KeptTelemetry:
         self._latest, self._count = 0, 0
 
     def add(self, number: int, payload: bytes) -> bool:
-        """Keep a message; whether it is to be published now, and not after what is published again."""
+        """Keep a message; return whether it is to be published now, and not after those that are published again."""
         self._latest, self._count = number, self.others(number) + 1
         self._kept.append((number, payload))
         self._bytes += len(payload)
@@ -54,19 +54,19 @@ class KeptTelemetry:
         return True
 
     def others(self, number: int) -> int:
-        """How many messages count to a Telemetry that is yet to be kept."""
+        """Return the number of messages that count to a Telemetry that is yet to be kept."""
         return self._count if number == self._latest else 0
 
     def again_from(self, number: int) -> int:
-        """Have messages from a number on published again; the first number that is still kept."""
+        """Have messages from a number on published again; return the first number that is still kept."""
         start = min(number, self._due[0][0]) if self._due else number
         self._due = deque(entry for entry in self._kept if entry[0] >= start)
         return max(number, self._kept[0][0]) if self._kept else number
 
     def take(self, count: int = AT_ONCE) -> list[bytes]:
-        """Take out what is to be published again now."""
+        """Take out the messages to publish again now."""
         return [self._due.popleft()[1] for _ in range(min(count, len(self._due)))]
 
     def take_all(self) -> list[bytes]:
-        """Take out all of it, as the run ends."""
+        """Take out all of them, as the run ends."""
         return self.take(len(self._due))

@@ -27,7 +27,7 @@ class LinkCommandSender:
     keys : Keys
         The run's.
     links : Links or None
-        Those to the plant; without any, nobody can be given commands.
+        The links to the plant; without any, commands are rejected.
     publish : Callable[[str, bytes], None]
         Publishes bytes under a key.
     """
@@ -98,18 +98,18 @@ class LinkCommandSender:
         )
 
     def answered(self, answer: LinkAcknowledgement) -> None:
-        """Note what an agent answered, and pass it on to whoever gave the command."""
+        """Note the answer of an agent, and pass it on to the client that gave the command."""
         name = answer.sender
         self._acknowledged[name] = max(self._acknowledged.get(name, 0), min(answer.seq, len(self._given)))
         self._pass_on(answer)
 
     def forget(self, name: str) -> None:
-        """Note that an agent is gone: whoever comes under its name is sent all commands."""
+        """Note that an agent is gone: the next agent of its name is sent all commands."""
         self._acknowledged.pop(name, None)
         self._sent.pop(name, None)
 
     def impaired(self, t: float) -> tuple[str, ...]:
-        """Agents between whom and the plant a fault holds at t (s of run time)."""
+        """Return the agents whose link to or from the plant has a fault at t (s of run time)."""
         return () if self._links is None else self._links.impaired(t)
 
     def _request(self, number: int, tree: dict[str, Any], t: float, reply_to: str) -> LinkRequest:

@@ -36,17 +36,7 @@ HEARD = 1.0
 
 
 class LivePlantNode(PlantNode):
-    """The plant in a run under real time, but for its steps.
-
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents and recorders to wait for, the control period and the speed.
-    plant : LivePlant
-        The plant at t = 0.
-    links : Links or None
-        What the links to the plant do to its messages.
-    """
+    """The plant in a run under real time, but for its steps; parameters as of `PlantNode`."""
 
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None) -> None:
         super().__init__(config, plant, links, rate=FASTER / config.T_c)
@@ -57,7 +47,7 @@ class LivePlantNode(PlantNode):
         self._states: dict[str, State] = {}
         """States that the links let through and that are not held yet."""
         self._state_at: dict[str, float] = {}
-        """When the last state of each agent came off the wire (s, driver's clock)."""
+        """Time (s, driver's clock) at which the last state of each agent came off the wire."""
         self._silence = SilenceDetector(config.max_age, config.T_c, config.T_c / config.speed)
         self._ask_timer = Timer(AGAIN, 0.0)
         self._refusals = 0
@@ -83,7 +73,7 @@ class LivePlantNode(PlantNode):
     # ---------------------------------------------------------------- tokens and nameplates
 
     def appeared(self, key: str, now: float) -> None:
-        """Note that a token appeared; whoever comes after the end did not hear that the others were told."""
+        """Note that a token appeared; an agent that comes after the end has missed the `Stop` to all."""
         parts = self.keys.parts(key)
         if self.phase == "closing" and parts[:2] == ("alive", "agent"):
             self._tokens.add(key)
@@ -190,7 +180,7 @@ class LivePlantNode(PlantNode):
 
     def _let_leave_and_join(self) -> None:
         """Ask the agents that leave at this tick by the scenario to do so, and report those that are to be started."""
-        leave, join, _ = self._schedule.take(self.tick)  # in real time whoever dies really does
+        leave, join, _ = self._schedule.take(self.tick)  # in real time an agent dies as a process
         for name in leave:
             instance = self.members.instance(name)
             if instance:

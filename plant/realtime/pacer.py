@@ -1,4 +1,4 @@
-"""How well steps keep to their due times in wall-clock time. Times are arguments: s on the driver's clock."""
+"""Due times of steps in real time, and the delays behind them. Times are arguments: s on the driver's clock."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class RealTimePacer:
         return self._start + self._slipped + self.steps * self.period
 
     def note(self, now: float) -> float:
-        """Note that the due step is made now; by how much the schedule had to be put off for it (s)."""
+        """Note that the due step is made now; return the time (s) by which the schedule is put off for it."""
         delay = max(0.0, now - self.due)
         self.steps += 1
         self.late += delay > self.period
@@ -67,7 +67,7 @@ class RealTimePacer:
         return delay
 
     def take_failure(self, of: int | None) -> bool:
-        """Whether it is clear now, and was not before, that pace cannot be kept.
+        """Return whether it is clear now, and was not before, that the plant cannot keep pace.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class RealTimePacer:
         return news
 
     def report(self) -> Pacing:
-        """Percentiles of the delays so far."""
+        """Return the percentiles of the delays so far."""
         ordered = sorted(self._delays) or [0.0]
 
         def percentile(part: float) -> float:
@@ -101,7 +101,7 @@ class RealTimePacer:
 
 
 def sentence(pacing: Pacing, period: float) -> str:
-    """How pace was kept, for a person.
+    """Return a sentence on the pace.
 
     Examples
     --------

@@ -39,17 +39,7 @@ WAITING = 0.5
 
 
 class RealtimePlant(LivePlantNode):
-    """The plant under real time.
-
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents to wait for, the control period, the speed and the end.
-    plant : LivePlant
-        The plant at t = 0.
-    links : Links, optional
-        What the links to the plant do to its messages.
-    """
+    """The plant under real time; parameters as of `PlantNode`."""
 
     def __init__(self, config: PlantConfig, plant: LivePlant, links: Links | None = None) -> None:
         if not config.speed > 0.0:
@@ -139,7 +129,7 @@ class RealtimePlant(LivePlantNode):
             self.recorder_feed.end()
 
     def close(self, reason: str, now: float) -> None:
-        """End the run and tell everybody."""
+        """End the run and tell all processes."""
         for line in self._warnings.left_out():
             self._tell_warning(line)
         self._say(f"ends: {reason}. {self.pacer}")
@@ -180,7 +170,7 @@ class RealtimePlant(LivePlantNode):
         self._say(f"t = 0; speed {self.config.speed:g}")
 
     def _tell_waiting(self) -> None:
-        """Tell the agents that the plant is there, and for whom they wait with it."""
+        """Tell the agents that the plant is there, and the names of the agents that it waits for."""
         waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=self.absent)
         self._publish(self.keys.control, encode(waiting))
 
@@ -197,7 +187,7 @@ class RealtimePlant(LivePlantNode):
             self.abort(f"plant: {text}", now)
 
     def _measure(self, now: float) -> None:
-        """Send every agent that is present its measurement, and who is heard."""
+        """Send every agent that is present its measurement, with the names of the agents that the plant hears."""
         readings, t, tick, epoch = self.plant.measure(), self.t, self.tick, self.config.epoch
         heard = self._heard(now)
         for name in self.members.nameplates:
@@ -206,7 +196,7 @@ class RealtimePlant(LivePlantNode):
         self._step_due = True
 
     def work(self, now: float) -> bool:
-        """Take the plant one step on, once its measurements are out. Whether anything was done."""
+        """Take the plant one step on, once its measurements are out; return whether it did."""
         if not self._step_due:
             return False
         self._step_due = False
@@ -227,7 +217,7 @@ class RealtimePlant(LivePlantNode):
             self._report_links()
         return True
 
-    # ---------------------------------------------------------------- what is told
+    # ---------------------------------------------------------------- events and telemetry
 
     @property
     def events(self) -> tuple[PlantEvent, ...]:

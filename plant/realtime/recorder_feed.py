@@ -23,7 +23,7 @@ class RecorderFeed:
         self._out_of_reach: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""
         self.kept = KeptTelemetry()
-        """What recorders can have again."""
+        """Messages that recorders can have again."""
         self.paced = False
         """Whether the plant keeps pace, so that `replay` publishes a little in each period; else all goes at once."""
 

@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 class RunCommands:
-    """Carries commands out.
-
-    Parameters
-    ----------
-    node : RealtimePlant
-        The plant that is asked.
-    """
+    """Carry commands to a plant out."""
 
     def __init__(self, node: RealtimePlant) -> None:
         self._node = node
@@ -46,7 +40,7 @@ class RunCommands:
         )
 
     def follow_up(self, command: Command, now: float) -> None:
-        """Do what a command entails once its answer is out."""
+        """Do the rest of a command once its answer is out."""
         node = self._node
         agents = node.members.nameplates
         if command.verb == "link":
@@ -83,9 +77,9 @@ class RunCommands:
         return f"switch {argument}: {verb} at t = {node.t:.2f} s"
 
     def _command_links(self, command: Command, now: float) -> dict[str, Any]:
-        """Return the command's number, from when on it holds (s), what it does, and the agents that are sent it.
+        """Return the command's number, its start (s), its effect in words, and the agents that are sent it.
 
-        It holds from one control period after the due tick on: till then all know it.
+        It holds from one control period after the due tick on: by then all agents have it.
         """
         node = self._node
         agents = self._agents(present=True)

@@ -1,10 +1,10 @@
-"""Agents that take part and are not heard: not by the plant, or not by a neighbour. Pure.
+"""Detect agents that take part and are not heard: not by the plant, or not by a neighbour. Pure.
 
 A frozen agent keeps its token for Zenoh's lease of 2 s, and two hosts that lose the path between them may both keep
 theirs to the plant. The neighbours leave such a state out after `max_age`, so the run is another one from then on. The
-plant sees the first by the age of the agent's last state, and is told the second by the ages in `AgentStatus`.
+plant sees the first by the age of the agent's last state, and the second by the ages in `AgentStatus`.
 
-Ages are counted in time for which the plant itself listened: while it stood still, states came that it has not read.
+Ages count the time for which the plant itself listened: while it stood still, states came that it has not read.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from wire.messages import AgentStatus
 
 SETTLING = 0.1
-"""Time (s, wall) for which a neighbour must be reported as not heard before that is told: if it is frozen, the plant
-itself finds out meanwhile."""
+"""Time (s, wall) for which a neighbour must be reported as not heard before that is an event: meanwhile the plant
+itself detects one that is frozen."""
 
 ACQUAINTANCE = 1.0
 """Time (s, wall) after a join in which agents may not have heard each other yet."""
@@ -24,11 +24,11 @@ LISTENED = 2.0
 """Control periods between two steps of the plant that count as time in which it listened; what is beyond it slept."""
 
 RECENT = 3.0
-"""Control periods within which an agent must have been heard here, if it is told that a neighbour does not hear it."""
+"""Control periods within which the plant must have heard an agent that a neighbour does not hear."""
 
 
 class SilenceDetector:
-    """When each agent was heard last, and the spells in which one is not.
+    """Keep the time at which each agent was heard last, and report silences.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ class SilenceDetector:
         self._clock = 0.0
         """Time (s, wall) for which the plant has listened."""
         self._now: float | None = None
-        """When that was last brought up to date (s)."""
+        """Time of the last update of the clock (s)."""
         self._joined: dict[str, float] = {}
         self._last: dict[str, float] = {}
-        """When each agent was heard last, or joined."""
+        """Time at which each agent was heard last, or joined."""
         self._holding: set[str] = set()
-        """Agents that say that they have no measurement."""
+        """Agents that report that they have no measurement."""
         self._failed: set[str] = set()
-        """Agents whose law has failed: they say nothing more."""
+        """Agents whose law has failed: they send nothing more."""
         self._silent: set[str] = set()
         self._unheard: dict[str, dict[str, float]] = {}
-        """Of each agent the neighbours that it does not hear, and from when on that is to be told."""
+        """By agent, the neighbours that it does not hear, and the time from which on that is an event."""
         self._told: dict[str, set[str]] = {}
-        """Those of whom it has been told."""
+        """By agent, the neighbours whose silence has been an event."""
 
     def joined(self, name: str) -> None:
         """Note that an agent takes part from now on."""
@@ -96,7 +96,7 @@ class SilenceDetector:
             told.discard(name)
 
     def reported(self, status: AgentStatus) -> None:
-        """Note what an agent says of its neighbours; while it does not tick, it uses nobody's state anyway."""
+        """Note an agent's report of its neighbours; while it does not tick, it uses no state anyway."""
         if status.sender not in self._joined:
             return
         if status.phase != "running":
@@ -117,7 +117,7 @@ class SilenceDetector:
         self._unheard[status.sender] = {name: at for name, at in before.items() if name not in named} | unheard
 
     def take(self, now: float) -> Iterator[tuple[str, str]]:
-        """Whose silence began or ended by a step of the plant at this time (s, wall), each with a sentence."""
+        """Yield the agents whose silence begins or ends by the plant's step at this time (s, wall), with a sentence."""
         self._clock += 0.0 if self._now is None else min(max(0.0, now - self._now), LISTENED * self._period)
         self._now = now
         for name, last in self._last.items():
@@ -137,7 +137,7 @@ class SilenceDetector:
         return "it says that it has no measurement" if name in self._holding else "nothing comes from it"
 
     def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
-        """Neighbours whom an agent has ceased to hear, or hears again. Whom nobody hears is told of as silent."""
+        """Yield the neighbours that an agent no longer hears, or hears again; one that nobody hears is silent."""
         unheard = {other: at for other, at in self._unheard[name].items() if other in self._last}
         told = self._told.setdefault(name, set())
         back = sorted(other for other in told if other not in unheard and other in self._last)

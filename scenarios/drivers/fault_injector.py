@@ -17,7 +17,7 @@ class ProcessFault(NamedTuple):
     """One signal to one process."""
 
     t: float
-    """When (s of run time)."""
+    """Run time (s)."""
     name: str
     number: signal.Signals
 

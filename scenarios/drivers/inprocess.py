@@ -37,7 +37,7 @@ class _Delivery(NamedTuple):
 
 
 class InprocessBus:
-    """Delivers what the cores publish, in the order of publication.
+    """Deliver the messages of the nodes, in the order of publication.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class InprocessBus:
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
     on_links : Callable[[LinkReport], None]
-        Takes what emulated links did.
+        Takes the reports of emulated links.
     newcomer : Callable[[str], LockstepAgent]
         Makes the core of an agent that the plant awaits while the run goes on.
     """
@@ -98,7 +98,7 @@ class InprocessBus:
             self._start(agent)
 
     def _start(self, agent: LockstepAgent) -> None:
-        """Let an agent and everybody before it see each other."""
+        """Let an agent and all nodes before it see each other."""
         name = agent.token
         for key in agent.subscriptions:
             self._subscribers[key].append(agent)
@@ -125,12 +125,12 @@ class InprocessBus:
                 for to in self._subscribers.get(key, ()):
                     self._queue.append(_Delivery(to, key, payload))
                 if key == self._plant.keys.telemetry:
-                    told = decode(payload)
-                    if isinstance(told, Telemetry):
-                        self._awaited += told.awaited
-                        self._on_telemetry(told)
-                    elif isinstance(told, LinkReport):
-                        self._on_links(told)
+                    message = decode(payload)
+                    if isinstance(message, Telemetry):
+                        self._awaited += message.awaited
+                        self._on_telemetry(message)
+                    elif isinstance(message, LinkReport):
+                        self._on_links(message)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
@@ -168,7 +168,7 @@ def run_inprocess(
     on_telemetry : Callable[[Telemetry], None]
         Called with every telemetry message as it comes; the first at t = 0.
     on_links : Callable[[LinkReport], None], optional
-        Called with every part of what the emulated links did.
+        Called with every report of emulated links.
     plant : PlantLike, optional
         A plant at t = 0 to use instead of building the configuration's.
 

@@ -1,4 +1,4 @@
-"""How a run ended, whichever driver ran it."""
+"""The outcome of a run, by any driver."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from wire.messages import Pacing, PlantEvent
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a run ended. Rows went to the callback as they came."""
+    """The outcome of a run. Its rows went to the callback as they came."""
 
     broke: str
-    """Why the run broke, with the last log lines of who broke it; empty if it reached its end."""
+    """Why the run broke, with the last log lines of the process that broke it; "" if it reached its end."""
     reproducible: bool
     """False once something unscripted (a dead agent) has entered the run."""
     events: tuple[PlantEvent, ...]
-    """Everything that happened in the plant and to the roster."""
+    """All events of the plant and of the roster."""
     notes: tuple[str, ...]
-    """What a person should be told though the run went on: who died, what was dropped."""
+    """Notes for a person though the run went on: processes that died, messages that were dropped."""
     ticks: int
     """Last tick that was reported."""
     start_s: float

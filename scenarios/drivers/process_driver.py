@@ -70,11 +70,11 @@ def run_processes(
     on_status : Callable[[str], None], optional
         Called with "listening", "compiling", "ready" as the plant comes up.
     on_start : Callable[[Children], None], optional
-        Called once all processes are started; the tests' way to hurt them.
+        Called once all processes are started; tests inject faults here.
     on_links : Callable[[LinkReport], None], optional
-        Called with every part of what the emulated links did.
+        Called with every report of emulated links.
     plant_command : Sequence[str], optional
-        How the interpreter is told to run the plant, if not as usual; tests have smaller ones.
+        Arguments of the interpreter for another plant than the usual one; tests have smaller ones.
 
     Returns
     -------

@@ -33,7 +33,7 @@ class TelemetryClient:
     endpoint : str
         Where the plant listens.
     clock : {"simulated", "wall"}
-        Which kind of time the run has.
+        The run's kind of time.
     on_message : Callable[[Recordable], None]
         Called with each message, in the order in which the plant published them.
     """
@@ -47,7 +47,7 @@ class TelemetryClient:
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far, in wall-clock time."""
         self.message_at = monotonic()
-        """When the last message came, of whichever kind (s, monotonic)."""
+        """Time of the last message, of any kind (s, monotonic)."""
         self.progress: tuple[float, float] | None = None
         """Run time of the last rows, and when they came (s, monotonic); None before the first."""
         self._stream = TelemetryStream() if clock == "wall" else None
@@ -56,7 +56,7 @@ class TelemetryClient:
         self.rejects = self._core.rejects
         """The messages that were dropped."""
         self.inbox = Inbox()
-        """Where other threads put words."""
+        """Takes the words of other threads."""
         self._session = self._open()
 
     @property

@@ -10,7 +10,7 @@ from wire.plant_follower import PlantFollower
 
 
 class TelemetryEndpoint(PlantFollower):
-    """Takes what the plant publishes for recorders, of one plant from the first message to the last.
+    """Accept the messages of one plant for recorders, from the first to the last.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class TelemetryEndpoint(PlantFollower):
 
     @property
     def finished(self) -> bool:
-        """Whether nothing more is taken: never, as what came before the session was closed is recorded too."""
+        """Whether nothing more is taken: never, as messages before the end of the session are recorded too."""
         return False
 
     @property
@@ -48,14 +48,14 @@ class TelemetryEndpoint(PlantFollower):
                 self._plant_appeared(part)
 
     def take(self) -> list[Recordable]:
-        """Take out what can be recorded now, in order."""
+        """Take out the messages that can be recorded now, in order."""
         found, self._recordable = self._recordable, []
         return found
 
     def question(self, now: float) -> bytes | None:
-        """The `Command` that asks the plant for what is missing, if it is to be asked now (s)."""
-        wanted = None if self._stream is None else self._stream.question(now)
-        if wanted is None:
+        """Return the `Command` that asks the plant for missing messages, if it is to be asked now (s)."""
+        number = None if self._stream is None else self._stream.question(now)
+        if number is None:
             return None
         self._questions += 1
         name = self._name
@@ -66,7 +66,7 @@ class TelemetryEndpoint(PlantFollower):
                 seq=self._questions,
                 t=0.0,
                 verb="telemetry",
-                argument=wanted,
+                argument=number,
                 reply_to=name,
             )
         )

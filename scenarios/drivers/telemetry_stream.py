@@ -1,7 +1,7 @@
-"""The plant's telemetry in order and without gaps: what is missing, and when to ask for it again. Pure.
+"""The plant's telemetry in order and without gaps: the missing messages, and the time to ask for them again. Pure.
 
-A recorder that stands still for longer than Zenoh's lease loses its link, and with it what was on the way. The plant
-keeps what it has published of late (`plant.realtime.kept_telemetry`) and publishes it again when asked by a `Command`.
+A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
+keeps its latest messages (`plant.realtime.kept_telemetry`) and publishes them again when asked by a `Command`.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ LONGEST = 60.0
 
 
 Recordable = Telemetry | LinkReport | LinkRequest
-"""What the plant publishes for recorders."""
+"""Messages that the plant publishes for recorders."""
 
 
 class TelemetryStream:
-    """Lets messages through in the order in which the plant published them, each once.
+    """Let messages through in the order in which the plant published them, each once.
 
     Attributes
     ----------
     lost : bool
-        Whether there are messages that the plant did not have any more; what came meanwhile is lost.
+        Whether messages are lost, as the plant did not have them any more.
 
     Examples
     --------
@@ -49,18 +49,18 @@ class TelemetryStream:
     def __init__(self) -> None:
         self.lost = False
         self._next = 0
-        """Number of the Telemetry that is to come."""
+        """Number of the next Telemetry."""
         self._held: list[Recordable] = []
         """Other messages that came since the one before: with the next they are known to be in order."""
         self._gap_since: float | None = None
-        """Since when (s) what comes is dropped, until the plant has said from where on it publishes again."""
+        """Time (s) since which messages are dropped, until the plant answers with the first number that comes again."""
         self._heard_at: float | None = None
         self._asked_at = self._opened_at = float("-inf")
         self._over = False
         self._patience = ASTRAY
 
     def take(self, message: Recordable, now: float) -> list[Recordable]:
-        """Note a message (s, monotonic); what can be recorded now, in order."""
+        """Note a message (s, monotonic); return the messages that can be recorded now, in order."""
         self._heard_at = now
         if self._gap_since is not None:
             return []  # it comes again, in its order
@@ -78,7 +78,7 @@ class TelemetryStream:
         return [*held, message]
 
     def answered(self, answer: Answer, now: float) -> None:
-        """Note what the plant answered: from which number on it publishes again."""
+        """Note the plant's answer: the number from which on it publishes again."""
         if answer.ok and answer.text.isascii() and answer.text.isdigit():
             self._heard_at, self._patience, self._gap_since = now, ASTRAY, None
             self._held.clear()
@@ -86,7 +86,7 @@ class TelemetryStream:
                 self.lost, self._next = True, int(answer.text)
 
     def question(self, now: float) -> str | None:
-        """Number of the first Telemetry that is to be published again, if the plant is to be asked for it now."""
+        """Return the number of the first Telemetry to be published again, if the plant is to be asked for it now."""
         if self._heard_at is None or self._over or now - self._asked_at < AGAIN:
             return None
         if self._gap_since is None:
@@ -98,7 +98,7 @@ class TelemetryStream:
         return str(self._next)
 
     def is_astray(self, now: float) -> bool:
-        """Whether a new session is to be opened now, as questions have had no answer for long."""
+        """Return whether a new session is to be opened now, as questions have had no answer for long."""
         if self._gap_since is None or now - max(self._gap_since, self._opened_at) < self._patience:
             return False
         self._opened_at, self._patience = now, min(2.0 * self._patience, LONGEST)

@@ -29,7 +29,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     speed: float = 1.0
     """Run time per wall time (s/s)."""
     wait: float = 30.0
-    """How long (s) the plant waits for its agents."""
+    """Time (s) for which the plant waits for its agents."""
     duration: float | None = None
     """Run time (s) after which the run ends; None for no end."""
     strict: bool = False

@@ -53,7 +53,7 @@ def say(line: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessOutcome:
-    """How a live run ended in the terminal where it was started."""
+    """The outcome of a live run in the terminal where it was started."""
 
     broke: str = ""
     """Why it could not go on; empty after a good end."""

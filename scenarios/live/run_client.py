@@ -25,17 +25,17 @@ from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledg
 VISITOR = "visitor"
 
 REMINDER = 2.0
-"""A wait is said again after so long (s), then after twice as long, and so on."""
+"""Time (s) after which a wait is reported again, then after twice as long, and so on."""
 
 RENEWAL = 2.0
-"""Time (s) between two looks at whether the session has gone astray."""
+"""Time (s) between two checks of the session."""
 
 LOOKING = 1.5
 """Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
 
 
 class NobodyError(ValueError):
-    """What was looked for is not there; the message says where it was looked for, how long, and what to do."""
+    """A run, plant or inverter is not there; the message says where the search was, how long, and what to do."""
 
 
 class RunClient:
@@ -74,7 +74,7 @@ class RunClient:
         self._session.watch(ANY_ALIVE_PLANT)
 
     def renew(self) -> None:
-        """Come again with a new session, as the old one does not hear what it should."""
+        """Open a new session, as the old one does not bring the messages that it should."""
         self._session.close()
         self._open()
 
@@ -102,9 +102,9 @@ class RunClient:
         return self._runs
 
     def read(self, key: str, payload: bytes) -> AnyMessage | None:
-        """Message of the bytes that came on a key, if it is one, and of whom the key says.
+        """Return the message that came on a key; None if it is none, or not of the sender that the key names.
 
-        If that is the plant, of the one that is there. What the plant passes on from others it has checked itself.
+        A message of the plant must be of the one that is there. The plant has checked the messages that it passes on.
         """
         try:
             message = decode(payload)
@@ -130,12 +130,12 @@ class RunClient:
         return self._session.id
 
     def listen(self, key: str) -> None:
-        """Have messages on a key come in."""
+        """Subscribe to a key."""
         self._heard.append(key)
         self._session.subscribe(key)
 
     def fetch(self, key: str) -> None:
-        """Ask a queryable; what it answers comes in as messages on that key."""
+        """Ask a queryable; its answers come in as messages on that key."""
         self._session.fetch(key)
 
     def publish(self, key: str, payload: bytes) -> None:
@@ -163,7 +163,7 @@ class RunClient:
                 self.agents.get(name, set()).discard(instance)
 
     def until(self, done: Callable[[], bool], seconds: float) -> bool:
-        """Wait (s) until something holds; whether it does. Messages that come meanwhile are dropped."""
+        """Wait (s) until a condition holds; return whether it does. Messages that come meanwhile are dropped."""
         end = monotonic() + seconds
         while not done():
             left = end - monotonic()
@@ -265,7 +265,7 @@ def endpoint_for_run(listen: str) -> str:
 
 
 def runs_at(endpoint: str) -> list[str]:
-    """Names of the runs whose plants are at an endpoint; none if nobody says so within `LOOKING` seconds."""
+    """Return the names of the runs whose plants are at an endpoint, as far as they show within `LOOKING` seconds."""
     with RunClient(RunAddress(run=RUN, connect=(endpoint,))) as client:
         client.until(lambda: bool(client.runs), LOOKING)
         return sorted(client.runs)
@@ -279,7 +279,7 @@ def check_alone(run: str, beyond: tuple[str, ...]) -> None:
     run : str
         Name of the run.
     beyond : tuple[str, ...]
-        What the plant will connect to; without any, it cannot meet another plant.
+        Endpoints that the plant will connect to; without any, it cannot meet another plant.
     """
     if not beyond:
         return

@@ -63,5 +63,5 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
 
 
 def _is_time(name: str) -> bool:
-    """Whether a folder is called as `gridpeers run` calls those of a scenario."""
+    """Return whether a folder has the name of a run of `gridpeers run`: a time."""
     return re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", name) is not None

@@ -109,7 +109,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
 
 def _told(summary: Summary) -> list[str]:
-    """What a sweep came to, in lines."""
+    """Return the results of a sweep, in lines."""
     from scenarios.results.run_files import shown
 
     broke = sum(summary.broke.values())

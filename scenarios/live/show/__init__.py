@@ -1,1 +1,1 @@
-"""What there is to see of a run, and how it is shown: `status` as text, `watch` as a live table."""
+"""The state of a live run and its views: `status` as text, `watch` as a live table."""

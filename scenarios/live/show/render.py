@@ -13,7 +13,7 @@ from scenarios.live.show.snapshot import InverterStatus, Snapshot
 from scenarios.short_names import short
 
 EVENTS = 6
-"""So many of the latest events are shown."""
+"""Number of the latest events in a view."""
 
 OLD = 0.2
 """An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""
@@ -57,18 +57,18 @@ _COLUMNS = (
     _Column("impaired", "", lambda inverter: short(inverter.impaired) if inverter.impaired else "", right=False),
     _Column("", "", lambda inverter: inverter.note, right=False),
 )
-"""What is shown of each agent; "age" is that of the oldest of what it heard from the neighbours that count, "impaired"
-are those between whom and it an emulated fault holds."""
+"""Columns of each agent; "age" is that of the oldest state of the neighbours in use, "impaired" are the senders whose
+links to it have an emulated fault."""
 
 
 def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
-    """The columns that there is something to show in."""
+    """Return the columns that have something to show."""
     calm = not any(inverter.impaired for inverter in snapshot.inverters)
     return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
 def head(snapshot: Snapshot) -> str:
-    """One line on the whole run."""
+    """Return one line on the whole run."""
     t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
     islands = list(dict.fromkeys(inverter.island for inverter in snapshot.inverters if inverter.island))
     parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
@@ -77,13 +77,7 @@ def head(snapshot: Snapshot) -> str:
 
 
 def plain(snapshot: Snapshot) -> str:
-    """Text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-        What to show.
-    """
+    """Return the text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut."""
     columns = _columns(snapshot)
     titles = [f"{column.head} {column.unit}".strip() for column in columns]
     rows = [titles, *([column.text(inverter) for column in columns] for inverter in snapshot.inverters)]
@@ -100,15 +94,7 @@ def plain(snapshot: Snapshot) -> str:
 
 
 def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
-    """Table for `gridpeers watch`.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-        What to show.
-    keys : str, optional
-        What can be typed.
-    """
+    """Return the table for `gridpeers watch`; `keys` says which keys can be typed."""
     grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
     columns = _columns(snapshot)
     for column in columns:

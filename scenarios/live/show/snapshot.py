@@ -38,7 +38,7 @@ class InverterStatus:
     lost: int | None = None
     """Messages that were sent to it and never came."""
     impaired: tuple[str, ...] = ()
-    """Senders between whom and it an emulated fault holds."""
+    """Senders whose links to it have an emulated fault."""
     note: str = ""
     """A note for the reader: "no agent", "waits for ...", "silent for 3 s"."""
 
@@ -51,9 +51,9 @@ class Snapshot:
     t: float | None = None
     """Run time (s)."""
     pace: str = ""
-    """How well the plant keeps real time, in a few words."""
+    """The plant's pace in a few words."""
     impaired: tuple[str, ...] = ()
-    """Agents between whom and the plant an emulated fault holds."""
+    """Agents whose link to or from the plant has an emulated fault."""
     inverters: tuple[InverterStatus, ...] = ()
     """All inverters, in their order."""
     events: tuple[str, ...] = ()

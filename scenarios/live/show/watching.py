@@ -52,7 +52,7 @@ class RunSubscriber:
         self._subscribed: set[str] = set()
         self._plant = client.plant
         self._heard_at: dict[str, float] = {}
-        """When each sender was last heard."""
+        """Time at which each sender was last heard."""
         self._used: dict[str, tuple[str, ...]] = {}
         """Neighbours that each agent uses."""
         self._patience = SessionPatience()
@@ -127,9 +127,9 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
     client : RunClient
         At the run, with its agents met.
     console : Console
-        Where to.
+        The terminal.
     seconds : float or None
-        For how long (s); None until q or Ctrl-C.
+        Time (s) after which it ends; None until q or Ctrl-C.
     """
     monitor = RunMonitor(client.where.run)
     monitor.plant_status(plant_status(client))

@@ -54,7 +54,7 @@ def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Pa
         watch.expect(r"inv1 +inv1 +60\.0")
 
         hosts.cut(3)
-        agents["inv7"].expect("inv7: no measurement of late; holds")
+        agents["inv7"].expect("inv7: no recent measurement; holds")
         watch.expect(r"inv1 .* inv2-6 ")
         for _ in range(3):
             plant.expect("inv[789] died; its inverter stays on primary droop")
