@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -17,21 +18,16 @@ LIVE = "live"
 """The driver of a live run, as files name it."""
 
 
+@dataclass(frozen=True)
 class Folders:
-    """Folders of a live run.
+    """Folders of a live run."""
 
-    Parameters
-    ----------
-    logs : Path
-        For the logs of processes.
-    record : Path or None
-        For history.csv and events.csv, a folder in the run folder; None if nothing is recorded.
-    whole : Path or None
-        The run folder; None if there is none.
-    """
-
-    def __init__(self, logs: Path, record: Path | None = None, whole: Path | None = None) -> None:
-        self.logs, self.record, self.whole = logs, record, whole
+    logs: Path
+    """For the logs of processes."""
+    record: Path | None = None
+    """For the files of the record, a folder in the run folder; None if nothing is recorded."""
+    whole: Path | None = None
+    """The run folder; None if there is none."""
 
     def complete(self) -> None:
         """Write to status.txt that the folder is complete."""
@@ -46,14 +42,7 @@ class Folders:
 
 @contextmanager
 def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
-    """Make the folders of a run.
-
-    Parameters
-    ----------
-    out : Path or None
-        What `--out` says.
-    scenario : ScenarioModel
-        As run, with its one case.
+    """Make the folders of a run, as `--out` says.
 
     Raises
     ------

@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass
 
 from scenarios.drivers.free_endpoint import parse_endpoint
-from wire.keys import check_name
+from wire.keys import check_name as check_key_part
 
 RUN = "gridpeers"
 """Default name of a run."""
@@ -65,23 +65,23 @@ def address_of(run: str, connect: list[str] | None) -> RunAddress:
         If a name or an endpoint cannot be used.
     """
     return RunAddress(
-        run=check_run(run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT])
+        run=check_name("--run", run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT])
     )
 
 
-def check_run(run: str) -> str:
-    """Return the name of a run, if it can be a part of a Zenoh key.
+def check_name(option: str, name: str) -> str:
+    """Return the name of a run or an inverter, if it can be a part of a Zenoh key.
 
     Examples
     --------
-    >>> check_run("lab-2")
+    >>> check_name("--run", "lab-2")
     'lab-2'
     """
     try:
-        check_name("--run", run)
+        check_key_part(option, name)
     except ValueError as error:
         raise UsageError(str(error)) from None
-    return run
+    return name
 
 
 def check_wait(wait: float) -> float:
@@ -101,14 +101,6 @@ def check_duration(seconds: float | None) -> None:
     """Raise UsageError if a duration (s) cannot be one; None has no end."""
     if seconds is not None and not 0.0 < seconds <= LONGEST:
         raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST:g} s, got {seconds:g} s")
-
-
-def check_inverter(name: str) -> None:
-    """Raise UsageError if a name cannot be that of an inverter."""
-    try:
-        check_name("INVERTER", name)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
 
 
 def check_endpoint(option: str, text: str) -> str:

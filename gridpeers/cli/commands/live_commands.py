@@ -66,11 +66,11 @@ def _start(
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
-        from scenarios.live.run_address import check_endpoint, check_run
+        from scenarios.live.run_address import check_endpoint, check_name
         from scenarios.live.run_client import check_alone, endpoint_for_run
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
-        check_run(run)
+        check_name("--run", run)
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         endpoint = endpoint_for_run(listen)
         check_alone(run, beyond)
@@ -166,10 +166,10 @@ def agent(
     with usage_errors():
         from scenarios.drivers.free_endpoint import free_endpoint
         from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import address_of, check_endpoint, check_inverter, check_wait
+        from scenarios.live.run_address import address_of, check_endpoint, check_name, check_wait
 
         where = address_of(run, connect)
-        check_inverter(inverter)
+        check_name("INVERTER", inverter)
         check_wait(wait)
         watch_readers(quits=False)
         listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())

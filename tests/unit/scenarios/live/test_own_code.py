@@ -11,7 +11,7 @@ from agents.agent_config import Control, LawChoice
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live import live_processes as hand
+from scenarios.live import live_processes
 from scenarios.live.run_address import RunAddress, UsageError
 from scenarios.live.run_requests import own_code
 from tests.toy.toy_configs import agent_config
@@ -43,15 +43,17 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     """Whoever can pose as a plant would else have any program run on every host that joins."""
     ran: list[str] = []
     where = RunAddress(run="demo", connect=(endpoint,))
-    monkeypatch.setattr(hand, "RunClient", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})()))
-    monkeypatch.setattr(hand, "configuration", lambda client, name: CONFIG)
-    monkeypatch.setattr(hand, "check_free", lambda client, name: None)
-    monkeypatch.setattr(hand, "run_agent", lambda config, links: ran.append(config.name) or "")
-    monkeypatch.setattr(hand.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(
+        live_processes, "RunClient", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})())
+    )
+    monkeypatch.setattr(live_processes, "configuration", lambda client, name: CONFIG)
+    monkeypatch.setattr(live_processes, "check_free", lambda client, name: None)
+    monkeypatch.setattr(live_processes, "run_agent", lambda config, links: ran.append(config.name) or "")
+    monkeypatch.setattr(live_processes.signal, "signal", lambda *_: None)
 
     if runs:
-        hand.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+        live_processes.agent_here(where, "inv1", None, 1.0, trusts=trusts)
     else:
         with pytest.raises(UsageError, match=r"inv1: the plant of run demo .* run the law mine:Mine and .*--own-code"):
-            hand.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+            live_processes.agent_here(where, "inv1", None, 1.0, trusts=trusts)
     assert ran == (["inv1"] if runs else [])
