@@ -62,8 +62,8 @@ def main() -> None:
     plain()  # loads the compiled step
     print(machine())
     print(f"islanding, case {given.case}, {end:g} s simulated, {given.rounds} rounds; processor time\n")
-    found = ratios(rivals, given.rounds)
-    met = all(found[name] < TARGET for name in IDLE)
+    measured = ratios(rivals, given.rounds)
+    met = all(measured[name] < TARGET for name in IDLE)
     print(f"\nno fault acting: under 5 % {'met' if met else 'MISSED'}")
 
 

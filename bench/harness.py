@@ -62,7 +62,7 @@ def ratios(rivals: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, 
     """
     (first, reference), *others = rivals.items()
     times: dict[str, list[float]] = {name: [] for name in rivals}
-    found: dict[str, list[float]] = {name: [] for name, _ in others}
+    ratios_by_rival: dict[str, list[float]] = {name: [] for name, _ in others}
     for i in range(rounds):
         before = reference()
         k = i % max(len(others), 1)
@@ -71,14 +71,14 @@ def ratios(rivals: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, 
         times[first] += [before, after]
         for name, seconds in took.items():
             times[name].append(seconds)
-            found[name].append(2.0 * seconds / (before + after))
+            ratios_by_rival[name].append(2.0 * seconds / (before + after))
     print(f"{'':48}{'median (s)':>11}{'fastest (s)':>13}   ratio (lowest to highest)")
     for name, values in times.items():
         line = f"{name:48}{median(values):11.3f}{min(values):13.3f}"
-        if of := found.get(name):
+        if of := ratios_by_rival.get(name):
             line += f"   {median(of):.3f} ({min(of):.3f} to {max(of):.3f})"
         print(line)
-    return {name: median(values) for name, values in found.items()}
+    return {name: median(values) for name, values in ratios_by_rival.items()}
 
 
 def cells(row: Mapping[str, float | None], *names: str) -> str:

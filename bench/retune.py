@@ -36,26 +36,26 @@ def main() -> None:
         cases[f"a{alpha}-b{beta}"] = replace(scenario.cases["untuned"], gains=gains)
     whole = replace(scenario, cases=cases)
     runs = [(i, Run(scenario=whole, case=case, sample=i, shown={})) for i, case in enumerate(cases)]
-    found = {end.number: end.measures for end in on_this_machine(runs, cores(), run_one)}
+    measures = {end.number: end.measures for end in on_this_machine(runs, cores(), run_one)}
     print("alpha   beta   V_error pu   MQSI    restored")
     for i, (alpha, beta) in enumerate([(float("nan"), float("nan")), *points]):
         what = f"{alpha:<7g} {beta:<6g}" if i else f"{'full graph':14}"
-        t = found[i]["event1.t_restore_s"]
+        t = measures[i]["event1.t_restore_s"]
         shown = "never" if t is None else f"{t:.2f} s"
-        print(f"{what} {found[i]['event1.V_error']:<12.4f} {found[i]['event1.MQSI']:<7.3f} {shown}")
-    alpha, beta = best({point: found[i] for i, point in enumerate(points, start=1)})
+        print(f"{what} {measures[i]['event1.V_error']:<12.4f} {measures[i]['event1.MQSI']:<7.3f} {shown}")
+    alpha, beta = best({point: measures[i] for i, point in enumerate(points, start=1)})
     print(f"best: alpha = {alpha:g}, beta_GFM = beta_GFL = {beta:g}")
 
 
-def best(found: dict[Point, dict[str, float | None]]) -> Point:
+def best(measures: dict[Point, dict[str, float | None]]) -> Point:
     """Return the best point by the rule above."""
 
     def rank(point: Point) -> tuple[float, float, float]:
-        MQSI = found[point]["event1.MQSI"]
+        MQSI = measures[point]["event1.MQSI"]
         assert MQSI is not None
         return round(MQSI, 3), point[1], -point[0]
 
-    return min((point for point in found if f"{found[point]['event1.V_error']:.3f}" == V_ERROR), key=rank)
+    return min((point for point in measures if f"{measures[point]['event1.V_error']:.3f}" == V_ERROR), key=rank)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ IN_PROCESS_TARGET, PROCESSES_TARGET = 0.7, 4.0
 """Seconds for one case of 7 s simulated: warm in one process; with processes, their start included."""
 
 
-class Case:
+class TimedCase:
     """One case, run by both drivers into a folder each."""
 
     def __init__(self, plant: PlantConfig, agents: tuple[AgentConfig, ...], folder: Path) -> None:
@@ -113,7 +113,7 @@ def main() -> None:
     print(machine())
     print(f"islanding, case {given.case}: {end:g} s simulated, {ticks} ticks, {steps} steps, {len(agents)} agents\n")
     with tempfile.TemporaryDirectory() as folder:
-        case = Case(plant, agents, Path(folder))
+        case = TimedCase(plant, agents, Path(folder))
         print(f"in one process, first run (loads the compiled step) {case.in_one_process():.3f} s\n")
         warm: list[float] = []
 

@@ -45,11 +45,11 @@ def main() -> None:
     loop()  # loads the compiled step for all of them
     print(machine())
     print(f"islanding, case {CASE}, 7 s simulated a run; {2 * len(half)} runs in the loop, {given.runs} in the sweep\n")
-    found = ratios({"a run in the plain loop": loop, "a run in the sweep": sweep}, rounds=1)
+    measured = ratios({"a run in the plain loop": loop, "a run in the sweep": sweep}, rounds=1)
     workers = getrusage(RUSAGE_CHILDREN)
     each = (workers.ru_utime + workers.ru_stime) / given.runs
     print(f"\nprocessor time of a run: loop {1e3 * min(busy):.0f} ms, workers {1e3 * each:.0f} ms with their start")
-    print(f"runs per second, sweep : loop {1.0 / found['a run in the sweep']:.2f}, on {os.cpu_count()} cores")
+    print(f"runs per second, sweep : loop {1.0 / measured['a run in the sweep']:.2f}, on {os.cpu_count()} cores")
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ class FaultSchedule:
 
     def flat(self) -> tuple[Span, ...]:
         """Return the same without precedence: spans that do not overlap within a kind, by kind and time."""
-        found: list[Span] = []
+        spans: list[Span] = []
         for kind in sorted({span.kind for span in self.spans}):
             own = [span for span in self.spans if span.kind == kind]
             bounds = sorted({bound for span in own for bound in (span.from_s, span.to_s)})
@@ -108,10 +108,10 @@ class FaultSchedule:
                 holds = [span for span in own if span.from_s <= start and end <= span.to_s]
                 if not holds:
                     continue
-                last = found[-1] if found else None
+                last = spans[-1] if spans else None
                 # A flap counts from its own beginning, so pieces of one can be joined but never moved.
                 if last and last.kind == kind and last.to_s == start and last.model == holds[-1].model:
-                    found[-1] = last._replace(to_s=end)
+                    spans[-1] = last._replace(to_s=end)
                 else:
-                    found.append(Span(kind, start, end, holds[-1].model))
-        return tuple(found)
+                    spans.append(Span(kind, start, end, holds[-1].model))
+        return tuple(spans)

@@ -153,13 +153,13 @@ def differences(
     t_second, theirs = _arranged(second, units)
     if not np.array_equal(t, t_second):
         raise ValueError(f"rows of {t.size} and {t_second.size} steps are not of the same times")
-    found = {}
+    largest_by_quantity = {}
     for k, quantity in enumerate(QUANTITIES):
         gap = np.abs(ours[:, :, k] - theirs[:, :, k])
         step, i = np.unravel_index(np.argmax(gap), gap.shape)  # the first nan, if there is any
         span = float(ours[:, :, k].min()), float(ours[:, :, k].max())
-        found[quantity] = Largest(float(gap[step, i]), units[int(i)].name, float(t[step]), span)
-    return found
+        largest_by_quantity[quantity] = Largest(float(gap[step, i]), units[int(i)].name, float(t[step]), span)
+    return largest_by_quantity
 
 
 def _arranged(
@@ -185,15 +185,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in given.runs or RUNS:
         run = RUNS[name]
         try:
-            version, found = compare(run, given.gridlabd)
+            version, largest_by_quantity = compare(run, given.gridlabd)
         except GridlabdError as error:
             print(error, file=sys.stderr)
             return 2
-        passed = all(largest.value <= run.tolerance for largest in found.values())
+        passed = all(largest.value <= run.tolerance for largest in largest_by_quantity.values())
         sound = sound and passed
         verdict = "within" if passed else "BEYOND"
         print(f"\n{name}: {run.text} (GridLAB-D {version}); {verdict} {run.tolerance:g}")
-        for quantity, largest in found.items():
+        for quantity, largest in largest_by_quantity.items():
             print(_line(quantity, largest), flush=True)
     return 0 if sound else 1
 

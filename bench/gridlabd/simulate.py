@@ -93,8 +93,8 @@ class GridlabdCore:
             self.doubles(name, key)[0] = value
 
     def _address(self, name: str, key: str) -> int:
-        found = self._library.object_find_name(name.encode())
-        address = self._library.object_get_addr(found, key.encode()) if found else None
+        handle = self._library.object_find_name(name.encode())
+        address = self._library.object_get_addr(handle, key.encode()) if handle else None
         if not address:
             raise KeyError(f"{name}.{key}")
         return int(address)

@@ -105,18 +105,18 @@ def _reachable(counter: Counter) -> Counter:
 
 def blocks(seq: npt.NDArray[np.int64]) -> tuple[Block, ...]:
     """Return numbers of messages, ascending, as runs without a gap, none across a start of the chain."""
-    found: list[Block] = []
+    blocks_so_far: list[Block] = []
     runs: list[Run] = []
     block, after = -1, 0
     for run in np.split(seq, np.flatnonzero((np.diff(seq) != 1) | (seq[1:] % RESTART == 0)) + 1):
         if not len(run):
             continue
         if run[0] // RESTART != block:
-            found += [tuple(runs)] if runs else []
+            blocks_so_far += [tuple(runs)] if runs else []
             block, runs, after = int(run[0]) // RESTART, [], int(run[0])
         runs.append((int(run[0]) - after, len(run)))
         after = int(run[-1])
-    return (*found, tuple(runs)) if runs else tuple(found)
+    return (*blocks_so_far, tuple(runs)) if runs else tuple(blocks_so_far)
 
 
 @lru_cache(maxsize=256)
@@ -149,9 +149,9 @@ def law(counted: str, model: LossModel, parts: tuple[Block, ...]) -> tuple[int, 
     return first, np.maximum(np.roll(probabilities, -(first % size)), 0.0)
 
 
-def tail(found: int, first: int, probabilities: Array) -> float:
+def tail(count: int, first: int, probabilities: Array) -> float:
     """Return the probability of a count as far out as this one: twice the smaller side, so never too small."""
-    at = found - first
+    at = count - first
     if not 0 <= at < len(probabilities):
         return 0.0
     return float(min(1.0, 2.0 * min(probabilities[: at + 1].sum(), probabilities[at:].sum())))

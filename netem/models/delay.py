@@ -111,11 +111,11 @@ class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
 
     def relations(self) -> list[Problem]:
         """Return contradictions between its values."""
-        found = []
+        problems = []
         if self.low_s >= self.high_s:
             text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
-            found.append(Problem("low_s", text))
-        return found
+            problems.append(Problem("low_s", text))
+        return problems
 
 
 class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):

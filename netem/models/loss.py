@@ -140,11 +140,11 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
 
     def relations(self) -> list[Problem]:
         """Return contradictions between its values."""
-        found = []
+        problems = []
         if self.loss_good > self.loss_bad:
             text = f"{self.loss_good:g} is above loss_bad = {self.loss_bad:g}; swap them: the bad state loses more"
-            found.append(Problem("loss_good", text))
-        return found
+            problems.append(Problem("loss_good", text))
+        return problems
 
 
 class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
@@ -198,13 +198,13 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
 
     def relations(self) -> list[Problem]:
         """Return contradictions between its values."""
-        found = []
+        problems = []
         for first, second in (("p13", "p14"), ("p31", "p32")):
             both = getattr(self, first) + getattr(self, second)
             if both > 1.0:
                 text = f"{first} and {second} leave the same state, so their sum is at most 1, got {both:g}"
-                found.append(Problem(first, text))
-        return found
+                problems.append(Problem(first, text))
+        return problems
 
 
 AnyLoss = Bernoulli | GilbertElliott | Markov

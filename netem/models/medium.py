@@ -74,10 +74,10 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def relations(self) -> list[Problem]:
         """Return contradictions between its values."""
-        found = []
+        problems = []
         for key in ("offset_s", "length_s"):
             value = getattr(self, key)
             if value > self.period_s or (key == "offset_s" and value == self.period_s):
                 text = f"{value:g} s does not go with period_s = {self.period_s:g} s: slots repeat with the period"
-                found.append(Problem(key, text))
-        return found
+                problems.append(Problem(key, text))
+        return problems

@@ -36,10 +36,10 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     @property
     def _change(self) -> Change:
         """The fault or the heal."""
-        found = self.fault or self.heal
-        if found is None or (self.fault and self.heal):
+        change = self.fault or self.heal
+        if change is None or (self.fault and self.heal):
             raise ValueError("a command to links is either a fault or a heal")
-        return found
+        return change
 
     def at(self, t: float) -> Change:
         """Return the change of links if it holds from t (s of run time) on."""
@@ -54,14 +54,14 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     def wrong_values(self) -> list[Problem]:
         """Return the errors of its values, which are errors in every run."""
-        found: list[Problem] = []
+        problems: list[Problem] = []
         if self.fault is not None:
-            found += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).problems()
+            problems += msgspec.structs.replace(self.fault, from_s=0.0, to_s=None).problems()
         if self.for_s is not None:
             allowed = Plausible("a time of the run", 0.0, LONGEST_RUN, above_zero=True)
             if text := allowed.objection(self.for_s, "s"):
-                found.append(Problem("for", text))
-        return found
+                problems.append(Problem("for", text))
+        return problems
 
     def __str__(self) -> str:
         """Return it in words.
