@@ -22,6 +22,9 @@ TRIPS = "protection.trips"
 LONGEST_CLEARING_TIME = 3600.0
 """Longest clearing time (s)."""
 
+_LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max", "i_max", "P_set_lim", "P_min")}
+"""Parameters by kind of inverter that limit a set-point of P, the first broken one of which is told."""
+
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """What a run folder holds beside the folders of the cases."""
 
@@ -48,48 +51,33 @@ def check_names(scenario: ScenarioModel, problems: Problems) -> None:
 
 
 def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note a first set-point that an inverter cannot give: the start would be no equilibrium and move by itself."""
-    plant = scenario.plant
-    gfm, gfl, start = plant.gfm, plant.gfl, plant.P_set0_pu
-    limits = {
-        "GFM": [("gfm.P_max_pu", gfm.P_max), ("gfm.P_set_lim_pu", gfm.P_set_lim), ("gfm.P_min_pu", gfm.P_min)],
-        "GFL": [
-            ("gfl.P_max_pu", gfl.P_max),
-            ("gfl.S_max_pu", gfl.S_max),
-            ("gfl.i_max_pu", gfl.i_max),
-            ("gfl.P_set_lim_pu", gfl.P_set_lim),
-            ("gfl.P_min_pu", gfl.P_min),
-        ],
-    }
-    if problems.touch("plant.P_set0_pu", "plant.gfm", "plant.gfl"):
+    """Note first set-points that an inverter cannot give: the start would be no equilibrium and move by itself."""
+    plant, P, V = scenario.plant, scenario.plant.P_set0_pu, scenario.plant.V_set0_pu
+    if problems.touch("plant.gfm", "plant.gfl"):
         return
-    for kind, keys in limits.items():
+    P_known, V_known = (not problems.touch(f"plant.{key}") for key in ("P_set0_pu", "V_set0_pu"))
+    for kind, names in _LIMITS_OF_P.items():
+        table, parameters = f"plant.{kind.lower()}", getattr(plant, kind.lower())
         units = [row for row in feeder.inverters if row.kind == kind]
-        for key, limit in keys:
-            below = key.endswith("P_min_pu")
-            if not units or problems.touch(f"plant.{key}") or (start >= limit if below else start <= limit):
+        for name in names:
+            key, limit, below = f"{table}.{name}_pu", getattr(parameters, name), name == "P_min"
+            right = limit <= P if below else limit >= P
+            if right or not units or not P_known or problems.touch(key):
                 continue
-            kW = ", ".join(
-                f"{row.name} {start * row.P_rated / 1e3:g} of {limit * row.P_rated / 1e3:g}" for row in units
-            )
+            kW = ", ".join(f"{row.name} {P * row.P_rated / 1e3:g} of {limit * row.P_rated / 1e3:g}" for row in units)
             problems.add(
                 "plant.P_set0_pu",
-                f"{start:g} pu is {'below' if below else 'above'} plant.{key} = {limit:g} pu, so the start is no "
-                f"equilibrium ({kW} kW); {'raise' if below else 'lower'} P_set0_pu, or change {key}",
+                f"{P:g} pu is {'below' if below else 'above'} {key} = {limit:g} pu, so the start is no equilibrium "
+                f"({kW} kW); {'raise' if below else 'lower'} P_set0_pu, or change {key.removeprefix('plant.')}",
             )
             break
-    for table, (low, high) in (
-        ("gfm", (gfm.V_set_min, gfm.V_set_max)),
-        ("gfl", (gfl.V_set_min, gfl.V_set_max)),
-    ):
-        V = plant.V_set0_pu
-        if problems.touch("plant.V_set0_pu") or low <= V <= high:
-            continue
-        problems.add(
-            "plant.V_set0_pu",
-            f"{V:g} pu is beyond plant.{table}.V_set_min_pu = {low:g} to V_set_max_pu = "
-            f"{high:g}, which limit every later set-point; choose it within, or change them",
-        )
+        low, high = parameters.V_set_min, parameters.V_set_max
+        if V_known and not low <= V <= high:
+            problems.add(
+                "plant.V_set0_pu",
+                f"{V:g} pu is beyond {table}.V_set_min_pu = {low:g} to V_set_max_pu = {high:g}, which limit every "
+                "later set-point; choose it within, or change them",
+            )
 
 
 def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: Problems) -> None:
@@ -128,8 +116,7 @@ def check_events(scenario: ScenarioModel, problems: Problems) -> None:
     labels = [event.label for event in scenario.events]
     for name, case in scenario.cases.items():
         for label in case.P_max_kW:
-            if label not in labels:
-                problems.add(f"case.{name}.P_max_kW", f'no event "{label}"; {suggestion(label, labels, "events")}')
+            problems.unknown(f"case.{name}.P_max_kW", "event", label, labels)
 
 
 def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
@@ -147,9 +134,7 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
     keys = InverterTable.__struct_fields__
     for name, table in scenario.plant.inverter.items():
         path = f"plant.inverter.{name}"
-        if name not in rows:
-            problems.add(path, f'no inverter "{name}"; {suggestion(name, rows, "inverters")}')
-        elif table == InverterTable() and not problems.below(path):
+        if not problems.unknown(path, "inverter", name, rows) and table == InverterTable() and not problems.below(path):
             problems.add(path, f"changes nothing; give it one of {', '.join(keys)}")
 
 
@@ -216,8 +201,7 @@ def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple
     seen: set[frozenset[str]] = set()
     for i, pair in enumerate(links):
         for name in pair:
-            if name not in inverters:
-                problems.add(f"{path}[{i}]", f'no inverter "{name}"; {suggestion(name, inverters, "inverters")}')
+            problems.unknown(f"{path}[{i}]", "inverter", name, inverters)
         if pair[0] == pair[1]:
             problems.add(f"{path}[{i}]", f'a link joins two inverters, got "{pair[0]}" twice')
         elif frozenset(pair) in seen:
@@ -238,8 +222,7 @@ def _check_limits(
 ) -> None:
     rows = {row.name: row for row in inverters_of(scenario, feeder)}
     for name, kW in limits.items():
-        if name not in rows:
-            problems.add(path, f'no inverter "{name}"; {suggestion(name, rows, "inverters")}')
+        if problems.unknown(path, "inverter", name, rows):
             continue
         row, most = rows[name], rows[name].P_rated * scenario.plant.gfl.P_max / 1e3
         if row.kind == "GFM":

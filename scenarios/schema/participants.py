@@ -9,7 +9,6 @@ from plant.plant_config import ScheduledAction
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.time_checks import multiple
-from wire.suggestion import suggestion
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
@@ -57,9 +56,9 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
         for key, names in (("leave", event.leave), ("join", event.join)):
             path = f"event[{i}].{key}"
             for name in names:
-                if name not in known:
-                    problems.add(path, f'no inverter "{name}"; {suggestion(name, known, "inverters")}')
-                elif name in named:
+                if problems.unknown(path, "inverter", name, known):
+                    continue
+                if name in named:
                     problems.add(path, f'"{name}" is named twice in event "{event.label}"; name it once')
                 elif key == "leave" and name not in present:
                     problems.add(path, f'"{name}" is not there at {event.t_s:g} s; leave it out, or let it join before')
@@ -114,7 +113,5 @@ def _check_names(path: str, given: Sequence[str], known: Sequence[str], problems
     if problems.touch(path):
         return
     for i, name in enumerate(given):
-        if name not in known:
-            problems.add(path, f'no inverter "{name}"; {suggestion(name, known, "inverters")}')
-        elif name in given[:i]:
+        if not problems.unknown(path, "inverter", name, known) and name in given[:i]:
             problems.add(path, f'"{name}" is named twice; name it once')

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from wire.printable import printable
+from wire.suggestion import suggestion
 from wire.table_reading import read_table
 from wire.table_schema import Problem
 
@@ -71,6 +72,12 @@ class Problems:
         """Note problems of a table, whose keys stand behind a prefix."""
         for path, text in found:
             self.add(prefix + path, text)
+
+    def unknown(self, path: str, kind: str, name: str, known: Collection[str]) -> bool:
+        """Whether there is no inverter, event or other thing of a name, which is noted with the nearest name."""
+        if name not in known:
+            self.add(path, f'no {kind} "{name}"; {suggestion(name, known, f"{kind}s")}')
+        return name not in known
 
     def add_plain(self, text: str) -> None:
         """Note a problem that says itself where it is, as a feeder's do."""
