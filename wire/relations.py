@@ -35,6 +35,22 @@ class Below:
 
 
 @dataclass(frozen=True)
+class After:
+    """An end (s) that must come after the beginning of another field."""
+
+    field: str
+    """Name of the other field."""
+    only_with: str = ""
+    """As of `Below`."""
+
+    def objection(self, value: float, other: float, key: str) -> str:
+        """Return why an end does not come after the beginning at `key`, "" if it does."""
+        if value > other:
+            return ""
+        return f"{value:g} s is not after {key} = {other:g} s, so that the entry never holds"
+
+
+@dataclass(frozen=True)
 class MultipleOf:
     """A time (s) that must be a whole multiple of the step (s) of another field."""
 
@@ -103,13 +119,13 @@ def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lamb
     """
     found: dict[str, str] = {}
     for field in fields_of(cls):
-        for relation in (mark for mark in field.marks if isinstance(mark, Below | MultipleOf | Divides)):
+        for relation in (mark for mark in field.marks if isinstance(mark, Below | After | MultipleOf | Divides)):
             other = named(cls, relation.field)
             idle = {field.key, other.key} & found.keys() or not (known(field) and known(other))
             if idle or (relation.only_with and not getattr(values, relation.only_with)):
                 continue
             numbers = getattr(values, field.name), getattr(values, other.name)
-            if text := relation.objection(*numbers, other.key):
+            if None not in numbers and (text := relation.objection(*numbers, other.key)):
                 found[field.key] = text
     return [Problem(key, text) for key, text in found.items()]
 

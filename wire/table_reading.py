@@ -2,43 +2,39 @@
 
 from __future__ import annotations
 
-import functools
-import json
-import operator
 import types
-import typing
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from wire.plausible import number_in
-from wire.printable import printable
 from wire.relations import contradictions
 from wire.suggestion import suggestion
 from wire.table_schema import (
     INHERITED,
     INLINE,
     NO_KEY,
-    Example,
     Field,
     OtherKeys,
     Problem,
     below,
     fields_of,
 )
+from wire.type_words import (
+    expected,
+    inner_struct,
+    keys_of,
+    kinds_of,
+    shown,
+    structs_in,
+    without_none,
+    wrong_type,
+)
 
 T = TypeVar("T", bound=msgspec.Struct)
 
 _UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
 _KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", "mHz", "Hz")
-_KIND_WORDS = {
-    float: "a number",
-    int: "a whole number",
-    str: "a text in quotes",
-    bool: "true or false",
-    dict: "a table",
-}
 
 
 def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Problem]]:
@@ -98,15 +94,6 @@ def parameter_values(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def shown(raw: object) -> str:
-    """Return a value as TOML writes it, or nearly."""
-    try:
-        text = json.dumps(raw, ensure_ascii=False, default=str)
-    except (TypeError, ValueError, RecursionError):  # what Python has and no file
-        text = repr(raw)
-    return printable(text, 1000)
-
-
 class _Reader:
     """Reads one file whose top table is `root`; `noun` is the word for a key."""
 
@@ -126,7 +113,7 @@ class _Reader:
         inline = [field for field in fields_of(struct) if INLINE in field.marks]
         others = next((field for field in fields if field.mark(OtherKeys)), None)
         keys = [field.key for field in fields if field is not others]
-        keys += [key for field in inline for key in _keys(field.type)]
+        keys += [key for field in inline for key in keys_of(field.type)]
         values: dict[str, Any] = self._top if struct is self._root else {}
         tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
         is_table = isinstance(data, Mapping)
@@ -135,7 +122,7 @@ class _Reader:
             data = {}
         for field in inline:
             values[field.name] = self.table(
-                field.type, {key: data[key] for key in _keys(field.type) if key in data}, path
+                field.type, {key: data[key] for key in keys_of(field.type) if key in data}, path
             )
         if others is not None:
             values[others.name] = ()
@@ -158,7 +145,7 @@ class _Reader:
                 values[field.name] = field.default
             else:
                 if is_table:
-                    self._add(_join(path, field.key), f"is missing; {_expected(field)}")
+                    self._add(_join(path, field.key), f"is missing; {expected(field)}")
                 values[field.name] = _placeholder(field.type)
         wrong = {problem.path for problem in self.problems[noted:]}
         found = contradictions(
@@ -169,20 +156,20 @@ class _Reader:
 
     def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
         """Convert the value of one key; return the default for a wrong one."""
-        kind = _without_none(field.type)
-        structs = _structs(kind)
+        kind = without_none(field.type)
+        structs = structs_in(kind)
         if structs == [kind]:
             return self.table(kind, raw, path, base)
         if structs and isinstance(raw, Mapping):
             before, chosen = len(self.problems), self._chosen(structs, raw, path)
             value = self.table(chosen, raw, path) if chosen else None
             return value if len(self.problems) == before else _fallback(field)
-        if (inner := _inner_struct(kind, tuple)) is not None:
+        if (inner := inner_struct(kind, tuple)) is not None:
             if isinstance(raw, list):
                 return tuple(self.table(inner, item, f"{path}[{i}]") for i, item in enumerate(raw))
             self._add(path, f"must be written as [[{path}]], got {shown(raw)}")
             return ()
-        if (inner := _inner_struct(kind, dict)) is not None:
+        if (inner := inner_struct(kind, dict)) is not None:
             if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
                 return {name: self.table(inner, item, f"{path}.{name}") for name, item in raw.items()}
             self._add(path, f"must be written as tables [{path}.NAME], got {shown(raw)}")
@@ -190,7 +177,7 @@ class _Reader:
         try:
             value = msgspec.convert(raw, kind)
         except msgspec.ValidationError:
-            self._add(path, _wrong_type(field, raw))
+            self._add(path, wrong_type(field, raw))
             return _fallback(field)
         wrong = ""
         if isinstance(value, str) and not value.isprintable() and self._noun == "key":
@@ -227,7 +214,7 @@ class _Reader:
                 return f"unknown {self._noun}; write {stem}"
         if f"{key}s" not in known:
             for where, table in _tables(self._root):
-                if table is not struct and key in _keys(table):
+                if table is not struct and key in keys_of(table):
                     return f"unknown key here; it belongs {where}"
         return f"unknown {self._noun}; {suggestion(key, known, f'{self._noun}s')}"
 
@@ -245,108 +232,14 @@ def _tables(root: type) -> Iterator[tuple[str, type]]:
             kind, key = field.type, _join(path, field.key)
             if INLINE in field.marks:
                 further.append((path, kind))
-            elif _structs(kind) == [kind]:
+            elif structs_in(kind) == [kind]:
                 yield f"into [{key}]", kind
                 further.append((key, kind))
-            elif (inner := _inner_struct(kind, dict)) is not None:
+            elif (inner := inner_struct(kind, dict)) is not None:
                 yield f"into [{key}.NAME]", inner
                 further.append((f"{key}.NAME", inner))
-            elif (inner := _inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
+            elif (inner := inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
                 yield f"into [[{key}]]", inner
-
-
-def _keys(struct: type) -> list[str]:
-    """Return the keys of a table."""
-    return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(OtherKeys))]
-
-
-def kinds_of(kind: Any) -> tuple[Any, ...]:
-    """Return the types of which a value may be one; None is none, as TOML has no null."""
-    return _parts(_without_none(kind))
-
-
-def _without_none(kind: Any) -> Any:
-    """Return a type without None: TOML has no null."""
-    rest = [part for part in _parts(kind) if part is not types.NoneType]
-    return functools.reduce(operator.or_, rest)
-
-
-def _parts(kind: Any) -> tuple[Any, ...]:
-    return get_args(kind) if get_origin(kind) in (types.UnionType, typing.Union) else (kind,)
-
-
-def _structs(kind: Any) -> list[Any]:
-    """Return the structs that a value may be."""
-    return [part for part in _parts(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
-
-
-def _inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
-    """Return the struct in a `tuple[Struct, ...]` or a `dict[str, Struct]`."""
-    if get_origin(kind) is not container:
-        return None
-    inner = get_args(kind)[1 if container is dict else 0]
-    return inner if _structs(inner) == [inner] else None
-
-
-def _wrong_type(field: Field, raw: Any) -> str:
-    kinds = _parts(_without_none(field.type))
-    literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
-    if literal is not None and isinstance(raw, str):
-        rest = [kind for kind in kinds if kind is not literal]
-        more = f"; or write {_named(rest, field)}" if rest else ""
-        choices = [choice for choice in get_args(literal) if choice]
-        return f"there is no {shown(raw)}; {suggestion(raw, choices, 'choices')}{more}"
-    hint = number_in(raw) if isinstance(raw, str) and {float, int} & {*kinds} else ""
-    return f"must be {_named(kinds, field)}, got {shown(raw)}{hint}"
-
-
-def _expected(field: Field) -> str:
-    """Say what to write for a key that is missing."""
-    kind, example = _without_none(field.type), field.mark(Example)
-    if get_origin(kind) is dict:
-        return f"write at least one table [{field.key}.NAME]"
-    if _structs(kind) == [kind]:
-        return f"write a table [{field.key}]"
-    if kind is str and example:
-        return f"write {field.key} = {example.text}"
-    return f"write {_named(_parts(kind), field)}"
-
-
-def _named(kinds: typing.Sequence[Any], field: Field) -> str:
-    """Name what a key takes, for people, with an example."""
-    example = field.mark(Example)
-    return in_words(*kinds) + (f" such as {example.text}" if example else "")
-
-
-def in_words(*kinds: Any) -> str:
-    """Return types in words.
-
-    Examples
-    --------
-    >>> in_words(Literal["a", "b"], list[float])
-    'one of "a", "b" or a list of numbers'
-    """
-    kinds = tuple(part for kind in kinds for part in kinds_of(kind))
-    words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(_structs(kind))))
-    return " or ".join(words)
-
-
-def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
-    """Name one type."""
-    origin = get_origin(kind)
-    if origin is Literal:
-        return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
-    if _structs(kind):
-        several = sum(bool(_structs(other)) for other in kinds) > 1
-        keys = f"a {kind.__struct_config__.tag_field}" if several else f"the keys {', '.join(_keys(kind))}"
-        return f"a table with {keys}"
-    if origin in (tuple, list):
-        inner = get_args(kind)[0]
-        if inner in (int, float):
-            return "a list of numbers"
-        pairs = get_origin(inner) is tuple and Ellipsis not in get_args(inner)
-        return "a list of pairs" if pairs else "a list of lists" if get_origin(inner) is tuple else "a list"
-    return _KIND_WORDS.get(origin or kind, getattr(kind, "__name__", str(kind)))
 
 
 def _fallback(field: Field) -> Any:
@@ -356,10 +249,10 @@ def _fallback(field: Field) -> Any:
 
 def _placeholder(kind: Any) -> Any:
     """Return something of a type; nobody sees it."""
-    kind = _parts(kind)[0]
+    kind = kinds_of(kind)[0]
     if get_origin(kind) is Literal:
         return get_args(kind)[0]
-    if _structs(kind):
+    if structs_in(kind):
         return kind(**{field.name: _placeholder(field.type) for field in fields_of(kind) if field.required})
     return (get_origin(kind) or kind)()
 

@@ -19,16 +19,16 @@ from netem.schema.profiles import PROFILES
 from wire.path_text import is_no_path
 from wire.plausible import Plausible, Unit
 from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
-from wire.relations import problems_of
+from wire.relations import After, problems_of
 from wire.suggestion import suggestion
-from wire.table_reading import shown
 from wire.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
+from wire.type_words import shown
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""
 
 RunTime = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
-RunTimeOrNone = Annotated[float | None, Unit("s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
+EndTime = Annotated[float | None, Unit("s"), After("from_s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
 
 KINDS = ("cut", "flap", "loss", "rate", "slots", "delay", "duplicate", "corrupt")
 """What an entry may do to a link, in the order in which it is done."""
@@ -80,7 +80,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Which links, e.g. "inv4 <-> inv7"; see `netem.schema.pattern`."""
     from_s: Annotated[RunTime, Label("faults begin at")] = 0.0
     """From when (s of run time)."""
-    to_s: Annotated[RunTimeOrNone, Label("faults end at")] = None
+    to_s: Annotated[EndTime, Label("faults end at")] = None
     """Until when (s); without it, to the end of the run."""
     profile: str = ""
     """Name of a profile; keys given beside it take the place of the profile's."""
@@ -138,7 +138,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def problems(self) -> list[Problem]:
         """Return the values that cannot be meant; `on` is judged where the names are known."""
-        found = problems_of(self) + times_problems(self.from_s, self.to_s)
+        found = problems_of(self)
         if self.profile and self.profile not in PROFILES:
             text = f'there is no profile "{self.profile}"; {suggestion(self.profile, PROFILES, "profiles")}'
             found.append(Problem("profile", text))
@@ -152,10 +152,3 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 _SHORTHANDS = {field.name: field.mark(Shorthand) for field in fields_of(Fault)}
 """By kind: what a number alone stands for."""
-
-
-def times_problems(from_s: float, to_s: float | None) -> list[Problem]:
-    """Return whether an entry ends before it begins."""
-    if to_s is None or to_s > from_s:
-        return []
-    return [Problem("to_s", f"{to_s:g} s is not after from_s = {from_s:g} s, so that the entry never holds")]

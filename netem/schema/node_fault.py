@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 
 from netem.models.delay import LONGEST_DELAY
-from netem.schema.fault import RunTime, RunTimeOrNone, times_problems
+from netem.schema.fault import EndTime, RunTime
 from wire.plausible import Plausible, Unit
 from wire.relations import problems_of
 from wire.suggestion import suggestion
@@ -35,7 +35,7 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """The inverter."""
     from_s: RunTime = 0.0
     """From when (s of run time)."""
-    to_s: RunTimeOrNone = None
+    to_s: EndTime = None
     """Until when (s); without it, to the end of the run."""
     kill: bool = False
     """Whether its process ends at from_s, without a word and for good."""
@@ -48,7 +48,7 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     def problems(self, names: Sequence[str] | None) -> list[Problem]:
         """Return the values that cannot be meant; without names of agents any may be one."""
-        found = problems_of(self) + times_problems(self.from_s, self.to_s)
+        found = problems_of(self)
         if names is not None and self.name not in names:
             found.append(Problem("name", f'no agent "{self.name}"; {suggestion(self.name, names, "agents")}'))
         if not (self.kill or self.pause or self.slow_s or self.skew):

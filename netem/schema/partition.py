@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from netem.models.gates import Cut
-from netem.schema.fault import RunTime, RunTimeOrNone, Span, times_problems
+from netem.schema.fault import EndTime, RunTime, Span
 from wire.messages import PLANT
 from wire.relations import problems_of
 from wire.suggestion import suggestion
@@ -34,7 +34,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Instead of groups: this inverter's agent, from everybody else."""
     from_s: RunTime = 0.0
     """From when (s of run time)."""
-    to_s: RunTimeOrNone = None
+    to_s: EndTime = None
     """Until when (s); without it, to the end of the run."""
     hold: bool = False
     """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
@@ -111,7 +111,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
         Without names of agents any may be one.
         """
-        found = problems_of(self) + times_problems(self.from_s, self.to_s)
+        found = problems_of(self)
         given = [key for key in ("groups", "by", "alone") if getattr(self, key)]
         if len(given) != 1:
             got = f"got {' and '.join(given)}" if given else "got none"

@@ -14,8 +14,8 @@ import msgspec
 from plant.equipment import PHASES
 from wire.plausible import Plausible
 from wire.suggestion import suggestion
-from wire.table_reading import shown
 from wire.table_schema import Field, Label, fields_of, named
+from wire.type_words import shown
 
 C = TypeVar("C", bound=msgspec.Struct)
 
