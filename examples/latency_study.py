@@ -1,4 +1,4 @@
-"""Latency study: what delay on the links between agents does to control, by a metric of our own.
+"""Latency study: the effect of delay on the links between agents, by a metric of our own.
 
 python examples/latency_study.py
 """

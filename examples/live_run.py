@@ -17,7 +17,7 @@ COMMAND = [sys.executable, "-m", "gridpeers"]
 
 
 def gridpeers(*words: str) -> None:
-    """Run one command, and show it with what it prints."""
+    """Run one command, and show it with its output."""
     print("$ gridpeers", *words, flush=True)
     subprocess.run([*COMMAND, *words, "--connect", ENDPOINT], check=True)
 

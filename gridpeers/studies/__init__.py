@@ -1,1 +1,1 @@
-"""What is made of runs, or before them: sweeps, comparisons, predictions."""
+"""Studies of many runs: sweeps, comparisons, predictions."""

@@ -1,4 +1,4 @@
-"""Two runs side by side: what differs in their scenarios, in their metrics, and in a figure."""
+"""Two runs side by side: differences of their scenarios and of their metrics, and a figure."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Comparison:
         )
 
     def __str__(self) -> str:
-        """Return what the command `gridpeers compare` prints."""
+        """Return the text that the command `gridpeers compare` prints."""
         changes = self.changes.to_string() if len(self.changes) else "The scenarios are the same."
         table = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
         verdict = "The histories are the same, byte by byte." if self.same else "The histories differ."

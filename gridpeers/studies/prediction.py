@@ -1,4 +1,4 @@
-"""What theory says of a case before it is run (docs/theory.md), as tables and as the command's text."""
+"""Predictions by theory of a case before it is run (docs/theory.md), as tables and as the command's text."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> 
 
 
 class Prediction:
-    """What theory says of one case; made by `gridpeers.predict`.
+    """Predictions by theory of one case; made by `gridpeers.predict`.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Prediction:
 
     @cached_property
     def modes(self) -> pd.Series:
-        """Rates of the slow modes (1/s) and what they follow from: `links`, `lambda_2`, `kappa`, `sharing_rate`, ...
+        """Rates of the slow modes (1/s) and their causes: `links`, `lambda_2`, `kappa`, `sharing_rate`, ...
 
         Empty where nobody runs a secondary law.
         """
@@ -164,7 +164,7 @@ class Prediction:
         return bool(self._inverters.acts.any())
 
     def __str__(self) -> str:
-        """Return what the command `gridpeers predict` prints."""
+        """Return the text that the command `gridpeers predict` prints."""
         return case_text(self.title, self._inverters, self._islands, self._plant)
 
     def __repr__(self) -> str:

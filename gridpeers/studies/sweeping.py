@@ -140,7 +140,7 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
 
 
 def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
-    """Check what is to be run."""
+    """Check the runs."""
     problems = Problems("sweep")
     crossed: dict[str, Any] = {}
     paired: dict[str, Any] = {}
@@ -172,7 +172,7 @@ def _jobs(plan: Plan, jobs: int | None) -> int:
 
 
 def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, History | None]:
-    """Do one run without its history, whose way between two processes is spared."""
+    """Do one run without its history, so that none travels between two processes."""
     return run_one(number, scenario, case), None
 
 

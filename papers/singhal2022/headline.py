@@ -30,7 +30,7 @@ def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[ComparedNumbe
 
 
 def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
-    """Lines on what is within its tolerance, what is not judged by one, and V_error beside its own size."""
+    """Return lines on numbers within their tolerance, numbers that have none, and V_error beside its own size."""
     return [*_judged(all_numbers), *_by_factor(all_numbers), *_relative(all_numbers)]
 
 

@@ -1,4 +1,4 @@
-"""What a run of each experiment is shown beside and judged by: the key `paper` of a scenario names one of them."""
+"""Benchmarks: the paper's numbers and claims for a run of each experiment, named in the scenario's key `paper`."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class Tolerance:
     value: float | None
     """Largest difference from the paper's number that passes, in its unit; None where nothing is judged by it."""
     reason: str
-    """Why that much, or why not at all."""
+    """Reason for the bound, or for having none."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Bound:
     """A bound on our own number, where the paper says a sentence and no number that could be compared."""
 
     value: float
-    """The bound, in the unit that the reason tells."""
+    """The bound, in the unit that its reason names."""
     reason: str
-    """Why that much."""
+    """Reason for the bound."""
 
 
 _PRINTED_F = Tolerance(0.005, "the paper prints 0.00: all that rounds to it")

@@ -57,7 +57,7 @@ def groups(inverters: InverterGroup) -> tuple[tuple[str, ...], ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Modes:
-    """Rates of the two slow modes and what follows from them. Infinite where there is no such mode."""
+    """Rates of the two slow modes, and times by these rates. Infinite where there is no such mode."""
 
     links: int
     """Number of links among those that run the law."""

@@ -33,7 +33,7 @@ LinkEnds = tuple[str, str]
 """(src, dst)."""
 
 AT_REST = 1e-9
-"""Singular values of 1 - M below this belong to what the law never moves."""
+"""Singular values of 1 - M below this belong to set-points that the law never moves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,7 +194,7 @@ class Loop:
 
     @cached_property
     def free_map(self) -> Floats:
-        """The map without what is constant by itself: the load and who does not run the law."""
+        """The map without its constants: the load, and inverters that do not run the law."""
         matrix = self.matrix
         frozen = np.zeros(matrix.shape[0], bool)
         frozen[-1] = True
@@ -214,7 +214,7 @@ class Loop:
 
     @cached_property
     def spectral_radius(self) -> float:
-        """Largest magnitude of an eigenvalue (1), those of what never moves left out; below 1 the loop is stable."""
+        """Largest magnitude of an eigenvalue (1), without set-points that never move; below 1 the loop is stable."""
         values = np.linalg.eigvals(self.free_map)
         values = values[np.argsort(np.abs(values - 1.0))][self.resting :]
         return float(np.abs(values).max(initial=0.0))

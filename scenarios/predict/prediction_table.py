@@ -1,4 +1,4 @@
-"""Predictions of a case as text for people, within 100 columns: each number with its unit and what it means."""
+"""Predictions of a case as text for people, within 100 columns: each number with its unit and its meaning."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ WIDTH = 100
 """Columns."""
 
 TextRow = tuple[str, str, str, str]
-"""Quantity, by the continuous law, by ours in discrete time, what it means."""
+"""Quantity, by the continuous law, by ours in discrete time, meaning."""
 
 
 def case_text(

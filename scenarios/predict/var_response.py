@@ -47,10 +47,10 @@ STEP = 0.002
 """By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""
 
 LENGTH = 2.0
-"""How long a response is followed (s). What is left then is one in ten of the slowest inverter's, and slow."""
+"""Length of a response (s). After it a tenth of the slowest inverter's change is left, and slow."""
 
 FOLLOWED = 20.0
-"""How long the law is followed (s); its rate is that of the last half."""
+"""Time for which the law is followed (s); its rate is that of the last half."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -42,7 +42,7 @@ INDEXES = {
 """Axes of the project's own indexes."""
 
 GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
-"""What is written at the axes for the parameters of drawn graphs, which no scenario file has."""
+"""Axis labels for the parameters of drawn graphs, which no scenario file has."""
 
 
 def unit_of(name: str) -> str:

@@ -19,7 +19,7 @@ REPEATS = ("sample", "case", "seed", "graph.number", "graph.lambda_2", "graph.ed
 
 
 def is_number(column: pd.Series) -> bool:
-    """Return whether a column holds numbers alone; what is true or false is none."""
+    """Return whether a column holds numbers alone; truth values are none."""
     return bool(is_numeric_dtype(column) and not is_bool_dtype(column))
 
 

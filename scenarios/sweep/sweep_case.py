@@ -32,7 +32,7 @@ from scenarios.schema.configs import as_in, configs
 from scenarios.schema.participants import without_agent
 
 KEPT_PLANTS = 4
-"""Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep of what the plant does not know needs but one."""
+"""Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""
 
 
 class _Kept(threading.local):
@@ -48,7 +48,7 @@ _feeder = lru_cache(maxsize=8)(read_feeder)
 
 
 class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
-    """What became of a run."""
+    """The result of one run."""
 
     number: int
     """Its place in the plan, from 0."""
@@ -61,9 +61,9 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     links_sha256: str = ""
     """Of all verdicts of the emulated links; "" without."""
     trips: str = ""
-    """Who tripped, when and why; "" when nobody did. What is measured is of those that are left."""
+    """Trips of inverters, with time and reason; "" without any. Measures are of those that are left."""
     metric_warnings: str = ""
-    """What of the scenario's own metrics has no value, and why; "" when all have."""
+    """The scenario's own metrics without a value, and why; "" when all have one."""
     link_warnings: str = ""
     """Accounts of emulated links that do not close, and plugged-in faults that failed; "" if there are none."""
     measures: dict[str, float | None] = {}

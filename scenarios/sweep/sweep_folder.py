@@ -1,4 +1,4 @@
-"""The folder of a sweep: what it holds, whose it is, and which runs are done already.
+"""The folder of a sweep: its files, its owner, and the runs that are done already.
 
 `runs.jsonl` is a journal: a line per finished run, written and flushed to the disk before the next. A line that was
 cut off by a kill has no line feed; it is removed when the sweep goes on, and its run is done again.
@@ -26,7 +26,7 @@ MANIFEST, JOURNAL, LOCK = "sweep.json", "runs.jsonl", ".lock"
 
 
 def folder_of(out: Path | None, name: str) -> Path:
-    """Return the folder of a sweep: the same every time, so that the same command goes on with what was interrupted."""
+    """Return the folder of a sweep: the same every time, so that the same command resumes it."""
     return RUNS / "sweeps" / name if out is None else out
 
 
@@ -138,7 +138,7 @@ def _locked(folder: Path) -> int:
 
 
 def _read(journal: Path, runs: int) -> dict[int, SweepRow]:
-    """Return the finished runs; what a kill has left of a line is cut off."""
+    """Return the finished runs; an unfinished last line is cut off."""
     if not journal.exists():
         return {}
     text = journal.read_bytes()

@@ -1,9 +1,9 @@
-"""Plots of a sweep, chosen by what is varied.
+"""Plots of a sweep, chosen by the varied parameters.
 
 One parameter: each index against it, median and range over all the rest (seeds, graphs). Two on a grid: a heat map of
 the medians. More, or drawn at random: each parameter by itself, with a point per run. Where the axis is a text, its
 values stand side by side. A case is a colour and a dash of Okabe and Ito's palette; heat maps are in cividis, made for
-colour-blind readers. What never came to be (a time) counts as later than all others, and how often is written down;
+colour-blind readers. A time that never came counts as later than all others, and its number is written down;
 other indexes of runs that broke are left out.
 """
 

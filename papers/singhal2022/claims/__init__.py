@@ -1,4 +1,4 @@
-"""What the paper claims of its experiments, one file per experiment."""
+"""The paper's claims on its experiments, one file per experiment."""
 
 from gridpeers.benchmarks import Claim
 from papers.singhal2022.claims import (

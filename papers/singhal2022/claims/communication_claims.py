@@ -1,4 +1,4 @@
-"""What the paper claims of reduced communication and of a link failure (its section 4, Table IV)."""
+"""The paper's claims on reduced communication and of a link failure (its section 4, Table IV)."""
 
 from __future__ import annotations
 

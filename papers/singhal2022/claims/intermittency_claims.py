@@ -1,4 +1,4 @@
-"""What the paper claims of intermittency: three inverters lose power, the others take over (section 4, Table III)."""
+"""The paper's claims on intermittency: three inverters lose power, the others take over (section 4, Table III)."""
 
 from __future__ import annotations
 

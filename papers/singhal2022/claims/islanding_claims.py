@@ -1,4 +1,4 @@
-"""What the paper claims of its islanding experiment (its section 4, Tables I and II, five figures)."""
+"""The paper's claims on its islanding experiment (its section 4, Tables I and II, five figures)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper claims of plug-n-play: inverter 2 leaves and returns while the others go on (its section 4)."""
+"""The paper's claims on plug-n-play: inverter 2 leaves and returns while the others go on (its section 4)."""
 
 from __future__ import annotations
 

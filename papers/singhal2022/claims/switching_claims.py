@@ -1,4 +1,4 @@
-"""What the paper claims of microgrid switching: three islands, each restored by its own (its section 4, Table V)."""
+"""The paper's claims on microgrid switching: three islands, each restored by its own (its section 4, Table V)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper claims of the communication topology: random connected graphs of 8 to 36 links (section 4, figure)."""
+"""The paper's claims on the communication topology: random connected graphs of 8 to 36 links (section 4, figure)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
 
 @dataclass(frozen=True, kw_only=True)
 class GraphRun:
-    """A run on one random graph: how the event settled, and what it left."""
+    """A run on one random graph: settling after the event, and steady values."""
 
     links: int
     """Links of the graph."""

@@ -1,4 +1,4 @@
-"""What limits of set-points are worth: ours, beside the paper's Remark 2, which accepts wind-up."""
+"""Our claims on limits of set-points, beside the paper's Remark 2, which accepts wind-up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`gridpeers experiment`: from a name to a figure and a table. What it needs is imported when it is used."""
+"""`gridpeers experiment`: from a name to a figure and a table. Heavy packages are imported when it runs."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def experiment(
 
 
 def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: str) -> ExperimentResult:
-    """Do what is left of the sweep, and draw."""
+    """Do the runs of the sweep that are not done yet, and draw."""
     from gridpeers.cli.commands.sweep_command import check_packages, finish
 
     check_packages()

@@ -82,7 +82,7 @@ class CaseData:
         )
 
     def mean(self, x: Floats, case: str, end: float) -> float:
-        """Return the mean (of what x is) over the 0.2 s before a time (s), as steady values are measured."""
+        """Return the mean over the 0.2 s before a time (s), as steady values are measured."""
         t = self.t(case)
         return float(x[(t >= end - STEADY - 1e-9) & (t < end - 1e-9)].mean())
 

@@ -28,9 +28,9 @@ class Curve:
 
     x: Floats
     y: Floats
-    """What never came to be is infinite: it is drawn as a sign at the upper edge."""
+    """A time that never came is infinite: it is drawn as a sign at the upper edge."""
     style: int
-    """Number of its colour and marker: what is alike in all panels has one."""
+    """Number of its colour and marker: one for the same case in all panels."""
     look: Look = "measured"
     low: Floats = field(default_factory=lambda: np.zeros(0))
     high: Floats = field(default_factory=lambda: np.zeros(0))
@@ -78,9 +78,9 @@ class Page:
     columns: int
     """Panels side by side."""
     names: Mapping[int, str]
-    """What the styles mean, for the legend."""
+    """Meaning of the styles, for the legend."""
     looks: Mapping[Look, str] = field(default_factory=lambda: {"measured": "measured", "predicted": "predicted"})
-    """What the looks mean, for the legend; those without words are left out."""
+    """Meaning of the looks, for the legend; those without words are left out."""
     share_y: bool = False
     height: float = 3.0
     """Height of a row of panels (inch)."""

@@ -51,7 +51,7 @@ def draw(page: Page, path: Path) -> Path:
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
-    """One panel: scales first, as what never came to be is put at the edge."""
+    """Draw one panel: scales first, as times that never came are put at the edge."""
     for start, end in panel.spans:
         axes.axvspan(start, end, color="#eeeeee", zorder=0)
     if panel.level is not None:
@@ -116,7 +116,7 @@ def _nested(curve: Curve, largest: float) -> float:
 
 
 def _never(axes: Axes, panel: Panel) -> None:
-    """Put a sign of infinity at the upper edge for what never came."""
+    """Put a sign of infinity at the upper edge for times that never came."""
     some = False
     for curve in panel.curves:
         never = np.isposinf(curve.y)
@@ -147,7 +147,7 @@ def _names(page: Page) -> list[Line2D]:
 
 
 def _looks(page: Page) -> list[Line2D]:
-    """Return what filled, hollow and dashed mean, as far as the page has them."""
+    """Return legend entries for filled, hollow and dashed, as far as the page has them."""
     used = {curve.look for panel in page.panels for curve in panel.curves}
     black = "#333333"
     shapes: dict[str, dict[str, Any]] = {

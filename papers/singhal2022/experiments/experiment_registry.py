@@ -1,4 +1,4 @@
-"""The experiments by name: what is run, and what makes a figure and a table of it."""
+"""The experiments by name: a sweep or scenario to run, and a function that makes a figure and a table of it."""
 
 from __future__ import annotations
 

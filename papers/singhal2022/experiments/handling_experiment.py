@@ -1,4 +1,4 @@
-"""What an agent makes of late and lost states: the options of `[handling]`, measured under delay and loss."""
+"""Options of `[handling]` for late and lost states, measured under delay and loss."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = {
     "no limits on P_set, V_set": {"anti_windup": "none"},
     "conditional anti-windup": {"anti_windup": "conditional"},
 }
-"""Options of the sweep by name; what they leave out is as in the paper."""
+"""Options of the sweep by name; keys that they leave out are as in the paper."""
 
 _PAPER = {"stale": "hold", "T_age_s": 0.2, "weights": "paper", "kappa_c": 12.0, "anti_windup": "clamp"}
 

@@ -1,4 +1,4 @@
-"""Lost messages: times against the probability of loss, and against delays of the same mean age of what is used.
+"""Lost messages: times against the probability of loss, and against delays of the same mean age of used states.
 
 With hold, a state is used until the next one comes. If each is lost with probability p, the mean age is T_c/(1 - p):
 the one period that every state takes, and T_c p/(1 - p) more.

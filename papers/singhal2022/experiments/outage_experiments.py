@@ -32,7 +32,7 @@ LOST = 1.0 - 1e-12
 
 
 def partition(runs: CaseData) -> ExperimentResult:
-    """Return F and MPSI over time, and what is left and comes back, in numbers."""
+    """Return f and MPSI over time, with their values at the end of the partition and the times to come back."""
     split = runs.scenario.cases["halves"].netem.partitions[0]
     event = runs.scenario.events[-1]
     start, end = split.from_s, split.to_s or runs.scenario.time.end_s
@@ -75,7 +75,7 @@ def partition(runs: CaseData) -> ExperimentResult:
 def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[Floats, Floats]]:
     """Return the time after the loss of load (s), and f (Hz) and MPSI, as long as the groups last.
 
-    What is held stays, as if all that follows were lost; what has expired is a link that is not there.
+    A held state stays, as if all later messages were lost; with expired states the link is left out.
     """
     inverters, load = runs.inverters(case), runs.loads[runs.scenario.events[-1].label]
     cut = cut_between(inverters, groups_of(runs, case))
@@ -124,7 +124,7 @@ def _back(after: Settling) -> tuple[TableCell, TableCell]:
 
 
 def flapping(runs: CaseData) -> ExperimentResult:
-    """Return F and MPSI over time, and times after each event."""
+    """Return f and MPSI over time, and times after each event."""
     cases = runs.scenario.cases
     panels = [
         Panel(
@@ -151,7 +151,7 @@ def flapping(runs: CaseData) -> ExperimentResult:
 
 
 def extra_age(rule: Case) -> float:
-    """Mean age (s) that a case's flapping adds to what is held: d^2 / (2 (u + d)); while down, ages rise to d."""
+    """Return the mean age (s) that flapping adds to held states: d^2 / (2 (u + d)); while down, ages rise to d."""
     flaps = [entry.flap for entry in rule.netem.links if entry.flap is not None]
     return sum(flap.down_s**2 / (2.0 * (flap.up_s + flap.down_s)) for flap in flaps)
 

@@ -1,6 +1,6 @@
-"""The same delay between agents, on the way of measurements, and on the way of set-points: what swings, from where on.
+"""The same delay between agents, of measurements, and of set-points: which quantity swings, and from which delay on.
 
-The links carry frequency and voltage together. What swings first is mostly the voltage; to see the frequency by itself,
+The links carry frequency and voltage together. Mostly the voltage swings first; to see the frequency by itself,
 the sweep has runs that leave V_set alone.
 """
 
@@ -30,10 +30,10 @@ LINKS, MEASUREMENTS, SET_POINTS = "* <-> *", "plant -> *", "* -> plant"
 CASES = ("full", "reduced", "path", "star")
 
 LEVELS = {"f_swing_Hz": 0.005, "V_swing_pu": 0.002}
-"""What counts as swinging (Hz, pu). An oscillation that stays is ten times as large."""
+"""Least swing that counts (Hz, pu). An oscillation that stays is ten times as large."""
 
 LEAST = 1e-5
-"""Swings below this (Hz, pu) are drawn as this: what is left of a transient, or rounding."""
+"""Swings below this (Hz, pu) are drawn as this: the rest of a transient, or rounding."""
 
 _PLACES = ((LINKS, "links"), (MEASUREMENTS, "measurements"), (SET_POINTS, "set-points"))
 
@@ -83,7 +83,7 @@ def places(sweep: SweepData) -> ExperimentResult:
 
 
 def _limits(sweep: SweepData) -> dict[tuple[str, bool, str], float]:
-    """Return the predicted limits (s) by what swings, whether links of the plant are late, and graph."""
+    """Return the predicted limits (s) by the quantity that swings, whether links of the plant are late, and graph."""
     found = {}
     for case in CASES:
         inverters = sweep.inverters[case]

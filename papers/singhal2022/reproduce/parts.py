@@ -1,4 +1,4 @@
-"""The parts of the paper: each an experiment with its tables and figures, and what has to be run for it."""
+"""The parts of the paper: each an experiment with its tables, figures and runs."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ class Picture:
     """One figure of the report."""
 
     key: str
-    """What claims name it by, and its file's name."""
+    """Its name in claims, and its file's name."""
     file: str
     """File in the run's folder of plots."""
     title: str
-    """What it shows, and which figure of the paper it stands for."""
+    """Its contents, and the figure of the paper that it stands for."""
     note: str = ""
-    """What a reader should see in it besides the claims."""
+    """A hint for the reader, besides the claims."""
 
     @property
     def stem(self) -> str:
@@ -34,7 +34,7 @@ class Part:
     """Whose tables and claims; "" for one that is ours."""
     title: str
     what: str
-    """What happens in it, in a sentence or two."""
+    """The course of events, in a sentence or two."""
     pictures: tuple[Picture, ...]
 
 
@@ -190,7 +190,7 @@ WITH_TABLES = ("islanding", "intermittency", "reduced-communication", "microgrid
 """Parts that have a table in the paper."""
 
 CHOICES = ("tables", "figures", *(part.name for part in PARTS))
-"""What `--only` takes."""
+"""Values of `--only`."""
 
 
 def chosen(only: str | None) -> tuple[Part, ...]:

@@ -19,7 +19,7 @@ class Entry(NamedTuple):
     off: str
     """Ours less the paper's."""
     judged: tuple[tuple[str, bool], ...]
-    """Every judgement: by what, "" for the tolerance of its table, and whether it passes."""
+    """Every judgement: its measure, "" for the tolerance of its table, and whether it passes."""
 
 
 class GridRow(NamedTuple):
@@ -50,7 +50,7 @@ def titles_of(result: PartResult) -> dict[str, str]:
 
 
 def tolerances(table: PaperTable) -> list[str]:
-    """Return what each column is judged by, and why."""
+    """Return the tolerance of each column, and its reason."""
     found = []
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)

@@ -1,4 +1,4 @@
-"""The command `gridpeers reproduce`. What it needs is imported when it is used, so that help comes at once."""
+"""The command `gridpeers reproduce`. It imports heavy packages when it runs, so that help comes at once."""
 
 from __future__ import annotations
 

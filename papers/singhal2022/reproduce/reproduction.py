@@ -1,4 +1,4 @@
-"""What the report is made of: what each part came to, what it was run with, and on what."""
+"""The contents of the report: results of each part, settings of the runs, and the machine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from papers.singhal2022.tables import Cell, PaperTable
 
 @dataclass(frozen=True, kw_only=True)
 class PartResult:
-    """What one part came to."""
+    """Findings, verdicts and files of one part."""
 
     part: Part
     found: Findings
@@ -31,7 +31,7 @@ class PartResult:
     sha256: Mapping[str, str]
     """Hash of each case's history.csv, by case."""
     metrics: Any
-    """What its metrics.json says; None for the topologies."""
+    """Contents of its metrics.json; None for the topologies."""
     wall_s: float
     """How long it took (s)."""
     cpu_s: float
@@ -46,7 +46,7 @@ class PartResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduction:
-    """Everything that the report tells."""
+    """All contents of the report."""
 
     results: tuple[PartResult, ...]
     driver: str
@@ -170,7 +170,7 @@ def _ours(result: PartResult, cell: Cell) -> float | None:
 
 
 def _plain(value: Any) -> Any:
-    """Return the same with null for what is not a number."""
+    """Return the same with null in place of nan."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

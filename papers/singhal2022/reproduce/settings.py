@@ -1,4 +1,4 @@
-"""What the paper does not print and we had to choose: read from the scenarios as run, each with its reason."""
+"""Settings that the paper does not print and we had to choose, from the scenarios as run, each with its reason."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from gridpeers.theory import ScenarioModel
 
 
 def settings(scenarios: dict[str, ScenarioModel]) -> list[tuple[str, str, str]]:
-    """Return what, its value with the unit, and why, for the scenarios of a report.
+    """Return each setting, its value with the unit, and its reason, for the scenarios of a report.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ END_S = 6.0
 """End of the runs (s): after the event at 1 s a path of nine inverters shares within 2 s, the slowest tree in 3 s."""
 
 TellProgress = Callable[[int, int], None]
-"""Told how many runs are done, and of how many."""
+"""Is called with the number of runs that are done, and of all runs."""
 
 
 def graphs(inverters: int, seed: int) -> Iterator[Edges]:

@@ -171,7 +171,7 @@ _STUDIES = ("topology", "var-sharing")
 
 @contextmanager
 def _timed() -> Iterator[dict[str, float]]:
-    """Wall time and processor time (s) of what is done inside, by this process and those that ended meanwhile."""
+    """Measure wall time and processor time (s) of the block, of this process and those that ended meanwhile."""
     took: dict[str, float] = {}
     wall, cpu = perf_counter(), sum(os.times()[:4])
     yield took

@@ -34,7 +34,7 @@ class Plan:
     name: str
     """Name of the results' folder."""
     title: str
-    """One line on what is studied."""
+    """One line on the study."""
     text: str
     """The sweep file."""
     base: ScenarioModel
@@ -46,7 +46,7 @@ class Plan:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Columns of what is varied, in the order of the file."""
+        """Columns of the varied keys, in the order of the file."""
         return tuple(self.runs[0].shown)
 
 

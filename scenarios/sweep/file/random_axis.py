@@ -24,7 +24,7 @@ class Distribution:
     name: str
     """One of `DISTRIBUTIONS`."""
     of: Sequence[Any]
-    """Bounds, or what is chosen from."""
+    """Bounds, or the choices."""
 
     def at(self, u: float) -> Any:
         """Return the quantile at a number u from [0, 1).
@@ -42,7 +42,7 @@ class Distribution:
         return float(f"{raw:.12g}")
 
     def problem(self) -> str:
-        """Return what is wrong with the bounds or the choices; "" if nothing is."""
+        """Return the problem of the bounds or the choices; "" if there is none."""
         of = self.of
         if self.name == "choice":
             return "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"

@@ -1,4 +1,4 @@
-"""Every sample's scenario, checked before anything starts; a problem is told once, with the samples it is in."""
+"""Every sample's scenario, checked before anything starts; a problem is noted once, with its samples."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from scenarios.sweep.file.axes import Setting
 from scenarios.sweep.file.paths import PathError, Tree, put
 from scenarios.sweep.file.plan import Run
 
-MOST_TOLD = 20
-"""Most problems of samples that are told: the rest is more of the same."""
+MOST_LISTED = 20
+"""Most problems of samples in a message: the rest is more of the same."""
 
 
 class BaseScenario(NamedTuple):
@@ -98,12 +98,12 @@ def checked_runs(
             feeders[scenario.plant.feeder, scenario.plant.load_set] = feeder
             chosen = msgspec.structs.replace(scenario, cases={case: scenario.cases[case] for case in cases})
             runs += [Run(i, case, chosen, setting.shown) for case in cases]
-    for (path, text), numbers in list(wrong.items())[:MOST_TOLD]:
+    for (path, text), numbers in list(wrong.items())[:MOST_LISTED]:
         at = _origin(path, origin)
         inside = f"{path}: " if path and not at.endswith(path) else ""
         problems.add(at, inside + text + _in_samples(numbers, settings))
-    if len(wrong) > MOST_TOLD:
-        problems.add("", f"and {len(wrong) - MOST_TOLD} more problems of this kind in other samples")
+    if len(wrong) > MOST_LISTED:
+        problems.add("", f"and {len(wrong) - MOST_LISTED} more problems of this kind in other samples")
     return runs, tuple(feeders.values())
 
 

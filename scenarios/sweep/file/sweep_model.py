@@ -1,4 +1,4 @@
-"""A sweep file as types: what may be written, and what holds when nothing is written."""
+"""A sweep file as types: its keys, their ranges and their defaults."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ValueRange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Whether their differences or their ratios are equal."""
 
     def relations(self) -> list[Problem]:
-        """Return what its values ask of each other."""
+        """Return the problems of its values beside each other."""
         if self.low == self.high:
             return [Problem("", f"a range goes from one number to another, got {self.low:g} twice")]
         if self.spacing == "log" and min(self.low, self.high) <= 0:
@@ -72,9 +72,9 @@ class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     name: str = ""
     """Name of the results' folder; without it, that of the file."""
     title: str = ""
-    """One line on what is studied."""
+    """One line on the study."""
     scenario: str
-    """What is varied: a scenario of the catalogue, or the path of a file, seen from this one."""
+    """The scenario that is varied: of the catalogue, or the path of a file, seen from this one."""
     cases: Annotated[tuple[str, ...], Example('["IV"]')] = ()
     """Cases that are run for every sample; all when left out."""
     seeds: Annotated[int, Range(1, 10_000)] = 1

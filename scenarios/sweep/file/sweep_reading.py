@@ -69,7 +69,7 @@ def plan_of(sweep: Sweep, base: BaseScenario) -> Plan:
 
 
 def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
-    """Return the axes that need no scenario, the slowest first, and note what is wrong with the file by itself."""
+    """Return the axes that need no scenario, the slowest first, and note the file's own problems."""
     for problem in problems_of(sweep):
         problems.add(*problem)
     axes = [*grid_axes(sweep.grid, problems), *zip_axes(sweep.zip, problems), *random_axes(sweep.random, problems)]
