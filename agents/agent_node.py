@@ -1,8 +1,8 @@
-"""An agent as a node: what it does alike under both kinds of time. Pure.
+"""An agent as a node: the common part of both kinds of time. Pure.
 
-It meets the other agents by their tokens and nameplates, listens to those whom the run's graph makes its in-neighbours,
-passes what it hears through the emulated links, if there are any, and tells the plant what these did. When it ticks,
-`agents.lockstep_agent` and `agents.realtime.realtime_agent` decide.
+The node meets the other agents by their tokens and nameplates, and listens to its in-neighbours by the run's graph. It
+passes their states through the emulated links, if there are any, and reports these to the plant.
+`agents.lockstep_agent` and `agents.realtime.realtime_agent` decide when it ticks.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from wire.plant_follower import PlantFollower
 
 
 class AgentNode(PlantFollower):
-    """One agent in a run.
+    """One agent as a participant of a run.
 
     Parameters
     ----------
     config : AgentConfig
-        Who it is and the run's rule.
+        The agent's nameplate and the run's rule.
     instance : str
-        Which process this is, unique in the run; part of the agent's token.
+        Id of this process, unique in the run; part of the agent's token.
     links : Links or None
-        What the links to it do to its messages.
+        Emulated links to the agent; None for none.
     law : Law or None
-        What decides its set-points; None is the paper's.
+        Law that decides the set-points; None is the paper's.
     rate : float, optional
         Most messages of one sender per s of run time; see `wire.admission`.
     """
@@ -45,15 +45,15 @@ class AgentNode(PlantFollower):
         super().__init__(config.name, config.run, rate)
         check_nameplate(config)
         self.stopped = ""
-        """Why it closes; empty as long as it goes on."""
+        """Why the agent closes; empty while it runs."""
         self.failed = ""
-        """Why this agent could not go on, or take part at all; empty unless so."""
+        """Why the agent could not continue, or take part at all; empty otherwise."""
         self.plant_seen = False
-        """Whether the plant's token was ever there."""
+        """Whether the agent has ever seen the plant's token."""
         self._config, self._instance, self._links = config, instance, links
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
-        """The last measurement and the last states that it heard."""
+        """The last measurement and the neighbours' last states."""
         self.routes[self.keys.stop_request(config.name, instance)] = Route(PLANT, (Stop,), self._on_stop_request)
         self.routes[self.keys.measurement(config.name)] = Route(PLANT, (Measurement,), self._on_own_measurement)
 
@@ -80,7 +80,7 @@ class AgentNode(PlantFollower):
         return bool(self.stopped or self.failed)
 
     def work(self, now: float) -> bool:
-        """Nothing: an agent computes when a message makes it possible, or its tick is due."""
+        """Do nothing: an agent computes when a message permits it, or its tick is due."""
         return False
 
     # ---------------------------------------------------------------- the others
@@ -116,7 +116,7 @@ class AgentNode(PlantFollower):
         raise NotImplementedError
 
     def _listen_to(self, name: str) -> None:
-        """Subscribe to the states of an agent, unless that is done."""
+        """Subscribe to the states of an agent, once."""
         key = self.keys.state(name)
         if key not in self.routes:
             self.routes[key] = Route(name, (State,), self._on_state)
@@ -139,12 +139,12 @@ class AgentNode(PlantFollower):
         raise NotImplementedError
 
     def _hear(self, message: State | Measurement, payload: bytes, at: float) -> None:
-        """Use what came off the wire at this time (s of run time), unless an emulated link takes it, or keeps it."""
+        """Use a message off the wire at this time (s of run time), unless an emulated link takes it."""
         if is_usable(self._links, message, payload, at, self.admission):
             self._keep(message, at)
 
     def _hear_late(self, at: float) -> None:
-        """Use what the emulated links have let through by now (s of run time)."""
+        """Use the messages that the emulated links have delivered by now (s of run time)."""
         for message in arrived(self._links, at, self.rejects, self.admission):
             if isinstance(message, State | Measurement):
                 self._keep(message, at)
@@ -157,6 +157,6 @@ class AgentNode(PlantFollower):
     # ---------------------------------------------------------------- reports
 
     def _report_links(self, *, final: bool = False) -> None:
-        """Send what the emulated links did since the last report."""
+        """Send the account of the emulated links since the last report."""
         key, epoch = self.keys.report(self._name), self._config.epoch
         self._publish_link_reports(key, self._links, epoch, instance=self._instance, last=final)

@@ -1,21 +1,22 @@
-"""An agent under simulated time: it ticks when all that a tick needs is here. Pure; `now` serves deadlines only.
+"""An agent under simulated time: it ticks when all messages of a tick are here. Pure; `now` serves deadlines only.
 
-**Getting ready.** Nothing tells an agent who exists: for every token of another agent it asks for the nameplate. Whom
-the graph makes its in-neighbour it subscribes to, and then asks for the nameplate once more: subscription and query
+**Getting ready.** No agent has a list of the others: for every token of another agent it asks for the nameplate. It
+subscribes to each in-neighbour by the graph, and then asks for the nameplate once more: subscription and query
 take the same way in the same order, so the answer proves that the neighbour's publications will come. For graphs that
-look at pairs this happens at once; for a ring, when `Prepare` has named the roster. `Ready` goes to the plant when all
-of the roster are met and all in-neighbours proven.
+look at pairs this happens at once; for a ring, when `Prepare` has named the roster. The agent sends `Ready` to the
+plant when it has met the whole roster and all in-neighbours are proven.
 
 **Ticks.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
-computes and sends State(k). A State(k) that overtakes the own Measurement(k) is kept until tick k is done, so what is
-used never depends on who was faster. Whoever is not on roster k is left out at once, so that it does not matter whether
-its last state or its end is heard first. At its first tick an agent has no roster k-1 and waits for nobody.
+computes and sends State(k). It keeps a State(k) that overtakes the own Measurement(k) until tick k is done, so the used
+values never depend on the order of arrival. It leaves out an agent that is not on roster k at once, so it does not
+matter whether it hears that agent's last state or its end first. At its first tick an agent has no roster k-1 and waits
+for no state.
 
-**No deadlock.** State(k) waits for Measurement(k) and States(k-1) only, Measurement(k) for States(k-1) only: every wait
-is for something earlier, so the earliest thing not yet sent always can be, if its sender lives. The token of a dead
+**No deadlock.** State(k) waits only for Measurement(k) and States(k-1), Measurement(k) only for States(k-1): every wait
+is for an earlier message, so the earliest unsent message can always be sent, if its sender lives. The token of a dead
 process vanishes, which ends the wait for it: its last value counts once more, and the next roster leaves it out. A
-process that neither sends nor dies meets the deadline. The agent's is twice the plant's, so that the plant, who sees
-all, names the culprit. Receivers only enqueue, without bound, so nobody blocks a sender.
+process that neither sends nor dies meets the deadline. The agent's deadline is twice the plant's, so that the plant,
+which sees all agents, names the culprit. Receivers only enqueue, without bound, so no receiver blocks a sender.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ from wire.node import Route
 from wire.tick_barrier import Awaited, TickBarrier
 
 CLOSING = 2.0
-"""Longest wait (s) for the neighbours' last states, and for word that the report on emulated links has come."""
+"""Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""
 
 DEADLINES = 2.0
-"""An agent waits this many deadlines, so that the plant complains first."""
+"""An agent waits this many deadlines, so that the plant reports the error first."""
 
 
 class LockstepAgent(AgentNode):
@@ -47,13 +48,13 @@ class LockstepAgent(AgentNode):
     Parameters
     ----------
     config : AgentConfig
-        Who it is and the run's rule.
+        The agent's nameplate and the run's rule.
     instance : str
-        Which process this is, unique in the run; part of the agent's token.
+        Id of this process, unique in the run; part of the agent's token.
     links : Links, optional
-        What the links to it do to its messages.
+        Emulated links to the agent; by default none.
     law : Law, optional
-        What decides its set-points; the paper's if left out.
+        Law that decides the set-points; by default the paper's.
     """
 
     def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
@@ -64,27 +65,27 @@ class LockstepAgent(AgentNode):
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None
-        """The last roster that this process is on."""
+        """The last roster with this process."""
         self._processes: dict[str, str] = {}
         """The process of each name on it."""
         self._ready = False
-        """Whether all is known that this roster needs. It stays so if somebody dies: the next roster tells."""
+        """Whether the agent is ready for this roster. It stays so if an agent dies: the next roster changes it."""
         self._proofs: dict[tuple[str, str], bool] = {}
-        """Processes that were asked for proof that they hear the subscription to them; True once they have answered."""
+        """Processes asked for proof that they know of the subscription to them; True once they have answered."""
         self._tick: int | None = None
-        """Number of the next tick; None until the first measurement has come."""
+        """Number of the next tick; None before the first measurement."""
         self._grant: Measurement | None = None
         """The measurement that grants it."""
         self._early: dict[str, tuple[State, bytes]] = {}
-        """States of this tick that came before it was done, and their bytes."""
+        """States of this tick that arrived before it was done, and their bytes."""
         self._neighbours: tuple[str, ...] = ()
         """In-neighbours on the roster of the last tick."""
         self._neighbours_of: tuple[str, ...] = ()
         """Roster of the last tick."""
         self._ending = ""
-        """Why it is about to close."""
+        """Why the agent is about to close; empty otherwise."""
         self._reported = False
-        """Whether the last report on emulated links is out."""
+        """Whether the last report on emulated links is sent."""
 
     # ---------------------------------------------------------------- what the driver needs
 
@@ -95,21 +96,21 @@ class LockstepAgent(AgentNode):
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages without which the next tick cannot be computed."""
+        """Number of messages that the next tick needs."""
         return self._barrier.messages_needed
 
     @property
     def deadline(self) -> float | None:
-        """When the deadline of the present wait passes (s on the driver's clock); None if it has none."""
+        """End of the present wait (s on the driver's clock); None if it has none."""
         return self._barrier.deadline
 
     def start(self, now: float) -> None:
-        """Begin to wait for the plant, which is built first."""
+        """Start to wait for the plant, which is built first."""
         self._barrier.renew(now)
         self._barrier.deadline = max(self._barrier.deadline or 0.0, now + self._config.plant_wait)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Who is awaited, and for what."""
+        """Return the missing messages with their senders."""
         if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
         if self._roster is None:
@@ -132,7 +133,7 @@ class LockstepAgent(AgentNode):
     # ---------------------------------------------------------------- liveliness
 
     def _plant_came(self, now: float) -> None:
-        # The plant may compile, or wait for agents yet to be started. Its token ends this wait if it dies.
+        # The plant may compile, or wait for agents yet to start. If it dies, its token vanishes and ends this wait.
         self._barrier.rest()
 
     def _plant_gone(self, now: float) -> None:
@@ -140,7 +141,7 @@ class LockstepAgent(AgentNode):
             self.stopped = self._ending
         elif not self.finished:
             tick = "" if self._tick is None else f" at tick {self._tick}"
-            self.failed = f"{self._name}: the plant is gone{tick}; nobody is left to compute for"
+            self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
     def _agent_gone(self, name: str, instance: str, now: float) -> None:
         self._proofs.pop((name, instance), None)
@@ -148,7 +149,7 @@ class LockstepAgent(AgentNode):
             self._barrier.came(name)
             self._compute(now)
 
-    # ---------------------------------------------------------------- the plant's word
+    # ---------------------------------------------------------------- messages of the plant
 
     def _used(self, message: AnyMessage, now: float) -> None:
         self._barrier.heard(message.sender, message.seq, now)
@@ -168,7 +169,7 @@ class LockstepAgent(AgentNode):
             self._end(message.reason, now)
 
     def _end(self, reason: str, now: float) -> None:
-        """Close; with emulated links only once the neighbours' last states are booked and the plant has the book."""
+        """Close; with emulated links only once their account has the neighbours' last states, and the plant has it."""
         if self._links is None or self._ending:
             self.stopped = self._ending or reason
             return
@@ -206,14 +207,14 @@ class LockstepAgent(AgentNode):
                 self._agent.meet(self.members.nameplates[name])
 
     def _ask_for_proof(self, name: str) -> None:
-        """Listen to an agent, and have it prove that it hears the subscription."""
+        """Listen to an agent, and ask it for proof that it knows of the subscription."""
         instance = self.members.instance(name)
         self._proofs[name, instance] = False
         self._listen_to(name)
         self._ask(name, instance)
 
     def _unmet(self) -> list[str]:
-        """Members of the roster whose nameplate is missing."""
+        """Return the members of the roster whose nameplate is missing."""
         met = self.members.nameplates
         return [
             name
@@ -222,12 +223,12 @@ class LockstepAgent(AgentNode):
         ]
 
     def _unproven(self) -> list[str]:
-        """In-neighbours on the roster that have not proven that they hear the subscription to them."""
+        """Return the in-neighbours on the roster without proof that they know of the subscription to them."""
         neighbours = self._agent.in_neighbours(self._processes)
         return [name for name in neighbours if not self._proofs.get((name, self._processes[name]))]
 
     def _get_ready(self, now: float) -> None:
-        """Ask for proof of whom this roster makes in-neighbours; say so once nothing is missing any more."""
+        """Ask the in-neighbours of this roster for proof; send `Ready` once nothing is missing."""
         if self._roster is None or self._ready or self._unmet():
             return
         unproven = self._unproven()
@@ -269,7 +270,7 @@ class LockstepAgent(AgentNode):
         if self._tick is None or seq == self._tick:
             self._early[name] = message, payload
             return
-        if seq > self._tick:  # the others go on without this agent: word that it is off the roster is on its way
+        if seq > self._tick:  # the others continue without this agent: a roster without it is on its way
             return
         if seq != self._tick - 1:
             raise RejectedError("stale", f"State({seq}) of {name} before tick {self._tick}")
@@ -282,7 +283,7 @@ class LockstepAgent(AgentNode):
             self._hear(state, payload, state.t)
 
     def _compute(self, now: float) -> None:
-        """Compute and send the next tick, if all that it needs is here."""
+        """Compute and send the next tick, if no message is missing."""
         if self._ending:
             if not any(self._barrier.awaits(name) for name in self._neighbours):
                 self._report_the_last()
@@ -303,7 +304,7 @@ class LockstepAgent(AgentNode):
         self._await_next(grant, now)
 
     def _await_next(self, grant: Measurement, now: float) -> None:
-        """Go on to the tick after this one: it needs the states of this one, some of which may be here already."""
+        """Start the wait for the next tick: it needs the states of this one, and some may be here already."""
         if grant.roster != self._neighbours_of:
             self._neighbours_of = grant.roster
             self._neighbours = self._agent.in_neighbours(grant.roster)

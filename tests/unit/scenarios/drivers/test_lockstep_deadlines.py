@@ -83,4 +83,4 @@ def test_a_plant_that_still_compiles_is_waited_for() -> None:
 
     assert agent.deadline is None
     agent.vanished(agent.keys.alive_plant(1), 2.0)
-    assert agent.failed == "inv1: the plant is gone; nobody is left to compute for"
+    assert agent.failed == "inv1: the plant is gone; the run has ended"
