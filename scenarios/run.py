@@ -38,10 +38,10 @@ from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
 
 Driver = Literal["processes", "inprocess"]
-"""How a case is run: as one process per agent over Zenoh, or all in this process."""
+"""Driver of a case: one process per agent over Zenoh, or all in this process."""
 
 Progress = Callable[[str, float, float], None]
-"""Told the case, the time it has reached (s) and its end (s)."""
+"""Takes the case, the time it has reached (s) and its end (s)."""
 
 _SHOWN = 3
 """Laws that failed which a report names."""
@@ -59,7 +59,7 @@ class BrokenRunError(RuntimeError):
 
 @dataclass(frozen=True, kw_only=True)
 class Request(RunMetrics):
-    """What is to be run; its folder is empty. Wall-clock time needs the driver "processes"."""
+    """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""
 
     driver: Driver
     strict: bool = False
@@ -132,7 +132,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             flush=True,
         )
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
-    found = find(scenario, request.feeder, cases)
+    findings = find(scenario, request.feeder, cases)
     compared = _compared(request, recorded)
     disturbed = any(one.disturbed for one in compared.values())
     facts = {}
@@ -144,7 +144,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             notes += [f"case {case}: {one.note}"] if one.note else []
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
-    write_whole(folder / "metrics.json", metrics_json(request, found, facts))
+    write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     if request.lasting:
         from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
@@ -155,8 +155,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     report = RunReport(
         scenario=scenario.name,
         titles={case: rule.title for case, rule in scenario.cases.items()},
-        found=found,
-        verdicts=(*judge(found, benchmark.claims), *(() if disturbed else judged(found, claims_of(scenario)))),
+        findings=findings,
+        verdicts=(*judge(findings, benchmark.claims), *(() if disturbed else judged(findings, claims_of(scenario)))),
         benchmark=benchmark,
         notes=[*notes, *_notes(recorded, request.clock)],
         folder=place + "/" if request.lasting else "",
@@ -167,7 +167,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
 
 
 def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:
-    """What the laws of a case did beside their set-points: failed, or told their neighbours less."""
+    """Yield notes on the laws of a case: those that failed, and states that were not sent."""
     failed = [event for event in record.events if event.kind == "law"]
     yield from (f"{event.text} (from t = {event.t:g} s on)" for event in failed[:_SHOWN])
     if len(failed) > _SHOWN:
@@ -235,7 +235,7 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
-    """What makes a case differ from what its scenario says."""
+    """Return notes on cases that cannot be repeated."""
     if clock == "wall":
         return ["in wall-clock time no two runs are the same: each has its own delays"]
     notes = []

@@ -1,4 +1,4 @@
-"""What is to be run, and how: cases, driver, clock; checked without what a run needs, as commands do it first."""
+"""Options of a run: cases, driver, clock. Their check imports nothing that a run needs: commands make it first."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option
 
 
 class Pace(TypedDict, total=False):
-    """How a run keeps time: fields of a `Request`, options of the command, arguments of `gridpeers.Scenario.run`."""
+    """Time keeping of a run: fields of a `Request`, options of the command, arguments of `gridpeers.Scenario.run`."""
 
     clock: Clock
     speed: float
@@ -53,7 +53,7 @@ class Pace(TypedDict, total=False):
 
 
 def check_how(driver: str, pace: Pace, *, dash: str = "") -> None:
-    """Check how a scenario is to be run; `dash` stands before the words' names: "--" on a command line.
+    """Check the options of a run; `dash` stands before their names: "--" on a command line.
 
     Raises
     ------

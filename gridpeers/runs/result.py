@@ -163,11 +163,11 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         """Claims of the scenario's benchmark, and its own, judged; none in a run that was disturbed."""
         if any(result.disturbed for result in self.values()):
             return ()
-        found = self.findings
-        return (*judge(found, benchmark_of(self._spec.paper).claims), *judged(found, claims_of(self._spec)))
+        claims = benchmark_of(self._spec.paper).claims
+        return (*judge(self.findings, claims), *judged(self.findings, claims_of(self._spec)))
 
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
-        """Return what the figures of some cases share (`scenarios.results.plots`)."""
+        """Return the data of the figures of some cases (`scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
         *_, last = cases.values()  # in wall-clock time each case has its own events
         events = _plant_events(last)
@@ -219,7 +219,7 @@ class Result(_FromFolder):
 
     @cached_property
     def events(self) -> pd.DataFrame:
-        """What happened in the plant and to the agents: time t (s), kind, subject, text."""
+        """Events of the plant and the agents: time t (s), kind, subject, text."""
         return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
 
     @cached_property
@@ -263,7 +263,7 @@ class Result(_FromFolder):
         return drawn(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
-        """Return what the figures of the case share (`scenarios.results.plots`)."""
+        """Return the data of the figures of the case (`scenarios.results.plots`)."""
         return self._run.drawing({self.case: self})
 
     def save(self, folder: str | Path) -> Path:

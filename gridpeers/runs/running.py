@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class How(Pace, total=False):
-    """How a run goes, beside its driver; `gridpeers.Scenario.run` says what the words mean."""
+    """Options of a run beside its driver; `gridpeers.Scenario.run` explains them."""
 
     self_check: bool
     progress: Progress | None

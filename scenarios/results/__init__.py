@@ -1,1 +1,1 @@
-"""What becomes of a run: its folder, its measures and claims, its plots and its report."""
+"""Results of a run: its folder, its record, its measures and claims, its figures and its report."""

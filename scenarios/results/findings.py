@@ -39,11 +39,11 @@ class Findings:
     GFL: tuple[str, ...] = ()
     """Names of the grid-following inverters."""
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
-    """How each event settled, by case and event."""
+    """Settling after each event, by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
     """Steady values of each island, by case, event and the island's first inverter; only where there are several."""
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """What inverters have available at the end, by case and name (pu of rating); only where that was changed."""
+    """Available power at the end, by case and inverter (pu of rating); only where it was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Inverters that have no agent, by case; only where there are any. The sharing indices leave them out."""
     messages_saved: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Findings:
     """The scenario's own metrics, by case and event."""
 
     def apart(self, case: str, event: str) -> bool:
-        """Whether an event left several islands: each shares for itself, and what the whole shares means nothing."""
+        """Return whether an event left several islands: each shares for itself, and sharing over all means nothing."""
         return bool(self.islands.get(case, {}).get(event))
 
     def value(self, cell: Published) -> float:
@@ -60,7 +60,7 @@ class Findings:
         return float(getattr(self._steady(cell), cell.quantity))
 
     def reason(self, cell: Published) -> str:
-        """Return why our number there is no steady value; "" where it is one."""
+        """Return the reason if our number there is no steady value; "" where it is one."""
         return self._steady(cell).reasons.get(cell.quantity, "")
 
     def _steady(self, cell: Published) -> Steady:
@@ -73,19 +73,19 @@ class Findings:
         return cell.within(float("nan") if self.reason(cell) else self.value(cell))
 
     def unsteady(self, cases: Sequence[str], events: Sequence[str], measures: Sequence[str]) -> list[str]:
-        """Reasons why some of these measures are no steady values, with their places; islands each for itself."""
-        found = []
+        """Return the reasons of those measures that are not steady, with their places; islands each for itself."""
+        reasons = []
         for case in cases:
             for event in events:
                 apart = self.islands.get(case, {}).get(event, {})
                 parts = {f", island of {name}": steady for name, steady in apart.items()}
                 for where, steady in (parts or {"": self.results[case][event]}).items():
-                    found += [
+                    reasons += [
                         f"case {case}, {event}{where}: {label(name, self.f_nom)} {steady.reasons[name]}"
                         for name in measures
                         if name in steady.reasons
                     ]
-        return found
+        return reasons
 
     def has(self, cell: Published) -> bool:
         """Return whether there is such a number."""

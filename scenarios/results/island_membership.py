@@ -1,4 +1,4 @@
-"""Who stands in which island after each event of a scenario, and the part of a history that is one island's."""
+"""The inverters of each island after each event of a scenario, and the part of a history that is one island's."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ def islands_of(scenario: ScenarioModel, feeder: Feeder) -> dict[str, IslandMembe
     network = Network(feeder)
     closed = network.closed0
     rows = inverters_of(scenario, feeder)
-    found = {}
+    islands = {}
     for event in scenario.events:
         closed = closed - {network.switch_name(name) for name in event.open}
         closed = closed | {network.switch_name(name) for name in event.close}
         members = [tuple(row.name for row in rows if row.bus in buses) for buses in network.islands(closed)]
         known = {names[0]: names for names in members if names}
-        found[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
-    return found
+        islands[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
+    return islands
 
 
 def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) -> tuple[History, Nameplates]:
@@ -80,28 +80,27 @@ def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> His
 
 
 def island_intervals(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandInterval, ...]:
-    """Return when there are several islands, and which."""
+    """Return the times with several islands, and these islands."""
     starts = [event.t_s for event in scenario.events]
-    found = islands_of(scenario, feeder).values()
-    times = zip(starts, [*starts, inf][1:], found, strict=True)
+    times = zip(starts, [*starts, inf][1:], islands_of(scenario, feeder).values(), strict=True)
     return tuple(IslandInterval(start, end, islands) for start, end, islands in times if len(islands) > 1)
 
 
 def worst(quantity: RowMeasure, nominal: float, island_intervals: Sequence[IslandInterval]) -> RowMeasure:
     """Return the measure of the island in which it is farthest from its nominal value, while there are several.
 
-    A mean over islands hides what is wrong in them: one is too fast, another too slow.
+    A mean over islands hides their errors: one is too fast, another too slow.
     """
 
     def measure(history: History, nameplates: Nameplates) -> Floats:
-        found = quantity(history, nameplates)
+        values = quantity(history, nameplates)
         for interval in island_intervals:
             rows = (history.t > interval.start) & (history.t <= interval.end)
             each = np.stack(
                 [quantity(*part_of(history, nameplates, names))[rows] for names in interval.islands.values()]
             )
             far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
-            found[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
-        return found
+            values[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
+        return values
 
     return measure

@@ -34,7 +34,7 @@ slowest swing that was met, of late links around a leader, has a period of 1.9 s
 
 @dataclass(frozen=True, kw_only=True)
 class Steady:
-    """What one event left behind."""
+    """Steady values after one event."""
 
     f_error_Hz: float
     """abs(f - f_nom) (Hz), mean over the GFM."""
@@ -52,12 +52,12 @@ class Steady:
     """Time (s) from the event until the inverters' total real power is within 2 % of its steady value for good: until
     those that remain carry the load of one that left. None if never, and where nothing is fed."""
     reasons: Mapping[str, str] = field(default_factory=dict)
-    """Why a measure is no steady value, by its name; what is not named is one (`scenarios.results.steadiness`)."""
+    """Reason of each measure that is no steady value, by its name (`scenarios.results.steadiness`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settling:
-    """How one event of one case settled: frequency and sharing apart, and whether anything still swings.
+    """Settling after one event of one case: times of frequency and of sharing apart, and remaining swings.
 
     `Steady.t_restore_s` is both bands together; theory predicts the two apart, and bad links may slow one of them and
     not the other.
@@ -87,7 +87,7 @@ def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats
     m : Floats
         Droops (pu per pu), shape (N,).
     present : Flags, optional
-        Who takes part in each row, shape (T, N); everybody if left out.
+        Which inverters take part in each row, shape (T, N); all if left out.
 
     Examples
     --------
@@ -105,7 +105,8 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
     .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
 
-    N counts who is present in the row, as the sums do. It is not a number where nothing is shared (eta = 0).
+    N counts the inverters that are present in the row, as the sums do. It is not a number where nothing is shared
+    (eta = 0).
 
     Examples
     --------
@@ -121,7 +122,7 @@ def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None)
 
 
 def mean_over(x: Floats, present: Flags) -> Floats:
-    """Return the mean of each row over those that are present in it; not a number where nobody is.
+    """Return the mean of each row over the inverters that are present in it; nan where there are none.
 
     Examples
     --------
@@ -257,7 +258,7 @@ def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
 
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
-    """Measure how one event of one case settled; the parameters are those of `measure`."""
+    """Measure the settling after one event of one case; the parameters are those of `measure`."""
     inside = window.rows(history.t)
     end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
     forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]

@@ -25,14 +25,14 @@ Clock = Literal["simulated", "wall"]
 
 @dataclass(frozen=True, kw_only=True)
 class RunMetrics:
-    """What was run, and how."""
+    """The run of which metrics.json has the measures."""
 
     scenario: ScenarioModel
     """Checked; with the seed and the cases asked for."""
     feeder: Feeder
     """Its feeder."""
     driver: str
-    """What moved bytes and time: "processes", "inprocess", or "live"."""
+    """Driver of the run: "processes", "inprocess", or "live"."""
     folder: Path
     """Its run folder."""
     clock: Clock = "simulated"
@@ -48,8 +48,8 @@ def case_facts(recorded: Recorded, pacing: Pacing | None = None, **more: Any) ->
 
 
 def metrics_json(
-    ran: RunMetrics,
-    found: Findings,
+    run: RunMetrics,
+    findings: Findings,
     facts: Mapping[str, Mapping[str, Any]],
     live: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
@@ -57,9 +57,9 @@ def metrics_json(
 
     Parameters
     ----------
-    ran : RunMetrics
+    run : RunMetrics
         The run.
-    found : Findings
+    findings : Findings
         Its measures.
     facts : Mapping[str, Mapping[str, Any]]
         By case: other entries; see `case_facts`.
@@ -67,27 +67,27 @@ def metrics_json(
         The table on a live run; see docs/results.md.
     """
     cases: dict[str, dict[str, Any]] = {}
-    for case, steady in found.results.items():
+    for case, steady in findings.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}
-        for label, share in found.messages_saved.get(case, {}).items():
+        for label, share in findings.messages_saved.get(case, {}).items():
             cases[case][label]["messages_saved"] = share
-        for label, islands in found.islands.get(case, {}).items():
+        for label, islands in findings.islands.get(case, {}).items():
             whole = cases[case][label]
             whole |= dict.fromkeys(SHARED)
             for name in ("MPSI", "MQSI"):
                 whole.get("reasons", {}).pop(name, None)
             whole["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
-        for label, measured in found.own.get(case, {}).items():
+        for label, measured in findings.own.get(case, {}).items():
             cases[case][label] |= measured.values
             if measured.reasons:
                 cases[case][label].setdefault("reasons", {}).update(measured.reasons)
-        if case in found.without_agent:
-            cases[case]["without_agent"] = list(found.without_agent[case])
+        if case in findings.without_agent:
+            cases[case]["without_agent"] = list(findings.without_agent[case])
         cases[case] |= facts[case]
-    scenario = ran.scenario
-    clock = {"clock": ran.clock, "speed": ran.speed} if ran.clock == "wall" else {}
+    scenario = run.scenario
+    clock = {"clock": run.clock, "speed": run.speed} if run.clock == "wall" else {}
     table = {"live": dict(live)} if live else {}
-    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": ran.driver, **clock, **table, "cases": cases}
+    text = {"scenario": scenario.name, "seed": scenario.seed, "driver": run.driver, **clock, **table, "cases": cases}
     return json.dumps(text, indent=2, allow_nan=False) + "\n"
 
 

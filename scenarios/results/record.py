@@ -1,7 +1,7 @@
 """Record one case of a run, by any driver: history.csv, events.csv and the files of its links, or all in memory.
 
 Nothing is ever half-written under its own name: rows go to `history.partial.csv` while the case runs, and the file
-gets its name when the last row is there. What a broken case leaves keeps the partial name. A recorder with a
+gets its name when the last row is there. The rows of a broken case keep the partial name. A recorder with a
 folder keeps no rows in memory: a run that lasts for hours takes no more than a short one.
 """
 
@@ -46,9 +46,9 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     missing: tuple[tuple[float, float], ...] = ()
     """Times (s) of the last row before and of the first row after each interval of which no rows came."""
     events: tuple[PlantEvent, ...]
-    """What happened, in the order of time."""
+    """Events, in the order of time."""
     quiet: tuple[tuple[float, int], ...] = ()
-    """Run time (s), and how many states of that tick the neighbours were not told of."""
+    """Run time (s), and number of states of that tick that were not sent to the neighbours."""
     links: LinkRecord = msgspec.field(default_factory=LinkRecord)
     """Verdicts and counts of the emulated links."""
     link_lines: tuple[str, ...] = ()
@@ -60,7 +60,7 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RecordError(RuntimeError):
-    """What was recorded is not the whole run."""
+    """The record is not the whole run."""
 
 
 def header(inverters: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The end of a run for people: tables ours beside the paper's, a verdict per claim, where the results lie."""
+"""The report at the end of a run: tables with our numbers beside the paper's, a verdict per claim, the folder."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "d
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """Everything that the end of a run tells."""
+    """The content of the report at the end of a run."""
 
     scenario: str
     """Name."""
     titles: Mapping[str, str]
     """A few words on each case that was run."""
-    found: Findings
-    """What was measured."""
+    findings: Findings
+    """The measures."""
     verdicts: Sequence[Verdict]
     """Claims judged; empty for a scenario without a benchmark."""
     benchmark: Benchmark = NO_BENCHMARK
-    """What is published of the experiment; its numbers stand beside ours."""
+    """The publication of the experiment; its numbers stand beside ours."""
     notes: Sequence[str]
-    """What a reader must know besides, e.g. that an agent died."""
+    """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
-    """Where the results lie; "" for a folder that goes with them."""
+    """Folder of the results; "" for one that goes with them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class Grid:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     legend: str = ""
-    """What stands below it; may be empty."""
+    """Lines below it; may be empty."""
 
 
 _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
@@ -63,11 +63,11 @@ _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
 
 
 def grids(report: RunReport) -> tuple[Grid, ...]:
-    """Tables for our results, laid out as the paper's Tables I and II, with its numbers beside where there are any."""
-    if not any(report.found.results.values()):
+    """Return the tables of our results, laid out as the paper's Tables I and II, with its numbers beside ours."""
+    if not any(report.findings.results.values()):
         return ()  # without events there is no window to measure in
-    found = [_grid(report, title, quantities) for title, quantities in _GRIDS]
-    return (*found, _own_grid(report)) if report.found.own else tuple(found)
+    tables = [_grid(report, title, quantities) for title, quantities in _GRIDS]
+    return (*tables, _own_grid(report)) if report.findings.own else tuple(tables)
 
 
 def plain(report: RunReport) -> str:
@@ -96,7 +96,7 @@ def _print(report: RunReport, console: Console) -> None:
             lines.append(Text.assemble(status, f"  {verdict.claim.text:{width}}  ", (verdict.found, "dim")))
             if verdict.status == "MISS":
                 lines.append(Text(f"{'':7}  {verdict.claim.known_miss}", style="dim"))
-        blocks.append([*lines, _count(report.verdicts), *report.benchmark.lines(report.found)])
+        blocks.append([*lines, _count(report.verdicts), *report.benchmark.lines(report.findings)])
     blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in _all_notes(report)]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
     for number, block in enumerate(blocks):
@@ -119,34 +119,34 @@ def _rendered(grid: Grid) -> Iterator[RenderableType]:
 
 
 def _all_notes(report: RunReport) -> list[str]:
-    """Return the notes of a report, after what its sharing indices leave out."""
+    """Return the notes of a report, after those on inverters that its sharing indices leave out."""
     agentless = [
         f"case {case}: {', '.join(names)} without an agent: MPSI, MQSI and the time to restore leave "
         f"{'it' if len(names) == 1 else 'them'} out; frequency and voltage do not"
-        for case, names in report.found.without_agent.items()
+        for case, names in report.findings.without_agent.items()
     ]
     return [*agentless, *report.notes]
 
 
 def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Grid:
-    results = report.found.results
+    results = report.findings.results
     events = list(dict.fromkeys(event for steady in results.values() for event in steady))
     timed = quantities[0] == "f_error_Hz"
     header = ["case"]
     for event in events:
-        header += [f"{event}\n{heading(quantity, report.found.f_nom)}" for quantity in quantities]
+        header += [f"{event}\n{heading(quantity, report.findings.f_nom)}" for quantity in quantities]
         header += [f"{event}\nrestored in"] if timed else []
     rows = []
     for case, steady in results.items():
         rows.append(_row(report, f"{case} {report.titles.get(case, '')}".strip(), case, steady, events, quantities))
-        islands = report.found.islands.get(case, {})
+        islands = report.findings.islands.get(case, {})
         for name in dict.fromkeys(name for parts in islands.values() for name in parts):
             parts = {event: islands[event][name] for event in islands if name in islands[event]}
             rows.append(_row(report, f"  island of {name}", case, parts, events, quantities, name))
-    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and report.found.has(one)]
+    beside = [one for one in report.benchmark.numbers if one.quantity in quantities and report.findings.has(one)]
     sources = dict.fromkeys(one.source for one in beside)
     against = f", ours | paper's {' and '.join(sources)}" if sources else ""
-    apart = any(report.found.apart(case, event) for case, steady in results.items() for event in steady)
+    apart = any(report.findings.apart(case, event) for case, steady in results.items() for event in steady)
     return Grid(
         title=f"{title} after each event{against}",
         header=tuple(header),
@@ -162,7 +162,7 @@ def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Gr
 
 def _own_grid(report: RunReport) -> Grid:
     """Return the scenario's own metrics; "-" where there is no value, with the reason below."""
-    own = report.found.own
+    own = report.findings.own
     places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
     rows, reasons = [], []
     for case, of in own.items():
@@ -190,7 +190,7 @@ def _row(
         if event not in steady:
             row += [""] * (len(quantities) + (quantities[0] == "f_error_Hz"))
             continue
-        values, mixed = steady[event], not island and report.found.apart(case, event)
+        values, mixed = steady[event], not island and report.findings.apart(case, event)
         row += [
             "-" if mixed and name in SHARED else _cell(report, case, event, name, values, island) for name in quantities
         ]
@@ -201,30 +201,30 @@ def _row(
 
 
 def _nothing_shared(values: Steady, name: str) -> bool:
-    """Whether a share means nothing, as there is next to nothing to share: then power is not shared equally ever."""
+    """Return whether a share means nothing, as there is next to nothing to share: it is never equal then."""
     return values.reasons.get(name, "").startswith("nothing shared")
 
 
 def _cell(report: RunReport, case: str, event: str, quantity: Quantity, values: Steady, island: str) -> str:
     """Write a number beside the paper's; one digit more than it prints, and "!" where it is not near enough.
 
-    What is not steady is no number: its reason's first words stand there, and all of it below the table.
+    A value that is not steady is no number: the first words of its reason stand there, and all of it below the table.
     """
     paper = report.benchmark.number(case, event, quantity, island)
     ours, reason = getattr(values, quantity), values.reasons.get(quantity, "")
     text = reason.partition(":")[0] or f"{ours:.{(paper.digits if paper else DIGITS[quantity]) + 1}f}"
     if paper is None:
         return text
-    off = report.found.within(paper) is False
+    off = report.findings.within(paper) is False
     return f"{text} | {paper.paper:.{paper.digits}f}{' !' if off else ''}"
 
 
 def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
-    """Return a line for every number that is not shown, with what the last 0.2 s came to."""
+    """Return a line for every number that is not shown, with the mean of the last 0.2 s."""
     lines = []
-    for case, steady in report.found.results.items():
+    for case, steady in report.findings.results.items():
         for event, whole in steady.items():
-            apart = report.found.islands.get(case, {}).get(event, {})
+            apart = report.findings.islands.get(case, {}).get(event, {})
             parts = {"": whole} | {f", island of {name}": values for name, values in apart.items()}
             for where, values in parts.items():
                 for name in quantities:
@@ -233,9 +233,8 @@ def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
                     mean = getattr(values, name)
                     dust = math.isnan(mean) or _nothing_shared(values, name)
                     last = "" if dust else f" (mean of the last {STEADY:g} s: {mean:.3f}{UNITS[name]})"
-                    lines.append(
-                        f"case {case}, {event}{where}: {label(name, report.found.f_nom)} {values.reasons[name]}{last}"
-                    )
+                    measure = label(name, report.findings.f_nom)
+                    lines.append(f"case {case}, {event}{where}: {measure} {values.reasons[name]}{last}")
     return lines
 
 

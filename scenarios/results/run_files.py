@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 RUNS = Path("runs")
-"""Where runs go when the user names no folder, seen from the working directory."""
+"""Parent of the run folders that the user does not name, seen from the working directory."""
 
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)

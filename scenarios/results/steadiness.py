@@ -1,4 +1,4 @@
-"""Whether the values at the end of a window are steady, and the reason where they are not.
+"""Steadiness of the values at the end of a window, and the reason where they are not steady.
 
 A measure counts as steady when its mean over the last 0.2 s of the window differs from its mean over the 0.2 s before
 by no more than one unit of the last digit that the paper prints: 0.01 Hz, 0.01 (MPSI, MQSI), 0.001 pu (V_error), and
@@ -21,7 +21,7 @@ STEADY = 0.2
 """Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
 
 SWINGS = 5.0
-"""How many times more a measure may swing within `STEADY` than its mean may move."""
+"""Factor by which a measure may swing more within `STEADY` than its mean may move."""
 
 FEWEST = 2
 """Rows that each of the two means needs at least."""
@@ -73,7 +73,7 @@ def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[s
     missing : str
         Why a row has no value, e.g. "de-energised: no inverter is on the network".
     names : tuple[str, ...], optional
-        Names of the columns, to tell which moves.
+        Names of the columns, to say which of them moves.
     """
     if not ends.steady.any():
         return f"no samples: no row was recorded between {ends.start:g} s and {ends.end:g} s"
@@ -85,7 +85,7 @@ def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[s
         return f"{missing} in a part of the last {STEADY:g} s"
     if min(ends.last.sum(), ends.before.sum()) < FEWEST:
         return f"not steady: {_rows(int(ends.inside.sum()), ends.end - ends.start)} too few to tell"
-    unit, found = UNITS[measure], []
+    unit, reasons = UNITS[measure], []
     for i, column in enumerate(columns.T):
         recent, earlier = column[ends.last], column[ends.before]
         recent, earlier = recent[np.isfinite(recent)], earlier[np.isfinite(earlier)]
@@ -97,10 +97,10 @@ def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[s
         change = float(recent.mean() - earlier.mean()) if earlier.size else 0.0
         if abs(change) * STEADY > allowed * ends.apart * (1.0 + 1e-9):
             per = f"{unit.strip() or '1'}/s"
-            found.append((abs(change) / allowed, f"not steady: {of}still moves {change / ends.apart:+.2g} {per}"))
+            reasons.append((abs(change) / allowed, f"not steady: {of}still moves {change / ends.apart:+.2g} {per}"))
         elif swing > SWINGS * allowed:
-            found.append((swing / allowed / SWINGS, f"not steady: {of}still swings by {swing:.2g}{unit}"))
-    return max(found, default=(0.0, ""))[1]
+            reasons.append((swing / allowed / SWINGS, f"not steady: {of}still swings by {swing:.2g}{unit}"))
+    return max(reasons, default=(0.0, ""))[1]
 
 
 def _rows(count: int, length: float) -> str:

@@ -42,18 +42,18 @@ def write_report(ran: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> 
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
     record = CaseRecord.of(departures.happened, feeder, case, recorded, departures.windows.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
-    found = find(departures.happened, feeder, {case: record})
+    findings = find(departures.happened, feeder, {case: record})
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
-        found=found,
+        findings=findings,
         verdicts=(),
         benchmark=NO_BENCHMARK if departures.disturbed else benchmark_of(scenario.paper),
         notes=[f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
         folder=shown(ran.folder) + "/",
     )
     facts = {case: case_facts(recorded, pacing)}
-    write_whole(ran.folder / "metrics.json", metrics_json(ran, found, facts, _live_table(recorded, departures)))
+    write_whole(ran.folder / "metrics.json", metrics_json(ran, findings, facts, _live_table(recorded, departures)))
     write_whole(ran.folder / "report.txt", plain(report))
 
     from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else

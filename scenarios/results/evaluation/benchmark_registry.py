@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """One number.
+    """One published number.
 
     Examples
     --------
@@ -34,7 +34,7 @@ class Published:
     """
 
     source: str
-    """Where it is printed, e.g. "Table I"."""
+    """Place in the publication, e.g. "Table I"."""
     case: str
     """Case of our scenario."""
     event: str
@@ -43,7 +43,7 @@ class Published:
     """First inverter of the island that it is about; "" for the whole microgrid."""
     quantity: Quantity
     paper: float
-    """What the publication prints."""
+    """The number that the publication prints."""
     digits: int
     """Decimals that it prints."""
     limit: float | None = None
@@ -72,26 +72,26 @@ CLAIMS: Registry[Any] = Registry("claim", "claims", _claim_objection)
 """Claims by name. Those of a publication come with its `Benchmark`."""
 
 
-def _nothing(found: Findings) -> Sequence[str]:
+def _nothing(findings: Findings) -> Sequence[str]:
     return ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark:
-    """What a publication says of one experiment."""
+    """A publication's numbers and claims on one experiment."""
 
     numbers: tuple[Published, ...] = ()
     """Numbers that it prints; they stand beside ours."""
     claims: tuple[Claim, ...] = ()
-    """What it says in words."""
+    """Its sentences."""
     summary: Callable[[Findings], Sequence[str]] = _nothing
-    """How near we come, in a few lines below the claims."""
+    """Return our distance from it, in a few lines below the claims."""
 
-    def lines(self, found: Findings) -> list[str]:
+    def lines(self, findings: Findings) -> list[str]:
         """Return the summary of a run; one that raises an exception is a line that says why."""
         try:
-            return [printable(str(line), 1000) for line in self.summary(found)]
-        except ANYTHING as error:  # a benchmark is anybody's code
+            return [printable(str(line), 1000) for line in self.summary(findings)]
+        except ANYTHING as error:  # a benchmark is a user's code
             return [f"The benchmark's summary failed: {named(error)}"]
 
     def number(self, case: str, event: str, quantity: str, island: str = "") -> Published | None:
@@ -102,7 +102,7 @@ class Benchmark:
 
 
 NO_BENCHMARK = Benchmark()
-"""Of a scenario that nobody has published."""
+"""The benchmark of a scenario that nobody has published."""
 
 
 def _benchmark_objection(it: Any) -> str:

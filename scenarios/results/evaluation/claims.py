@@ -1,15 +1,15 @@
-"""Claims of one's own: from a function to a verdict.
+"""Claims and their verdicts; a user's claim is a function.
 
     @gridpeers.claim("restored")
-    def restored(found):
+    def restored(findings):
         '''Frequency and sharing are back within 1 s of islanding.'''
-        t = found.results["IV"]["event1"].t_restore_s
+        t = findings.results["IV"]["event1"].t_restore_s
         return t is not None and t <= 1.0, f"{t} s"
 
 A claim is a function of what was found that returns whether it holds, and our value with its unit; or a
 `gridpeers.Claim` object, which also says which cases, events and steady values it needs. What was found:
-`found.results[case][event]` has the measures (f_error_Hz, MPSI, V_error, MQSI, t_restore_s, t_load_s), and
-`found.own[case][event].values[name]` the scenario's own metrics (`docs/plugins.md`).
+`findings.results[case][event]` has the measures (f_error_Hz, MPSI, V_error, MQSI, t_restore_s, t_load_s), and
+`findings.own[case][event].values[name]` the scenario's own metrics (`docs/plugins.md`).
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from wire.printable import printable
 from wire.registry import PluginError
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
-"""MISS: it does not hold, for a reason that is known and told; NOT RUN: a case that it is about was left out."""
+"""MISS: it does not hold, for a known reason that is shown; NOT RUN: a case that it is about was left out."""
 
 Judge = Callable[[Findings], tuple[bool, str]]
-"""Whether it holds, and what we found, with units."""
+"""Return whether a claim holds, and our value with its unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Claim:
     text: str
     """The claim."""
     source: str
-    """Where it is said."""
+    """Place in the publication."""
     judge: Judge
     measures: tuple[Measure, ...]
     """Steady values that it is judged by: it does not pass while one of them is not steady, or no number."""
@@ -55,16 +55,16 @@ class Claim:
     events: tuple[str, ...] = ()
     """Events that must have been measured in them."""
     lacking: Callable[[Findings], str] = lambda _: ""
-    """What there must be and is not, e.g. an island; it fails then, also as a known miss. "" where nothing lacks."""
+    """Return what the run lacks, e.g. an island: the claim fails then, also a known miss. "" where nothing lacks."""
     figure: str = ""
     """Figure of the report that shows it; "" for a claim about a table."""
     known_miss: str = ""
-    """Why it cannot hold here, where that is known. It is shown as a miss then, and does not fail the run."""
+    """Known reason why it cannot hold here; "" for none. It is shown as a miss then, and does not fail the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """A claim judged."""
+    """The judgement of a claim."""
 
     claim: Claim
     status: Status
@@ -72,48 +72,48 @@ class Verdict:
     """Our value, with its unit."""
 
 
-def judge(found: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
-    """Judge claims by what was found; one that raises an exception fails, and its verdict says why."""
+def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
+    """Judge claims by the findings; one that raises an exception fails, and its verdict says why."""
     verdicts = []
     for claim in claims:
         try:
-            verdicts.append(_verdict(claim, found))
-        except ANYTHING as error:  # a claim is anybody's code
+            verdicts.append(_verdict(claim, findings))
+        except ANYTHING as error:  # a claim is a user's code
             verdicts.append(
-                Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, found)}")
+                Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, findings)}")
             )
     return tuple(verdicts)
 
 
-def _there(error: BaseException, found: Findings) -> str:
-    """Return the names that there are, for a claim that asked for another."""
+def _there(error: BaseException, findings: Findings) -> str:
+    """Return the known names, for a claim that asked for another."""
     if not isinstance(error, KeyError):
         return ""
     known = {
-        "cases": dict.fromkeys(found.results),
-        "events": dict.fromkeys(event for of in found.results.values() for event in of),
+        "cases": dict.fromkeys(findings.results),
+        "events": dict.fromkeys(event for of in findings.results.values() for event in of),
         "scenario's own metrics": dict.fromkeys(
-            n for of in found.own.values() for one in of.values() for n in one.values
+            n for of in findings.own.values() for one in of.values() for n in one.values
         ),
     }
     return "".join(f"; the {kind} are {', '.join(names)}" for kind, names in known.items() if names)
 
 
-def _verdict(claim: Claim, found: Findings) -> Verdict:
-    results = found.results
+def _verdict(claim: Claim, findings: Findings) -> Verdict:
+    results = findings.results
     missing = [case for case in claim.cases if case not in results]
     if missing:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
     absent = [event for event in claim.events if any(event not in results[case] for case in claim.cases)]
     if absent:
         return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
-    if lacking := claim.lacking(found):
+    if lacking := claim.lacking(findings):
         return Verdict(claim=claim, status="FAIL", found=lacking)
-    holds, told = claim.judge(found)
-    text = str(told)
+    holds, value = claim.judge(findings)
+    text = str(value)
     if not holds and claim.known_miss:
         return Verdict(claim=claim, status="MISS", found=text)
-    unsteady = found.unsteady(claim.cases, claim.events, claim.measures)
+    unsteady = findings.unsteady(claim.cases, claim.events, claim.measures)
     if holds and unsteady:
         more = f", and {len(unsteady) - 1} more" if len(unsteady) > 1 else ""
         return Verdict(claim=claim, status="FAIL", found=f"{text}, but {unsteady[0]}{more}")
@@ -128,15 +128,15 @@ def claim_of(plugin: Plugin) -> Claim:
     PluginError
         If there is none, or it cannot be made with these parameters.
     """
-    found = made(CLAIMS, plugin)
-    if isinstance(found, Claim):
-        return found
-    kind = found if inspect.isroutine(found) else type(found)
+    claim = made(CLAIMS, plugin)
+    if isinstance(claim, Claim):
+        return claim
+    kind = claim if inspect.isroutine(claim) else type(claim)
     name = plugin.use.rpartition(":")[2]
     text = (inspect.getdoc(kind) or "").partition("\n")[0].rstrip(".") or name
 
     def holds(findings: Findings) -> tuple[bool, str]:
-        result = found(findings)
+        result = claim(findings)
         if isinstance(result, tuple) and len(result) == 2:
             return _truth(result[0]), printable(str(result[1]), 200)
         return _truth(result), ""
@@ -151,8 +151,8 @@ def _truth(value: Any) -> bool:
     return bool(value)
 
 
-def judged(found: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
-    """Return the verdicts on one's own claims; one that raises does not hold, and its verdict says why."""
+def judged(findings: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
+    """Return the verdicts on a scenario's own claims; one that raises does not hold, and its verdict says why."""
     verdicts: list[Verdict] = []
     for plugin in plugins:
         try:
@@ -161,5 +161,5 @@ def judged(found: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:
             claim = Claim(name=plugin.use, text=plugin.use, source="", judge=lambda _: (False, ""), measures=())
             verdicts.append(Verdict(claim=claim, status="FAIL", found=str(error)))
             continue
-        verdicts += judge(copy.deepcopy(found), (claim,))  # what it changes there is no other claim's concern
+        verdicts += judge(copy.deepcopy(findings), (claim,))  # its changes there must not reach another claim
     return tuple(verdicts)

@@ -1,4 +1,4 @@
-"""Metrics: functions of an event's window, the registry of them, and what becomes of one that fails.
+"""Metrics: functions of an event's window, their registry, and the reasons of those that fail.
 
     @gridpeers.metric("nadir_Hz")
     def nadir(window):
@@ -44,12 +44,12 @@ METRICS: Registry[Any] = Registry(
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """What the metrics of a scenario came to in one window."""
+    """Values of the metrics of a scenario in one window."""
 
     values: Mapping[str, float | None] = field(default_factory=dict)
     """By name; None where there is no value."""
     reasons: Mapping[str, str] = field(default_factory=dict)
-    """Why a metric has no value, where it should have one."""
+    """Reasons of the metrics that lack a value."""
 
 
 def name_of(plugin: Plugin, label: str = "") -> str:
@@ -82,10 +82,10 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     reasons: dict[str, str] = {}
     for name, metric in metrics:
         try:
-            found = metric(data)
-            several = dict(found) if isinstance(found, Mapping) else {"": found}
+            result = metric(data)
+            several = dict(result) if isinstance(result, Mapping) else {"": result}
             numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
-        except ANYTHING as error:  # a metric is anybody's code, and so is what it returns
+        except ANYTHING as error:  # a metric is a user's code, and its result is too
             values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
             continue
         finally:
@@ -120,7 +120,7 @@ def _made(plugin: Plugin) -> Callable[[WindowData], Any]:
 
 
 def _number(value: Any) -> tuple[float | None, str]:
-    """Return a value as a number, or None and why; None itself is "there was none", as of a time that never came."""
+    """Return a value as a number, or None and why; None itself stands for no value, as of a time that never came."""
     if value is None:
         return None, ""
     try:
@@ -135,7 +135,7 @@ def _shown(error: BaseException) -> str:
 
 
 def _columns(error: BaseException, data: WindowData) -> str:
-    """Return what a table has, for a metric that asked for something else."""
+    """Return the columns of a table, for a metric that asked for others."""
     if not isinstance(error, (KeyError, AttributeError, IndexError)):
         return ""
     few = ", ".join(data.inverters[:12]) + (", ..." if len(data.inverters) > 12 else "")

@@ -75,7 +75,7 @@ class WindowData(History):
 
     @cached_property
     def settled(self) -> Settling:
-        """How frequency and sharing settled, and what still swings."""
+        """Settling of frequency and sharing, and remaining swings."""
         return settling(self.whole, self.nameplates, self.window, self.f_nom)
 
 
@@ -136,7 +136,7 @@ def own_measures(
     metrics = make_metrics(metrics_of(scenario))
     if not metrics:
         return {}
-    found: dict[str, dict[str, Measured]] = {}
+    values: dict[str, dict[str, Measured]] = {}
     for case, record in cases.items():
         whole = read_only(record.history)
         nameplates = Nameplates.of_columns(whole.inverters, feeder).without(without_agent(scenario, case))
@@ -147,11 +147,11 @@ def own_measures(
             "T_c": scenario.time.T_c_s,
         }
         with np.errstate(all="ignore"):  # a value that is no number has its reason
-            found[case] = {
+            values[case] = {
                 window.label: measured(
                     metrics,
                     WindowData.cut(whole, window, messages_saved=record.messages_saved.get(window.label, 0.0), **about),
                 )
                 for window in record.windows
             }
-    return found
+    return values

@@ -1,4 +1,4 @@
-"""What all figures of a run share; made without matplotlib, which takes longer to import than a case to run."""
+"""Data of the figures of a run; made without matplotlib, which takes longer to import than a case to run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Mark(NamedTuple):
     label: str
     """Name of its window; "" for none."""
     t: float
-    """When it came (s)."""
+    """Time of the event (s)."""
     what: str = ""
-    """What happens in it, in a few words: "13-152 opens"."""
+    """The event in a few words: "13-152 opens"."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
-    """What all figures of a run share."""
+    """Data that all figures of a run share."""
 
     histories: Mapping[str, History]
     """Recorded cases by name."""
@@ -38,7 +38,7 @@ class Drawing:
     nameplates: Nameplates
     """Nameplates, in the order of the histories' columns."""
     events: Sequence[Mark]
-    """What is marked at its time."""
+    """Events, marked at their times."""
     f_nom: float
     """Nominal frequency (Hz)."""
     without_agent: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Drawing:
     island_titles: Mapping[str, str] = field(default_factory=dict)
     """A few words on each island."""
     island_intervals: Sequence[IslandInterval] = ()
-    """When there are several islands; figures of all cases then show the worst."""
+    """Times with several islands; figures of all cases show the worst of them then."""
 
     def nameplates_in(self, case: str) -> Nameplates:
         """Return the nameplates as they count in a case."""
@@ -87,7 +87,7 @@ def drawing_of(
 
 
 def happening(event: Event, scenario: ScenarioModel) -> str:
-    """Return what happens at an event, in a few words.
+    """Return an event in a few words.
 
     Examples
     --------
@@ -96,12 +96,12 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
     >>> [happening(event, scenario) for event in scenario.events]
     ['13-152 opens', 'sw1_2, sw2_3 open']
     """
-    said = [
+    parts = [
         f"{', '.join(names)} {verb}{'s' if len(names) == 1 else ''}"
         for names, verb in ((event.open, "open"), (event.close, "close"))
         if names
     ]
-    said += [
+    parts += [
         f"{short(in_order(names))} {verb}{'s' if len(names) == 1 else ''}"
         for names, verb in ((event.leave, "leave"), (event.join, "join"))
         if names
@@ -109,5 +109,5 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
     limits = [limit for case in scenario.cases for limit in limits_of(scenario, case) if limit.t == event.t_s]
     if limits:
         names, powers = short(in_order({limit.inverter for limit in limits})), {limit.P_max for limit in limits}
-        said += [f"{names}: {powers.pop() / 1e3:g} kW" if len(powers) == 1 else f"{names}: P_max by case"]
-    return ", ".join(said)
+        parts += [f"{names}: {powers.pop() / 1e3:g} kW" if len(powers) == 1 else f"{names}: P_max by case"]
+    return ", ".join(parts)

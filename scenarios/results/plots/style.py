@@ -1,4 +1,4 @@
-"""What all figures have in common: one style per case, the page, axes of time, reproducible files.
+"""Style of all figures: one line style per case, the page, axes of time, reproducible files.
 
 One colour and one dash pattern per case, the same in every figure, after Okabe and Ito's palette, which stays apart
 for colour-blind readers; with the patterns the curves can be told in a black-and-white print too.
@@ -122,7 +122,7 @@ def widths(count: int) -> list[float]:
 
 
 class Bounds(NamedTuple):
-    """Where an axis that starts at 0 ends."""
+    """End of an axis that starts at 0."""
 
     least: float = 0.05
     """There or above, so that what is next to nothing looks like it."""
@@ -217,7 +217,7 @@ _UNDATED: Mapping[Format, Mapping[str, Any]] = {
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
-"""What leaves the time of writing out of a file."""
+"""Metadata that leave the time of writing out of a file."""
 
 
 def save(

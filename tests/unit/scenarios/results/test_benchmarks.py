@@ -57,7 +57,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     found = Findings(results={"IV": {"event1": steady}})
     verdicts = judge(found, benchmark.claims)
     text = plain(
-        RunReport(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=benchmark, notes=[], folder="x/")
+        RunReport(scenario="", titles={}, findings=found, verdicts=verdicts, benchmark=benchmark, notes=[], folder="x/")
     )
 
     assert "ours | paper's Table 7" in text
@@ -90,7 +90,9 @@ def test_a_benchmark_that_raises_fails_its_claim_and_not_the_run() -> None:
     broken = Benchmark(claims=(claim,), summary=lambda found: [found.no_such_thing])  # type: ignore[attr-defined]
     found = Findings(results={"IV": {}})
     verdicts = judge(found, broken.claims)
-    report = RunReport(scenario="", titles={}, found=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/")
+    report = RunReport(
+        scenario="", titles={}, findings=found, verdicts=verdicts, benchmark=broken, notes=[], folder="x/"
+    )
 
     (verdict,) = verdicts
     assert (verdict.status, verdict.found) == ("FAIL", "cannot be judged: KeyError: 'V'; the cases are IV")

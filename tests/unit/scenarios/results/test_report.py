@@ -40,7 +40,7 @@ def report(*, judged: bool = True, f_error: float = 0.137) -> RunReport:
     return RunReport(
         scenario="islanding",
         titles={"I": "no control"},
-        found=found,
+        findings=found,
         verdicts=judge(found, CLAIMS["islanding"]) if judged else (),
         benchmark=ISLANDING if judged else NO_BENCHMARK,
         notes=["case I: inv3 [died] at t = 2 s"],
@@ -93,7 +93,7 @@ def test_what_several_islands_share_together_is_not_told() -> None:
     whole = Steady(f_error_Hz=0.027, MPSI=0.093, V_error=0.01, MQSI=0.492, t_restore_s=None, p={})
     part = Steady(f_error_Hz=0.041, MPSI=0.019, V_error=0.09, MQSI=0.135, t_restore_s=0.37, p={})
     found = Findings(results={"IV": {"e": whole}}, islands={"IV": {"e": {"inv1": part}}})
-    text = plain(RunReport(scenario="own", titles={}, found=found, verdicts=(), notes=(), folder="here/"))
+    text = plain(RunReport(scenario="own", titles={}, findings=found, verdicts=(), notes=(), folder="here/"))
 
     rows = [line.split() for line in text.splitlines()]
     assert [row[1:] for row in rows if row[:1] == ["IV"]] == [["0.027", "-", "-"], ["0.0100", "-"]]
@@ -108,7 +108,7 @@ def test_an_island_without_load_has_no_time_to_share_it() -> None:
     part = Steady(f_error_Hz=0.0, MPSI=12719.3, V_error=0.0, MQSI=0.1, t_restore_s=None, p={}, reasons=idle)
     text = plain(
         RunReport(
-            scenario="own", titles={}, found=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder=""
+            scenario="own", titles={}, findings=Findings(results={"IV": {"e": part}}), verdicts=(), notes=(), folder=""
         )
     )
 

@@ -176,7 +176,7 @@ def test_the_report_prints_the_reason_and_not_the_number() -> None:
     """No cell shows a number that is not steady; the reason stands below the table, with the last mean."""
     found, _ = ramping()
     report = RunReport(
-        scenario="islanding", titles={}, found=found, verdicts=(), benchmark=ISLANDING, notes=[], folder="x/"
+        scenario="islanding", titles={}, findings=found, verdicts=(), benchmark=ISLANDING, notes=[], folder="x/"
     )
 
     text = plain(report)
