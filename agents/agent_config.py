@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from wire.plausible import Plausible, Range, Unit
-from wire.plugin import Plugin
-from wire.relations import Below
-from wire.table_schema import NO_KEY, Example, Label
+from wire.plugins.plugin import Plugin
+from wire.schema.plausible import Plausible, Range, Unit
+from wire.schema.relations import Below
+from wire.schema.table_schema import NO_KEY, Example, Label
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""

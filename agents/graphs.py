@@ -16,11 +16,11 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Protocol
 
-from wire.anybody import ANYTHING, named
-from wire.plugin import Plugin, callable_objection, made
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.plugin import Plugin, callable_objection, made
+from wire.plugins.registry import PluginError, Registry
 from wire.printable import printable
-from wire.registry import PluginError, Registry
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 
 class Member(Protocol):

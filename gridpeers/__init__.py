@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from scenarios.run import BrokenRunError
     from scenarios.schema.loading import catalogue
     from scenarios.schema.scenario_errors import ScenarioError
-    from wire.plausible import Range, Unit
+    from wire.schema.plausible import Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     link_fault, metric = FAULTS.register, METRICS.register
@@ -57,13 +57,13 @@ _HOME = {
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
-    "Range": "wire.plausible",
+    "Range": "wire.schema.plausible",
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
     "ScenarioError": "scenarios.schema.scenario_errors",
     "SetPoints": "agents.laws.law",
-    "Unit": "wire.plausible",
+    "Unit": "wire.schema.plausible",
     "WindowData": "scenarios.results.evaluation.window_metrics",
     "catalogue": "scenarios.schema.loading",
     "claim": "scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
@@ -120,7 +120,7 @@ if not TYPE_CHECKING:
 
             return version("gridpeers")
         if name not in _HOME:
-            from wire.suggestion import suggestion
+            from wire.schema.suggestion import suggestion
 
             raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
         module, _, attributes = _HOME[name].partition(":")

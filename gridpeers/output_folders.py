@@ -17,7 +17,7 @@ from scenarios.results.run_files import (
 )
 from scenarios.run import versions
 from wire.driver.output import OutputLostError
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 __all__ = [
     "RUNS",

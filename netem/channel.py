@@ -17,7 +17,7 @@ from netem.fault_schedule import GATES, FaultSchedule
 from netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
-from wire.plugin import Plugin
+from wire.plugins.plugin import Plugin
 
 NEVER = -math.inf
 """A time that no message has."""

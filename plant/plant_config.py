@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from wire.plausible import Plausible, Unit
-from wire.relations import Below
-from wire.table_schema import Example
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import Below
+from wire.schema.table_schema import Example
 
 TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
 Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from wire.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
-from wire.type_words import in_words, kinds_of, shown
+from wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
+from wire.schema.type_words import in_words, kinds_of, shown
 
 
 class FieldDoc(NamedTuple):

@@ -28,8 +28,8 @@ from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTab
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
-from wire.registry import PluginError, Registry
-from wire.table_schema import fields_of
+from wire.plugins.registry import PluginError, Registry
+from wire.schema.table_schema import fields_of
 
 _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
 

@@ -18,7 +18,7 @@ from agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
 from agents.carriers.fmu_interface import named as variables
 from agents.laws.call import LawError, begun, decided
 from agents.laws.law import LIMITS, NOTHING, Law, Neighbour, Own, SetPoints
-from wire.anybody import ANYTHING, named
+from wire.plugins.anybody import ANYTHING, named
 
 
 class LoadedFmu(Law):

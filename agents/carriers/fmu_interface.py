@@ -17,8 +17,8 @@ from typing import Any
 
 from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
 from wire.printable import printable
-from wire.suggestion import suggestion
-from wire.table_reading import read_parameters
+from wire.schema.suggestion import suggestion
+from wire.schema.table_reading import read_parameters
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 """Inputs of the own inverter."""

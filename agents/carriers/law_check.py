@@ -12,11 +12,11 @@ from agents.carriers.executable import executable_problem
 from agents.carriers.law_registry import CARRIERS, KEYS, LAWS
 from agents.carriers.time_limit import make_limited
 from agents.laws.law import Law, limits_in
-from wire.path_text import is_no_path
-from wire.plugin import scalar_objection
-from wire.registry import PluginError
-from wire.table_reading import read_parameters, read_table
-from wire.table_schema import Problem
+from wire.plugins.path_text import is_no_path
+from wire.plugins.plugin import scalar_objection
+from wire.plugins.registry import PluginError
+from wire.schema.table_reading import read_parameters, read_table
+from wire.schema.table_schema import Problem
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[handling]`."""

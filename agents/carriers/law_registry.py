@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from agents.laws.law import Law
-from wire.plugin import class_objection
-from wire.registry import Registry
+from wire.plugins.plugin import class_objection
+from wire.plugins.registry import Registry
 
 CARRIERS = ("use", "command", "fmu")
 """Keys of a scenario's table `law`, one of which says what the law is."""

@@ -12,7 +12,7 @@ from typing import Any
 
 from agents.laws.call import LawError
 from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints
-from wire.anybody import ANYTHING, named
+from wire.plugins.anybody import ANYTHING, named
 
 FIRST = 10.0
 """Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""

@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Any
 
 from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
-from wire.anybody import ANYTHING, named
 from wire.bounds import MOST_SHARED, SHARED_LIMIT
+from wire.plugins.anybody import ANYTHING, named
 from wire.printable import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from agents.laws.law import Law, Neighbour, Own, SetPoints
-from wire.plausible import Range, Unit
+from wire.schema.plausible import Range, Unit
 
 
 class Centralised(Law):

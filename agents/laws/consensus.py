@@ -67,7 +67,7 @@ from typing import Annotated, Any
 
 from agents.agent_config import Gains
 from agents.laws.law import Law, Neighbour, Own, SetPoints
-from wire.plausible import Range, Unit
+from wire.schema.plausible import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:

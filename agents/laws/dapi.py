@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from agents.laws.law import Law, Neighbour, Own, SetPoints
-from wire.plausible import Range, Unit
+from wire.schema.plausible import Range, Unit
 
 
 class Dapi(Law):

@@ -23,7 +23,7 @@ from typing import Annotated, Any
 
 from agents.laws.consensus import Consensus
 from agents.laws.law import Neighbour, Own, SetPoints
-from wire.plausible import Range, Unit
+from wire.schema.plausible import Range, Unit
 
 
 class EventTriggered(Consensus):

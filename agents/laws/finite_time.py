@@ -27,7 +27,7 @@ from math import copysign
 from typing import Annotated
 
 from agents.laws.law import Law, Neighbour, Own, SetPoints
-from wire.plausible import Range, Unit
+from wire.schema.plausible import Range, Unit
 
 
 class FiniteTime(Law):

@@ -14,9 +14,9 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from wire.plausible import Range, Unit
-from wire.relations import Below
-from wire.table_reading import parameter_values
+from wire.schema.plausible import Range, Unit
+from wire.schema.relations import Below
+from wire.schema.table_reading import parameter_values
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""
@@ -102,7 +102,7 @@ class SetPoints(NamedTuple):
 
 
 class Law:
-    """Base of all laws. Parameters are annotated attributes (`wire.table_schema`).
+    """Base of all laws. Parameters are annotated attributes (`wire.schema.table_schema`).
 
     Parameters
     ----------

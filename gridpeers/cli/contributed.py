@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from wire.registry import PluginError, Registry
+from wire.plugins.registry import PluginError, Registry
 
 Command = Callable[..., None]
 

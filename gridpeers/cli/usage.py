@@ -44,7 +44,7 @@ def refuse(error: ScenarioError) -> NoReturn:
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
     """End with the nearest word if a value is none of those that an option takes."""
-    from wire.suggestion import suggestion
+    from wire.schema.suggestion import suggestion
 
     if value not in known:
         fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)

@@ -12,7 +12,7 @@ from scenarios.results.metrics_file import Clock
 from scenarios.run import Driver
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 
 def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option: str = "") -> model.ScenarioModel:

@@ -26,7 +26,7 @@ from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.schema import scenario_model as model
 from scenarios.schema.plugin_keys import claims_of
 from wire.messages import PlantEvent
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

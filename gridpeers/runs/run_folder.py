@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
-from wire.path_text import is_no_path
+from wire.plugins.path_text import is_no_path
 from wire.printable import printable
 
 T = TypeVar("T")

@@ -19,7 +19,7 @@ from scenarios.schema.configs import as_in
 from scenarios.schema.loading import read_tables, read_toml
 from scenarios.schema.plugin_keys import check_portable
 from scenarios.schema.scenario_errors import Problems
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario

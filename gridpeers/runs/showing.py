@@ -7,7 +7,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from scenarios.results.plots.drawing import Drawing
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

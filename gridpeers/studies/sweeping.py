@@ -25,7 +25,7 @@ from scenarios.sweep.file.sweep_reading import plan_of
 from scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
 from scenarios.sweep.sweep_table import results_frame
 from scenarios.sweep.workers import cores, on_this_machine
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
 """Values by the dotted path of a key."""

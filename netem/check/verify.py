@@ -21,7 +21,7 @@ from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
-from wire.plugin import Plugin
+from wire.plugins.plugin import Plugin
 
 LEVEL = 0.001
 """Probability that a run without any fault of ours has a warning, over all its tests together (Holm)."""

@@ -9,7 +9,7 @@ import msgspec
 
 from netem.draws import Stream
 from netem.models.delay import DELAY
-from wire.plausible import Probability, Unit
+from wire.schema.plausible import Probability, Unit
 
 _WHETHER, _WHICH, _PER_COPY = 0, 1, 2
 """Indices of the draws of the first copy of a corrupted message; those of the next follow."""

@@ -24,8 +24,8 @@ import msgspec
 
 from netem.draws import Stream
 from netem.models.chain import Chain
-from wire.plausible import Plausible, Unit, in_percent
-from wire.table_schema import Problem
+from wire.schema.plausible import Plausible, Unit, in_percent
+from wire.schema.table_schema import Problem
 
 LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from wire.plausible import Plausible, Unit
+from wire.schema.plausible import Plausible, Unit
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""

@@ -14,8 +14,8 @@ import msgspec
 
 from netem.draws import Stream
 from netem.models.chain import Chain
-from wire.plausible import Probability
-from wire.table_schema import Problem
+from wire.schema.plausible import Probability
+from wire.schema.table_schema import Problem
 
 Lost = Callable[[int], bool]
 """From a message number to whether that message is lost."""

@@ -8,8 +8,8 @@ from typing import Annotated
 import msgspec
 
 from netem.models import INSTANT
-from wire.plausible import Plausible, Unit
-from wire.table_schema import Problem
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.table_schema import Problem
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import msgspec
 
 from netem.draws import Stream
-from wire.anybody import ANYTHING, named
-from wire.plugin import Plugin, class_objection, made
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.plugin import Plugin, class_objection, made
+from wire.plugins.registry import Registry
 from wire.printable import printable
-from wire.registry import Registry
-from wire.table_reading import parameter_values
+from wire.schema.table_reading import parameter_values
 
 LONGEST = 3600.0
 """Longest delay (s) that a fault may add."""
@@ -69,7 +69,7 @@ class MessageDraws:
 
 
 class LinkFault:
-    """Base of all user-defined faults. Parameters are annotated attributes (`wire.table_schema`).
+    """Base of all user-defined faults. Parameters are annotated attributes (`wire.schema.table_schema`).
 
     There is one object per link and entry. The result of `judge` should depend on the message and the draws alone:
     a receiver that joins late has not seen the messages before.

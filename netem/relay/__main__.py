@@ -9,7 +9,7 @@ import sys
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayCommandError, RelayError
 from netem.relay.relay_command import FAULTS, HELP
 from wire.driver.output import speaking
-from wire.table_schema import fields_of
+from wire.schema.table_schema import fields_of
 
 OK, USAGE = 0, 2
 

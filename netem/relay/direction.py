@@ -9,8 +9,8 @@ from typing import Annotated
 import msgspec
 
 from netem.models.delay import DELAY, LONGEST_DELAY
-from wire.plausible import Plausible, Probability, Unit
-from wire.table_schema import fields_of
+from wire.schema.plausible import Plausible, Probability, Unit
+from wire.schema.table_schema import fields_of
 
 
 class FaultsError(ValueError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from netem.relay.direction import Faults
-from wire.table_schema import fields_of
+from wire.schema.table_schema import fields_of
 
 HELP = """\
 delay S | jitter S | rate BYTES_PER_S | queue BYTES | loss P | reorder P

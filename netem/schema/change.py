@@ -13,7 +13,7 @@ from netem.models.gates import Cut
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link, links_among, parse
-from wire.plugin import Plugin
+from wire.plugins.plugin import Plugin
 
 
 class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -16,13 +16,13 @@ from netem.models.medium import Rate, Slots
 from netem.models.own_fault import FAULTS
 from netem.schema.pattern import parse
 from netem.schema.profiles import PROFILES
-from wire.path_text import is_no_path
-from wire.plausible import Plausible, Unit
-from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
-from wire.relations import After, problems_of
-from wire.suggestion import suggestion
-from wire.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
-from wire.type_words import shown
+from wire.plugins.path_text import is_no_path
+from wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import After, problems_of
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
+from wire.schema.type_words import shown
 
 LONGEST_RUN = 86_400.0
 """A day (s): no schedule is longer."""

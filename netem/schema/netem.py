@@ -12,7 +12,7 @@ from netem.schema.fault import Fault, Span
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from netem.schema.pattern import Link, links_among, objections
-from wire.table_schema import NO_KEY, Problem, below
+from wire.schema.table_schema import NO_KEY, Problem, below
 
 
 class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

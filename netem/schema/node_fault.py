@@ -9,10 +9,10 @@ import msgspec
 
 from netem.models.delay import LONGEST_DELAY
 from netem.schema.fault import EndTime, RunTime
-from wire.plausible import Plausible, Unit
-from wire.relations import problems_of
-from wire.suggestion import suggestion
-from wire.table_schema import Example, Problem
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import problems_of
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import Example, Problem
 
 
 def _in_ppm(factor: float) -> str:

@@ -12,9 +12,9 @@ import msgspec
 from netem.models.gates import Cut
 from netem.schema.fault import EndTime, RunTime, Span
 from wire.messages import PLANT
-from wire.relations import problems_of
-from wire.suggestion import suggestion
-from wire.table_schema import Example, Problem
+from wire.schema.relations import problems_of
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import Example, Problem
 
 _REST = "the rest"
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from wire.messages import PLANT
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 ANY = "*"
 """All agents; the plant only where it is named."""

@@ -11,8 +11,8 @@ import msgspec
 
 from netem.models.delay import DELAY, LONGEST_DELAY, Trace
 from netem.schema.netem import Netem
-from wire.suggestion import suggestion
-from wire.table_schema import Problem
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import Problem
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""

@@ -15,7 +15,7 @@ from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""

@@ -24,7 +24,7 @@ from plant.tables.feeder_columns import (
     TransformerColumns,
     power_of,
 )
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 
 def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:

@@ -11,7 +11,7 @@ from plant.connectivity import Connectivity, Node
 from plant.equipment import PHASES, Bus, Feeder
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import BusColumns
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 _SHOWN = 24
 """So many buses that are cut off are named."""

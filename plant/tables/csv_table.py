@@ -12,10 +12,10 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import msgspec
 
 from plant.equipment import PHASES
-from wire.plausible import Plausible
-from wire.suggestion import suggestion
-from wire.table_schema import Field, Label, fields_of, named
-from wire.type_words import shown
+from wire.schema.plausible import Plausible
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import Field, Label, fields_of, named
+from wire.schema.type_words import shown
 
 C = TypeVar("C", bound=msgspec.Struct)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.tables.feeder_columns import Manifest
-from wire.table_reading import read_table
+from wire.schema.table_reading import read_table
 
 MANIFEST = "feeder.toml"
 """Name of the file."""

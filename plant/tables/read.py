@@ -11,7 +11,7 @@ from plant.tables.csv_table import required_columns
 from plant.tables.feeder_columns import TABLES, LoadColumns
 from plant.tables.manifest import read_f_nom
 from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""

@@ -23,7 +23,7 @@ from plant.tables.feeder_columns import (
 )
 from wire.keys import check_name
 from wire.messages import OFF, PLANT
-from wire.plausible import Plausible
+from wire.schema.plausible import Plausible
 
 TAKEN = {
     PLANT: "the plant sends under it",

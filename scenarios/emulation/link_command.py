@@ -11,8 +11,8 @@ from netem.schema.change import Change, Heal
 from netem.schema.fault import LONGEST_RUN, Fault
 from netem.schema.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words
-from wire.plausible import Plausible
-from wire.table_schema import Problem
+from wire.schema.plausible import Plausible
+from wire.schema.table_schema import Problem
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""

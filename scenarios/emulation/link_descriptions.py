@@ -11,7 +11,7 @@ from netem.models.gates import Cut
 from netem.models.loss import Bernoulli
 from netem.models.medium import Rate
 from netem.schema.profiles import PROFILES
-from wire.plugin import Plugin
+from wire.plugins.plugin import Plugin
 
 
 def words(kind: str, model: Any) -> str:

@@ -16,7 +16,7 @@ from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.run_requests import configurations, request
 from wire.messages import PLANT, LinkAcknowledgement
-from wire.table_schema import Problem
+from wire.schema.table_schema import Problem
 
 
 class _LinkReply(msgspec.Struct, frozen=True):

@@ -13,7 +13,7 @@ from scenarios.live.run_address import LONGEST, UsageError, check_duration, chec
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.netem_tables import netem_of, setup_of
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 SPEEDS = (0.1, 50.0)
 """Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""

@@ -11,8 +11,8 @@ from plant.trip_settings import DEFAULTS, defaults
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import InverterTable, ScenarioModel
-from wire.plugin import plugin_of
-from wire.suggestion import suggestion
+from wire.plugins.plugin import plugin_of
+from wire.schema.suggestion import suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""

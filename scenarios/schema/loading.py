@@ -31,7 +31,7 @@ from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from scenarios.schema.supply import check_supply
 from scenarios.schema.time_checks import check_step, check_times
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""

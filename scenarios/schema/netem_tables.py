@@ -16,7 +16,7 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
-from wire.table_schema import NO_KEY, Problem, fields_of
+from wire.schema.table_schema import NO_KEY, Problem, fields_of
 
 LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
 """Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""

@@ -23,11 +23,11 @@ from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name
 from scenarios.schema.participants import with_agent
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel
-from wire.module_folder import folder_of
-from wire.path_text import is_no_path
-from wire.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
-from wire.registry import PluginError, Registry
-from wire.table_reading import read_table
+from wire.plugins.module_folder import folder_of
+from wire.plugins.path_text import is_no_path
+from wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
+from wire.plugins.registry import PluginError, Registry
+from wire.schema.table_reading import read_table
 
 OUR_GRAPHS = get_args(GraphRule)
 """Rules of gridpeers, which need no module."""

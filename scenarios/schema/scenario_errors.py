@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 import msgspec
 
 from wire.printable import printable
-from wire.suggestion import suggestion
-from wire.table_reading import read_table
-from wire.table_schema import Problem
+from wire.schema.suggestion import suggestion
+from wire.schema.table_reading import read_table
+from wire.schema.table_schema import Problem
 
 T = TypeVar("T", bound=msgspec.Struct)
 

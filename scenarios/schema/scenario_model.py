@@ -13,9 +13,9 @@ import msgspec
 from agents.agent_config import Gains, Handling, Secondary
 from netem.schema.netem import Netem
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
-from wire.plausible import Plausible, Unit
-from wire.relations import Divides, MultipleOf
-from wire.table_schema import INHERITED, INLINE, Example, Label
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import Divides, MultipleOf
+from wire.schema.table_schema import INHERITED, INLINE, Example, Label
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""

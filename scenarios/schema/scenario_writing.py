@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from wire.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
+from wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
 
 def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
-from wire.relations import MultipleOf
+from wire.schema.relations import MultipleOf
 
 PART_OF_T = 0.3
 """Longest integration step, as a part of the inverters' shortest time constant: at 0.4 microgrid123 oscillates."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from scenarios.schema.scenario_model import ScenarioModel
-from wire.table_schema import INLINE, Field, Label, fields_of
+from wire.schema.table_schema import INLINE, Field, Label, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 

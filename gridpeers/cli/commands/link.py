@@ -134,7 +134,7 @@ def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     from netem.models.delay import DELAY, LONGEST_DELAY, Uniform
     from scenarios.live.run_address import UsageError
-    from wire.plausible import Plausible
+    from wire.schema.plausible import Plausible
 
     if jitter is None:
         return {} if delay is None else {"delay": delay}

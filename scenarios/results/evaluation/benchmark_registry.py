@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from scenarios.results.evaluation.quantities import Quantity
-from wire.anybody import ANYTHING, named
-from wire.plugin import callable_objection, plugin_of
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.plugin import callable_objection, plugin_of
+from wire.plugins.registry import Registry
 from wire.printable import printable
-from wire.registry import Registry
 
 if TYPE_CHECKING:
     from scenarios.results.evaluation.claims import Claim

@@ -25,10 +25,10 @@ import numpy as np
 from scenarios.results.evaluation.benchmark_registry import CLAIMS
 from scenarios.results.evaluation.quantities import Measure
 from scenarios.results.findings import Findings
-from wire.anybody import ANYTHING, named
-from wire.plugin import Plugin, made
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.plugin import Plugin, made
+from wire.plugins.registry import PluginError
 from wire.printable import printable
-from wire.registry import PluginError
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a known reason that is shown; NOT RUN: a case that it is about was left out."""

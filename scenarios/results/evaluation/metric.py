@@ -17,10 +17,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from wire.anybody import ANYTHING, named
-from wire.plugin import KEYS, Plugin, callable_objection, made
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.plugin import KEYS, Plugin, callable_objection, made
+from wire.plugins.registry import PluginError, Registry
 from wire.printable import printable
-from wire.registry import PluginError, Registry
 
 if TYPE_CHECKING:
     from scenarios.results.evaluation.window_metrics import WindowData

@@ -12,9 +12,9 @@ from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
 from scenarios.sweep.file.paths import flatten
 from scenarios.sweep.file.sweep_model import GraphAxis, ValueRange
-from wire.relations import problems_of
-from wire.table_reading import read_table
-from wire.table_schema import fields_of
+from wire.schema.relations import problems_of
+from wire.schema.table_reading import read_table
+from wire.schema.table_schema import fields_of
 
 
 class Setting(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from scenarios.schema.scenario_model import ScenarioModel
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 _STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"
 _PATH = re.compile(rf"{_STEP}(?:\.{_STEP})*")

@@ -12,7 +12,7 @@ from scenarios.schema.scenario_errors import Problems
 from scenarios.sweep.file.axes import Axis, Setting, is_number, of_values
 from scenarios.sweep.file.paths import flatten
 from scenarios.sweep.file.sweep_model import RandomAxis
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 DISTRIBUTIONS = ("uniform", "loguniform", "choice")
 

@@ -21,8 +21,8 @@ from scenarios.sweep.file.plan import Plan, fingerprint
 from scenarios.sweep.file.random_axis import random_axes
 from scenarios.sweep.file.samples import BaseScenario, checked_runs
 from scenarios.sweep.file.sweep_model import Sweep
-from wire.relations import problems_of
-from wire.suggestion import suggestion
+from wire.schema.relations import problems_of
+from wire.schema.suggestion import suggestion
 
 SECONDS_PER_SECOND = 0.05
 """Rough cost of a second of the nine-inverter feeder (s on one core, bench/sweep_speed.py), for messages alone."""

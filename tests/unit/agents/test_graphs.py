@@ -13,8 +13,8 @@ from agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
 from agents.topology import adjacency, in_neighbours, is_pairwise
 from tests.toy.toy_configs import agent_config
 from wire.messages import Measurement
-from wire.plugin import Plugin, plugin_of, plugin_problems
-from wire.registry import PluginError
+from wire.plugins.plugin import Plugin, plugin_of, plugin_problems
+from wire.plugins.registry import PluginError
 
 MODULE = '''
 from typing import Annotated

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agents.agent_config import Gains, Handling
 from agents.degraded_communication import gains_in_force
 from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
-from wire.table_schema import fields_of
+from wire.schema.table_schema import fields_of
 
 Matrix = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from netem.schema.fault import KINDS
 from netem.schema.netem import Netem
 from netem.schema.profiles import PROFILES
 from tests.unit.netem.link_messages import MICROGRIDS
-from wire.table_reading import read_table
+from wire.schema.table_reading import read_table
 
 TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf-8")
 

@@ -20,7 +20,7 @@ from netem.schema.partition import Partition
 from netem.schema.pattern import Link, links_among
 from netem.schema.profiles import PROFILES
 from tests.unit.netem.link_messages import MICROGRIDS, steady
-from wire.table_reading import read_table
+from wire.schema.table_reading import read_table
 
 NAMES = list(MICROGRIDS)
 

@@ -20,9 +20,9 @@ from netem.schema.netem import Netem
 from netem.schema.pattern import Link
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
-from wire.plugin import Plugin, plugin_problems
-from wire.registry import PluginError
-from wire.table_reading import read_table
+from wire.plugins.plugin import Plugin, plugin_problems
+from wire.plugins.registry import PluginError
+from wire.schema.table_reading import read_table
 
 MODULE = '''
 from typing import Annotated

@@ -6,8 +6,8 @@ from importlib import metadata
 import pytest
 
 from agents.graphs import GRAPHS, ring
-from wire import registry
-from wire.plugin import Plugin, made, plugin_problems
+from wire.plugins import registry
+from wire.plugins.plugin import Plugin, made, plugin_problems
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from scenarios.live import live_processes
 from scenarios.live.run_address import RunAddress, UsageError
 from scenarios.live.run_requests import own_code
 from tests.toy.toy_configs import agent_config
-from wire.plugin import Plugin
+from wire.plugins.plugin import Plugin
 
 SETUP = EmulationConfig(
     netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"}

@@ -19,8 +19,8 @@ from scenarios.results.findings import Findings
 from scenarios.results.history import History, Nameplates, read_only
 from scenarios.results.metrics import Steady
 from scenarios.sweep.column_labels import unit_of
-from wire.plugin import Plugin, plugin_problems
-from wire.registry import PluginError
+from wire.plugins.plugin import Plugin, plugin_problems
+from wire.plugins.registry import PluginError
 
 NAMES = ("inv1", "inv2")
 

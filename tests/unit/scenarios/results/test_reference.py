@@ -18,7 +18,7 @@ from scenarios.field_docs import field_docs
 from scenarios.reference import TOPICS, page
 from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from wire import keys, messages
-from wire.table_schema import fields_of
+from wire.schema.table_schema import fields_of
 
 DOCS = Path(__file__).parents[4] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from wire.table_schema import Field, Problem, below, fields_of, named
+from wire.schema.table_schema import Field, Problem, below, fields_of, named
 
 
 @dataclass(frozen=True)

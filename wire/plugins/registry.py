@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from wire.suggestion import suggestion
+from wire.schema.suggestion import suggestion
 
 T = TypeVar("T")
 
@@ -57,7 +57,7 @@ class Registry(Generic[T]):
     >>> greetings.resolve("helo")
     Traceback (most recent call last):
         ...
-    wire.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings are print, hello; ...
+    wire.plugins.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings are ...
     """
 
     def __init__(

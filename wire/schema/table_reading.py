@@ -8,9 +8,9 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from wire.relations import contradictions
-from wire.suggestion import suggestion
-from wire.table_schema import (
+from wire.schema.relations import contradictions
+from wire.schema.suggestion import suggestion
+from wire.schema.table_schema import (
     INHERITED,
     INLINE,
     NO_KEY,
@@ -20,7 +20,7 @@ from wire.table_schema import (
     below,
     fields_of,
 )
-from wire.type_words import (
+from wire.schema.type_words import (
     expected,
     inner_struct,
     keys_of,

@@ -9,12 +9,12 @@ from typing import Any
 
 import msgspec
 
-from wire.anybody import ANYTHING, named
+from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.registry import PluginError, Registry
 from wire.printable import printable
-from wire.registry import PluginError, Registry
-from wire.table_reading import parameter_values, read_parameters
-from wire.table_schema import Problem, fields_of
-from wire.type_words import in_words, shown
+from wire.schema.table_reading import parameter_values, read_parameters
+from wire.schema.table_schema import Problem, fields_of
+from wire.schema.type_words import in_words, shown
 
 KEYS = ("use", "folder")
 """Keys of a plug-in's table that are no parameters of it."""
