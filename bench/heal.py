@@ -20,7 +20,7 @@ from time import monotonic
 
 from harness import load, machine, say
 from latency import two_hosts
-from watched import NotInTimeError, Watched, describe
+from run_observer import NotInTimeError, RunObserver, describe
 
 from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.hosts import Hosts
@@ -47,10 +47,10 @@ sessions   new sessions that agents opened, as a link had not been made anew on 
 deaf       cuts after which this program's own session did not hear a running agent any more: not counted above"""
 
 
-def wait(fleet: Watched, seconds: float) -> None:
+def wait(observer: RunObserver, seconds: float) -> None:
     """Take in what comes for so long."""
     end = monotonic() + seconds
-    fleet.until(lambda: monotonic() >= end, "time goes by", seconds + 1.0)
+    observer.until(lambda: monotonic() >= end, "time goes by", seconds + 1.0)
 
 
 def sessions(logs: Path) -> int:
@@ -58,43 +58,43 @@ def sessions(logs: Path) -> int:
     return sum(path.read_text().count("opens a new session") for path in logs.glob("inv*.log"))
 
 
-def noticed(fleet: Watched, here: Iterable[str]) -> bool:
+def noticed(observer: RunObserver, here: Iterable[str]) -> bool:
     """Whether, since `mark`, anybody who was not cut off went out of the sums of another."""
     pairs = set(permutations(here, 2))
-    return any((who, whom) in pairs and not into for _, who, whom, into in fleet.turns)
+    return any((who, whom) in pairs and not into for _, who, whom, into in observer.turns)
 
 
-def healed(fleet: Watched) -> bool:
+def healed(observer: RunObserver) -> bool:
     """Wait for a heal; whether this program heard everybody meanwhile."""
     try:
-        fleet.all_use(*fleet.names, patience=DEAF)
+        observer.all_use(*observer.names, patience=DEAF)
     except NotInTimeError:
-        if fleet.listen_again():
-            fleet.all_use(*fleet.names, patience=PATIENCE)
+        if observer.listen_again():
+            observer.all_use(*observer.names, patience=PATIENCE)
             return False
-        fleet.all_use(*fleet.names, patience=PATIENCE - DEAF)
+        observer.all_use(*observer.names, patience=PATIENCE - DEAF)
     return True
 
 
-def measure(fleet: Watched, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int, int]:
+def measure(observer: RunObserver, hosts: Hosts, repeat: int, rng: random.Random) -> tuple[list[float], int, int]:
     """Return times (s) of so many heals, in how many cuts the others noticed, and how often this program was deaf."""
-    here = [name for name in fleet.names if name not in AWAY]
+    here = [name for name in observer.names if name not in AWAY]
     took, disturbed, deaf = [], 0, 0
     for i in range(repeat):
-        fleet.mark(fleet.names)
+        observer.mark(observer.names)
         cut = rng.uniform(SHORTEST, LONGEST)
         hosts.cut(2)
-        wait(fleet, cut)
+        wait(observer, cut)
         hosts.heal(2)
         began = monotonic()
-        if healed(fleet):
-            took.append(max(at for at, *_ in fleet.turns) - began)
-            disturbed += noticed(fleet, here)
+        if healed(observer):
+            took.append(max(at for at, *_ in observer.turns) - began)
+            disturbed += noticed(observer, here)
             say(f"{i + 1} of {repeat}: cut for {cut:.2f} s, healed after {took[-1]:.2f} s")
         else:
             deaf += 1
             say(f"{i + 1} of {repeat}: cut for {cut:.2f} s; this program's own session was deaf")
-        wait(fleet, rng.uniform(*REST))
+        wait(observer, rng.uniform(*REST))
     return took, disturbed, deaf
 
 
@@ -111,10 +111,10 @@ def main() -> int:
             return 1
         listen = f"tcp/{hosts.address(1)}:0"
         elsewhere = {name: (f"tcp/{hosts.address(2)}:0", hosts.at(2)) for name in AWAY}
-        fleet = Watched(Path(folder), free_endpoint(listen), listen, elsewhere)
-        say("the fleet starts")
-        with fleet:
-            took, disturbed, deaf = measure(fleet, hosts, arguments.repeat, random.Random(arguments.seed))
+        observer = RunObserver(Path(folder), free_endpoint(listen), listen, elsewhere)
+        say("the run starts")
+        with observer:
+            took, disturbed, deaf = measure(observer, hosts, arguments.repeat, random.Random(arguments.seed))
         opened = sessions(Path(folder))
     print(f"\n{'(ms)':40}{'n':>6} {'p50':>9} {'p95':>9} {'max':>9}")
     print(f"{'healed':40}{describe(took)}")

@@ -1,9 +1,9 @@
-"""The latency budget of a fleet in wall-clock time: how long until a newcomer counts, until somebody lost is noticed.
+"""Measure the latencies of a run in real time: until a new agent counts, and until a lost one is noticed.
 
-One fleet, nine agents and the plant on the paper's feeder, islanded, fully coordinated, at real time. One agent is
-killed, started, stopped, started, frozen and woken, again and again; another, which stands on a host of its own (a
-network namespace), is cut off and healed. Where the lost agent's inverter stays on, nothing would have to be restored:
-there the load is changed by a third at the same moment (switch 60-160 opens or closes).
+The run has nine agents and the plant on the paper's feeder, islanded, fully coordinated, at speed 1. One agent is
+killed, started, stopped, started, frozen and woken, again and again; another, on a host of its own (a network
+namespace), is cut off and healed. Where the lost agent's inverter stays on, nothing would have to be restored: there
+the load changes by a third at the same moment (switch 60-160 opens or closes).
 
     .venv/bin/python bench/latency.py [--repeat 20] [--quick]
 """
@@ -25,7 +25,7 @@ from typing import Literal
 
 from harness import load, machine, say
 from ping import TICK, one_way, round_trip
-from watched import HOLD, RUN, NotInTimeError, Watched, describe
+from run_observer import HOLD, RUN, NotInTimeError, RunObserver, describe
 
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.results.metrics import F_BAND, MPSI_BAND
@@ -38,7 +38,7 @@ LOAD_SWITCH = "60-160"
 """Opens on the passive zone, a third of the load."""
 
 BOTH_WAYS = 5.0
-"""Longest wait (s) for somebody who is used by all again to use all; then it is started anew, and counted."""
+"""Longest wait (s) for an agent that all use again to use all; then it is started anew, and counted."""
 
 AFTERMATH = 2.5
 """Time (s) after which a link that was silent is either alive or given up: more than Zenoh's lease."""
@@ -55,7 +55,7 @@ restored   the first time from which, for {HOLD:g} s, all rows of the plant have
 again      SIGCONT, or healing, -> used by the first neighbour, by all eight, and all eight used by it too
 deaf       the cut lasts about 1.5 s, until the others are restored; with TCP's back-off a link may then be silent for
            longer than Zenoh's lease of 2 s. Counted once links have settled: a pair of agents that do not use each
-           other within {AFTERMATH + BOTH_WAYS:g} s more, then one is restarted; and the observer, who no longer
+           other within {AFTERMATH + BOTH_WAYS:g} s more, then one is restarted; and the observer, which no longer
            hears the status of an agent and opens a new session
 one-way    handed to Zenoh -> in the receiving thread of another process, at the rate of ticks ({TICK * 1e3:g} ms)
 All times in ms, from the act of the observer to the arrival of its effect at the observer; both share the machine."""
@@ -66,14 +66,14 @@ class Budget:
 
     Parameters
     ----------
-    fleet : Watched
+    observer : RunObserver
         What is measured.
     hosts : Hosts or None
         The hosts; None where there is but one, and nothing can be cut.
     """
 
-    def __init__(self, fleet: Watched, hosts: Hosts | None) -> None:
-        self.fleet, self.hosts = fleet, hosts
+    def __init__(self, observer: RunObserver, hosts: Hosts | None) -> None:
+        self.observer, self.hosts = observer, hosts
         self.samples: dict[str, list[float]] = defaultdict(list)
         self.tokens: dict[str, int] = defaultdict(int)
         """Number of times that the token was still there when the last neighbour noticed."""
@@ -86,77 +86,77 @@ class Budget:
     def once(self) -> None:
         """Everything, one time."""
         kill, stop = signal.SIGKILL, signal.SIGTERM
-        self._lose("kill -9", HURT, lambda: self.fleet.signal(HURT, kill))
+        self._lose("kill -9", HURT, lambda: self.observer.signal(HURT, kill))
         self._start("start, inverter on droop (killed before)")
-        self._lose("proper stop (SIGTERM)", HURT, lambda: self.fleet.signal(HURT, stop), off=True)
+        self._lose("proper stop (SIGTERM)", HURT, lambda: self.observer.signal(HURT, stop), off=True)
         self._start("start, inverter off (stopped before)")
-        self._lose("hang (SIGSTOP)", HURT, lambda: self.fleet.signal(HURT, signal.SIGSTOP))
-        self._again("hang (SIGSTOP)", HURT, lambda: self.fleet.signal(HURT, signal.SIGCONT))
+        self._lose("hang (SIGSTOP)", HURT, lambda: self.observer.signal(HURT, signal.SIGSTOP))
+        self._again("hang (SIGSTOP)", HURT, lambda: self.observer.signal(HURT, signal.SIGCONT))
         if self.hosts is not None:
             self._lose("cut", CUT, self._cut)
             self._again("cut", CUT, self._heal)
 
     def _start(self, label: str) -> None:
-        fleet = self.fleet
+        observer = self.observer
         self._ended(HURT)
-        fleet.mark(fleet.names)
+        observer.mark(observer.names)
         began = monotonic()
-        fleet.start(HURT)
-        fleet.until(lambda: fleet.tokens.get(HURT, 0.0) > began, f"the token of {HURT}")
-        token = fleet.tokens[HURT]
-        used = fleet.turned(HURT, True)
-        restored = fleet.restored(fleet.names, fleet.event("roster", f"{HURT} joined"))
+        observer.start(HURT)
+        observer.until(lambda: observer.tokens.get(HURT, 0.0) > began, f"the token of {HURT}")
+        token = observer.tokens[HURT]
+        used = observer.turned(HURT, True)
+        restored = observer.restored(observer.names, observer.event("roster", f"{HURT} joined"))
         for part, at in zip(
             ("token seen", "used (first)", "used (all)", "restored"), (token, *used, restored), strict=True
         ):
             self.samples[f"{label}: {part}"].append(at - began)
 
     def _lose(self, label: str, name: str, hurt: Callable[[], float], *, off: bool = False) -> None:
-        fleet = self.fleet
-        fleet.at_rest()
-        others = [other for other in fleet.names if other != name]
-        fleet.mark(others)
+        observer = self.observer
+        observer.at_rest()
+        others = [other for other in observer.names if other != name]
+        observer.mark(others)
         began = hurt()
         if not off:
             verb: Literal["open", "close"] = "close" if self._open else "open"
             self._open = not self._open
-            fleet.switch(LOAD_SWITCH, verb)
-        noticed = fleet.turned(name, False)
-        self.tokens[label] += name in fleet.tokens
-        since = fleet.event("inverter", f"{name} disconnected") if off else fleet.event("switch", "")
-        restored = fleet.restored(others, since)
+            observer.switch(LOAD_SWITCH, verb)
+        noticed = observer.turned(name, False)
+        self.tokens[label] += name in observer.tokens
+        since = observer.event("inverter", f"{name} disconnected") if off else observer.event("switch", "")
+        restored = observer.restored(others, since)
         for part, at in zip(("noticed (first)", "noticed (all)", "restored"), (*noticed, restored), strict=True):
             self.samples[f"{label}: {part}"].append(at - began)
 
     def _again(self, label: str, name: str, help_it: Callable[[], float]) -> None:
-        self.fleet.mark(self.fleet.names)
+        self.observer.mark(self.observer.names)
         began = help_it()
-        first, last = self.fleet.turned(name, True)
+        first, last = self.observer.turned(name, True)
         self.samples[f"{label}: again (first)"].append(first - began)
         self.samples[f"{label}: again (all)"].append(last - began)
-        fleet = self.fleet
+        observer = self.observer
         try:
-            fleet.all_use(*fleet.names, patience=BOTH_WAYS)
-            self.samples[f"{label}: again (both ways)"].append(max(at for at, *_ in fleet.turns) - began)
+            observer.all_use(*observer.names, patience=BOTH_WAYS)
+            self.samples[f"{label}: again (both ways)"].append(max(at for at, *_ in observer.turns) - began)
         except NotInTimeError:
             say(f"{name} is back, but not both ways")
-        healed = fleet.t
-        fleet.until(lambda: fleet.t > healed + AFTERMATH, "the lease is over")
-        self.deaf[label] += fleet.listen_again()
+        healed = observer.t
+        observer.until(lambda: observer.t > healed + AFTERMATH, "the lease is over")
+        self.deaf[label] += observer.listen_again()
         try:
-            fleet.all_use(*fleet.names, patience=BOTH_WAYS)
+            observer.all_use(*observer.names, patience=BOTH_WAYS)
             self.halves[label] += 0
         except NotInTimeError as error:
             self.halves[label] += 1
             say(f"{name} is started anew: {error}")
-            fleet.signal(name, signal.SIGTERM)
-            fleet.turned(name, False)
+            observer.signal(name, signal.SIGTERM)
+            observer.turned(name, False)
             self._ended(name)
-            fleet.start(name)
-            fleet.turned(name, True)
+            observer.start(name)
+            observer.turned(name, True)
 
     def _ended(self, name: str) -> None:
-        self.fleet.until(lambda: self.fleet.children[name].status is not None, f"{name} ends")
+        self.observer.until(lambda: self.observer.children[name].status is not None, f"{name} ends")
 
     def _cut(self) -> float:
         assert self.hosts is not None
@@ -216,22 +216,22 @@ def main() -> int:
         address = "127.0.0.1" if hosts is None else hosts.address(1)
         elsewhere = {} if hosts is None else {CUT: (f"tcp/{hosts.address(2)}:0", hosts.at(2))}
         listen = f"tcp/{address}:0"
-        fleet = Watched(Path(folder), free_endpoint(listen), listen, elsewhere)
-        say("the fleet starts")
-        with fleet:
-            size, key = fleet.size, fleet.keys.state("probe")
+        observer = RunObserver(Path(folder), free_endpoint(listen), listen, elsewhere)
+        say("the run starts")
+        with observer:
+            size, key = observer.size, observer.keys.state("probe")
             say(f"{messages} messages of {size} bytes while it runs")
-            run = one_way(size, messages, key=key, receiver=(listen,), sender=(listen,), connect=(fleet.endpoint,))
-            budget = Budget(fleet, hosts)
+            run = one_way(size, messages, key=key, receiver=(listen,), sender=(listen,), connect=(observer.endpoint,))
+            budget = Budget(observer, hosts)
             try:
                 for i in range(repeat):
                     say(f"repetition {i + 1} of {repeat}")
                     budget.once()
             except NotInTimeError as error:
                 failed = f"broke off: {error}"
-            pacing = None if fleet.telemetry is None else fleet.telemetry.pacing
+            pacing = None if observer.telemetry is None else observer.telemetry.pacing
         loaded = load()
-        say("the same messages with the fleet gone")
+        say("the same messages without the run")
         bare = one_way(size, messages, key=key, receiver=(free_endpoint(listen),), sender=(listen,), connect=())
         trips = round_trip(size, 10 * messages, key=f"gridpeers/{RUN}/state/ping", endpoint=free_endpoint(listen))
     print(f"load at the end of the run {loaded}")
@@ -243,8 +243,8 @@ def main() -> int:
     print(f"\n{'(ms)':40}{'n':>6} {'p50':>9} {'p95':>9} {'max':>9}", end="")
     budget.print()
     print(f"\none message of {size} bytes, as a State")
-    print(f"  {'one-way at tick rate, fleet running':38}{describe(run)}")
-    print(f"  {'one-way at tick rate, no fleet':38}{describe(bare)}")
+    print(f"  {'one-way at tick rate, run going on':38}{describe(run)}")
+    print(f"  {'one-way at tick rate, no run':38}{describe(bare)}")
     print(f"  {'bare Zenoh ping, half a round trip':38}{describe([trip / 2.0 for trip in trips])}")
     print(LEGEND)
     if failed:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -22,30 +21,16 @@ from gridpeers.cli.usage import (
 )
 
 
-class DriverName(StrEnum):
-    """Values of `--driver`."""
-
-    processes = "processes"
-    inprocess = "inprocess"
-
-
-class ClockName(StrEnum):
-    """Values of `--clock`."""
-
-    simulated = "simulated"
-    wall = "wall"
-
-
 def run(
     scenario: ScenarioName,
     driver: Annotated[
-        DriverName,
+        Literal["processes", "inprocess"],
         typer.Option(help="processes: a plant process and one process per agent, over Zenoh; inprocess: all in one."),
-    ] = DriverName.processes,
+    ] = "processes",
     clock: Annotated[
-        ClockName,
+        Literal["simulated", "wall"],
         typer.Option(help="simulated: in lock-step, the same result every time; wall: real time, agents run freely."),
-    ] = ClockName.simulated,
+    ] = "simulated",
     speed: Annotated[
         float, typer.Option(metavar="X", help="With --clock wall: seconds of the run per second of real time.")
     ] = 1.0,
@@ -80,13 +65,13 @@ def run(
 
     spec, feeder = load(scenario)
     spec = chosen(spec, case, seed)
-    pace = Pace(clock=clock.value, speed=speed, strict=strict)
+    pace = Pace(clock=clock, speed=speed, strict=strict)
     try:
-        check_how(driver.value, pace, dash="--")
+        check_how(driver, pace, dash="--")
     except ScenarioError as error:
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
-    require(needed | ({"zenoh": "the driver with processes"} if driver is DriverName.processes else {}))
+    require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
 
     from rich.console import Console
 
@@ -99,14 +84,14 @@ def run(
     from scenarios.run import run as run_scenario
 
     try:
-        if driver is DriverName.processes:
+        if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     except (ListenError, FolderError) as error:
         fail([str(error)], BAD_INPUT)
 
     console = Console()
-    request = Request(scenario=spec, feeder=feeder, driver=driver.value, folder=folder, self_check=self_check, **pace)
+    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, **pace)
     try:
         with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)

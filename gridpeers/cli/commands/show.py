@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, load, require
 
-
-class Topic(StrEnum):
-    """Values of the argument of `doc`."""
-
-    keys = "keys"
-    messages = "messages"
-    scenario = "scenario"
-    feeder = "feeder"
-    laws = "laws"
-    metrics = "metrics"
-    claims = "claims"
-    faults = "faults"
-    graphs = "graphs"
+Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "faults", "graphs"]
+"""Values of the argument of `doc`."""
 
 
 def list_() -> None:
@@ -65,7 +53,9 @@ def check(
     )
 
 
-def doc(topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to print: {', '.join(Topic)}.")]) -> None:
+def doc(
+    topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to print: {', '.join(get_args(Topic))}.")],
+) -> None:
     """Print a reference page that is made from the code.
 
     keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, metrics,
@@ -75,4 +65,4 @@ def doc(topic: Annotated[Topic, typer.Argument(metavar="TOPIC", help=f"What to p
     """
     from scenarios.reference import page
 
-    typer.echo(page(topic.value), nl=False)
+    typer.echo(page(topic), nl=False)

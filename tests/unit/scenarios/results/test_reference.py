@@ -3,6 +3,7 @@
 import re
 import typing
 from pathlib import Path
+from typing import get_args
 
 import msgspec
 import pytest
@@ -96,4 +97,4 @@ def test_the_reference_in_the_documentation_is_up_to_date() -> None:
 
 def test_the_command_has_every_page() -> None:
     """Its list is written apart, as help comes without what makes the pages."""
-    assert set(Topic) == set(TOPICS)
+    assert set(get_args(Topic)) == set(TOPICS)

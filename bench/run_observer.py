@@ -49,7 +49,7 @@ def _ignore(_: object) -> None:
     """Take no notice: the observer looks at the processes itself."""
 
 
-class Watched:
+class RunObserver:
     """A plant, its agents and the observer. Use it as a context: no process is left.
 
     Parameters
@@ -116,7 +116,7 @@ class Watched:
             self.until(heard, "a status of every agent")
         return deaf
 
-    def __enter__(self) -> Watched:
+    def __enter__(self) -> RunObserver:
         """Start all processes; return once all nine agents share, in the island."""
         try:
             self.start(PLANT, *self.names)
