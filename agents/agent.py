@@ -15,7 +15,7 @@ from agents.agent_config import AgentConfig
 from agents.degraded_communication import SaturationDetector, StalenessWeights
 from agents.graphs import GraphError
 from agents.island_detector import IslandDetector
-from agents.laws.call import LawError, begun, decided
+from agents.laws.call import LawError, decide, start_law
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING, Law, Neighbour, Own
 from agents.own_nameplate import nameplate_of
@@ -26,19 +26,19 @@ SIGN_OF_LIFE = 0.5
 """Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
 
 
-def neighbour_of(plate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
+def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
     """Return a neighbour as a law sees it, per unit of the neighbour's own rating."""
     return Neighbour(
-        name=plate.sender,
-        leader=plate.kind == "GFM",
+        name=nameplate.sender,
+        leader=nameplate.kind == "GFM",
         age=age,
         weight=weight,
-        P_set=state.P_set / plate.P_rated,
-        V_set=state.V_set / plate.V_nom,
-        Q=state.Q / plate.P_rated,
-        m_p=plate.m_p,
-        m_q=plate.m_q,
-        P_rated=plate.P_rated,
+        P_set=state.P_set / nameplate.P_rated,
+        V_set=state.V_set / nameplate.V_nom,
+        Q=state.Q / nameplate.P_rated,
+        m_p=nameplate.m_p,
+        m_q=nameplate.m_q,
+        P_rated=nameplate.P_rated,
         shared=state.shared,
     )
 
@@ -208,9 +208,9 @@ class Agent:
             around = [neighbour_of(self._known[name], self._heard[name], *of) for name, of in counted.items()]
             try:
                 if not self._law_runs:
-                    begun(self._law, own)
+                    start_law(self._law, own)
                     self._law_runs = True
-                P_set, V_set, shared, send = decided(self._law, own, around, config.T_c)
+                P_set, V_set, shared, send = decide(self._law, own, around, config.T_c)
             except LawError as error:
                 self.fault = f"law {config.control.law.name}: {error}"
                 return replace(self.idle_state(measurement), fault=self.fault)

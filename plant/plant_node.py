@@ -164,7 +164,7 @@ class PlantNode(Node):
     def _note_state(self, state: State) -> None:
         """Note a failed law or a quiet state."""
         if state.fault:
-            text = f"{state.sender}: {state.fault}; its agent stands still, its inverter stays on primary droop"
+            text = f"{state.sender}: {state.fault}; its agent is idle, its inverter stays on primary droop"
             self._note_event("law", state.sender, text)
         if state.quiet:
             self._reporter.note_quiet(self.t)

@@ -16,7 +16,7 @@ import msgspec
 
 from agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
 from agents.carriers.fmu_interface import named as variables
-from agents.laws.call import LawError, begun, decided
+from agents.laws.call import LawError, decide, start_law
 from agents.laws.law import LIMITS, NOTHING, Law, Neighbour, Own, SetPoints
 from wire.plugins.anybody import ANYTHING, named
 
@@ -156,9 +156,9 @@ def _answer(law: LoadedFmu, asked: dict[str, Any]) -> dict[str, Any]:
     own = Own(**asked["own"])
     if asked["type"] == "start":
         law.take(asked["parameters"])
-        begun(law, own)
+        start_law(law, own)
         return {"type": "ready"}
-    decision = decided(law, own, [Neighbour(**other) for other in asked["neighbours"]], asked["T"])
+    decision = decide(law, own, [Neighbour(**other) for other in asked["neighbours"]], asked["T"])
     return decision._asdict() | {"shared": dict(decision.shared)}
 
 

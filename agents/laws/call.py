@@ -22,7 +22,7 @@ class LawError(RuntimeError):
     """A law that raised, took too long, or returned no decision."""
 
 
-def begun(law: Law, own: Own) -> None:
+def start_law(law: Law, own: Own) -> None:
     """Start a law from the set-points that the plant holds; raise LawError if it fails."""
     try:
         law.start(own)
@@ -32,7 +32,7 @@ def begun(law: Law, own: Own) -> None:
         raise LawError(f"start at t = {own.t:.6g} s raised {named(error)}") from error
 
 
-def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
     """Return a law's decision, within its limits.
 
     Raises
@@ -46,7 +46,7 @@ def decided(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Se
     ...     def step(self, own, neighbours, T):
     ...         return SetPoints(7.0, 1.0)
     >>> own = Own("inv1", True, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
-    >>> decided(Far(), own, (), 0.02).P_set
+    >>> decide(Far(), own, (), 0.02).P_set
     1.0
     """
     try:

@@ -314,7 +314,7 @@ class RealtimeAgent(AgentNode):
     def _send(self, state: State) -> None:
         """Send a state to everybody, or to the plant alone if the law does not tell the neighbours."""
         if state.fault:
-            self._say(f"{state.fault}; stands still, its inverter stays on primary droop")
+            self._say(f"{state.fault}; idle, its inverter stays on primary droop")
         if state.quiet:
             self._skipped += 1
             self._publish(self.keys.set_points(self._name), encode(state))

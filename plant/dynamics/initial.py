@@ -157,7 +157,9 @@ def equilibrium(
     return OperatingPoint(J=I_out + units.y_f[:, None] * V, V=V, I=I_out, V_branch=flow.V_b)
 
 
-def stand_at(units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None) -> None:
+def set_equilibrium(
+    units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None
+) -> None:
     """Set the inverters' set-points and controller states so that they rest at an operating point.
 
     Parameters

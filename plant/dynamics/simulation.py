@@ -9,7 +9,7 @@ import numpy as np
 from plant.dynamics import switching
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
-from plant.dynamics.initial import OperatingPoint, equilibrium, stand_at
+from plant.dynamics.initial import OperatingPoint, equilibrium, set_equilibrium
 from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
@@ -71,7 +71,7 @@ class Dynamics:
         units, network = self.inverters, self.network
         first = np.zeros(P.size) if Q is None else Q
         point = equilibrium(network.circuit, units, P, first, V_set, swing_voltage=swing_voltage)
-        stand_at(units, point, network.reduction.online, P, V_set)
+        set_equilibrium(units, point, network.reduction.online, P, V_set)
         network.V_branch[network.reduction.branches] = point.V_branch
         self.connect(network.circuit)
         return point

@@ -240,7 +240,7 @@ class Plant:
     # ---------------------------------------------------------------- events of the schedule
 
     def _operate(self, step: int) -> None:
-        """Operate the switches of this step, all at once, and find the islands anew."""
+        """Operate the switches of this step, all at once, and find the islands again."""
         t, before = self._time(step), self._switches.closed
         notes, warnings = self._closings.judge(step)
         self._events += warnings

@@ -15,7 +15,7 @@ import pytest
 from agents.agent_config import LawChoice
 from agents.carriers.fmu import FmuLaw, load_problem
 from agents.carriers.fmu_interface import fmu_problems
-from agents.laws.call import LawError, begun, decided
+from agents.laws.call import LawError, decide, start_law
 from tests.conformance.laws.test_programs_end import OWN
 
 NAME = "FailingFmu.fmu"
@@ -43,9 +43,9 @@ def steps(path: Path, how: float, time_limit: float = 1.0) -> float:
     """P_set (pu) after two steps of an FMU."""
     law = FmuLaw(LawChoice(fmu=path.name, folder=str(path.parent), parameters={"how": how}, time_limit=time_limit))
     try:
-        begun(law, OWN)
-        decided(law, OWN, (), 0.02)
-        return decided(law, OWN, (), 0.02).P_set
+        start_law(law, OWN)
+        decide(law, OWN, (), 0.02)
+        return decide(law, OWN, (), 0.02).P_set
     finally:
         law.close()
 

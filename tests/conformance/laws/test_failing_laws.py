@@ -1,4 +1,4 @@
-"""A law that fails is named, its agent stands still, and the run goes on; one that cannot work is refused before."""
+"""A law that fails is named, its agent is idle, and the run continues; one that cannot work is refused before."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) ->
     told = result.events[result.events["kind"] == "law"]
 
     assert list(told["subject"]) == [f"inv{i}" for i in range(1, 10)]
-    assert all(re.search(f"law {BAD}:Failing: {said}; its agent stands still", text) for text in told["text"]), told
+    assert all(re.search(f"law {BAD}:Failing: {said}; its agent is idle", text) for text in told["text"]), told
     assert result.history.index[-1] == 1.5
     assert 59.0 < result.history["inv1"]["f"].iloc[-1] < 60.0
 
