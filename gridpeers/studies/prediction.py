@@ -12,25 +12,21 @@ from agents.carriers.law_check import PAPER
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from plant.equipment import Feeder
-from scenarios.predict.closed_form import DelayKind, delay_limit_closed, modes
-from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from scenarios.predict.load_steps import IslandStep, LoadError, load_steps
+from scenarios.predict.case_prediction import CasePrediction, predict_cases
+from scenarios.predict.closed_form import DelayKind
+from scenarios.predict.load_steps import LoadError
 from scenarios.predict.prediction_table import case_text
-from scenarios.predict.times import predicted_times
-from scenarios.predict.var_response import VarResponse, var_response
 from scenarios.run import BrokenRunError
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
-from scenarios.schema.netem_tables import is_calm, netem_of
 from scenarios.schema.plugin_keys import law_of
 
-_LIMITS: dict[str, DelayKind] = {
-    "agent to agent": "neighbours",
-    "agent to agent, own value as late": "disagreement",
-    "plant to agent or back": "local loop",
+_LIMITS: dict[DelayKind, str] = {
+    "neighbours": "agent to agent",
+    "disagreement": "agent to agent, own value as late",
+    "local loop": "plant to agent or back",
 }
-"""Delays whose limit is known, and their names in `scenarios.predict`."""
+"""Names of the delays whose limit is known."""
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
@@ -65,47 +61,19 @@ def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> 
             for case, name in others.items()
         )
     try:
-        steps = load_steps(spec, feeder)
-        plant = var_response(spec, feeder) if voltage else None
+        cases = predict_cases(spec, feeder, voltage=voltage)
     except LoadError as error:
         raise BrokenRunError(f"{spec.name}: {error}") from error
-    found = {}
-    for name, rule in spec.cases.items():
-        islands = [
-            (step, inverter_group_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps
-        ]
-        title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
-        if not is_calm(netem_of(spec, name)):
-            title += "; without its faults of links and nodes, which these numbers leave out"
-        found[name] = Prediction(title, inverter_group_of(spec, feeder, name), islands, plant)
-    return found
+    return {name: Prediction(case) for name, case in cases.items()}
 
 
 class Prediction:
-    """Predictions by theory of one case; made by `gridpeers.predict`.
+    """Predictions by theory of one case; made by `gridpeers.predict`."""
 
-    Parameters
-    ----------
-    title : str
-        Scenario and case.
-    inverters : InverterGroup
-        The inverters at the start, and who listens to whom.
-    islands : list of (IslandStep, InverterGroup)
-        Islands after each event.
-    plant : VarResponse or None
-        How voltage and vars answer; None leaves them out.
-    """
-
-    def __init__(
-        self,
-        title: str,
-        inverters: InverterGroup,
-        islands: list[tuple[IslandStep, InverterGroup]],
-        plant: VarResponse | None,
-    ) -> None:
-        self.title = title
+    def __init__(self, case: CasePrediction) -> None:
+        self._case = case
+        self.title = case.title
         """Scenario and case."""
-        self._inverters, self._islands, self._plant = inverters, islands, plant
 
     @cached_property
     def modes(self) -> pd.Series:
@@ -113,7 +81,7 @@ class Prediction:
 
         Empty where nobody runs a secondary law.
         """
-        found = asdict(modes(self._inverters)) if self._acts else {}
+        found = asdict(self._case.modes) if self._case.has_law else {}
         return pd.Series(found, name=self.title, dtype=float)
 
     @cached_property
@@ -122,14 +90,8 @@ class Prediction:
 
         Infinite: any delay; nan: unstable without one.
         """
-        kinds = _LIMITS if self._acts else {}
-        rows = {
-            words: {
-                "continuous": delay_limit_closed(self._inverters, kind),
-                "discrete": delay_limit(self._inverters, kind),
-            }
-            for words, kind in kinds.items()
-        }
+        limits = self._case.delay_limits if self._case.has_law else {}
+        rows = {_LIMITS[kind]: pair for kind, pair in limits.items()}
         frame = pd.DataFrame.from_dict(rows, orient="index", columns=["continuous", "discrete"], dtype=float)
         frame.attrs["units"] = {"continuous": "s", "discrete": "s"}
         return frame.rename_axis("delay")
@@ -141,31 +103,27 @@ class Prediction:
         Columns: `restore_s` (abs(f - f_nom) < 0.01 Hz for good), `share_s` (MPSI < 0.01 for good), `t_restore_s`
         (both), nan where that never comes; `stable`; `note`.
         """
-        rows = []
-        for step, island in self._islands:
-            row: dict[str, object] = {"window": step.label, "island": ", ".join(step.members)}
-            if step.load is None or not island.GFM.any() or not self._acts:
-                why = "there is no secondary law" if island.GFM.any() else "no grid-forming inverter: it is dead"
-                row |= {"stable": False, "note": why if step.load else "islands join, which is not predicted"}
-            else:
-                found = predicted_times(island, load=step.load)
-                row |= {"restore_s": found.restore_s, "share_s": found.share_s, "t_restore_s": found.report_s}
-                row |= {"stable": found.stable, "note": found.note}
-            rows.append(row)
-        columns = ["window", "island", "restore_s", "share_s", "t_restore_s", "stable", "note"]
-        frame = pd.DataFrame(rows, columns=columns).set_index(["window", "island"])
         numbers = ["restore_s", "share_s", "t_restore_s"]
-        frame[numbers] = frame[numbers].astype(float)
+        rows = [
+            (
+                step.label,
+                ", ".join(step.members),
+                times.restore_s,
+                times.share_s,
+                times.report_s,
+                times.stable,
+                times.note,
+            )
+            for (step, _), times in zip(self._case.islands, self._case.times, strict=True)
+        ]
+        frame = pd.DataFrame(rows, columns=["window", "island", *numbers, "stable", "note"])
+        frame = frame.set_index(["window", "island"]).astype(dict.fromkeys(numbers, float))
         frame.attrs["units"] = dict.fromkeys(numbers, "s")
         return frame
 
-    @property
-    def _acts(self) -> bool:
-        return bool(self._inverters.acts.any())
-
     def __str__(self) -> str:
         """Return the text that the command `gridpeers predict` prints."""
-        return case_text(self.title, self._inverters, self._islands, self._plant)
+        return case_text(self._case)
 
     def __repr__(self) -> str:
         return f"<Prediction {self.title}>"

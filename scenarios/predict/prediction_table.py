@@ -6,22 +6,13 @@ import math
 import textwrap
 from collections.abc import Sequence
 
-from scenarios.predict.closed_form import (
-    SETTLING,
-    DelayKind,
-    Modes,
-    delay_limit_closed,
-    equivalent_delay,
-    groups,
-    modes,
-    settling_in_ticks,
-)
-from scenarios.predict.delay_limits import delay_limit
+from scenarios.predict.case_prediction import CasePrediction
+from scenarios.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop
 from scenarios.predict.load_steps import IslandStep
-from scenarios.predict.times import Times, predicted_times
-from scenarios.predict.var_response import VarResponse, var_delay_limit, var_spectral_radius
+from scenarios.predict.times import Times
+from scenarios.predict.var_response import var_delay_limit, var_spectral_radius
 
 WIDTH = 100
 """Columns."""
@@ -30,42 +21,25 @@ TextRow = tuple[str, str, str, str]
 """Quantity, by the continuous law, by ours in discrete time, meaning."""
 
 
-def case_text(
-    title: str, inverters: InverterGroup, steps: Sequence[tuple[IslandStep, InverterGroup]], plant: VarResponse | None
-) -> str:
-    """Return everything that is predicted of one case.
-
-    Parameters
-    ----------
-    title : str
-        Heads the table.
-    inverters : InverterGroup
-        Everybody on the network at the start.
-    steps : sequence of (IslandStep, InverterGroup)
-        Islands after each event, and the inverters in them.
-    plant : VarResponse, optional
-        For voltage and vars.
-    """
-    if not inverters.acts.any():
+def case_text(case: CasePrediction) -> str:
+    """Return all predictions of one case."""
+    if not case.has_law:
         words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
-        return "\n".join([title, *_wrapped(words, "  ")])
-    found = modes(inverters)
-    lines = [title, *_wrapped(_words(inverters, found), "  ")]
-    lines += _aligned([("", "continuous", "our law", ""), *_rows(inverters, found)])
-    for step, island in steps:
-        lines += _event(step, island, whole=set(step.members) == set(step.roster))
-    lines += _vars(inverters, plant)
+        return "\n".join([case.title, *_wrapped(words, "  ")])
+    lines = [case.title, *_wrapped(_words(case), "  ")]
+    lines += _aligned([("", "continuous", "our law", ""), *_rows(case)])
+    for (step, island), times in zip(case.islands, case.times, strict=True):
+        lines += _wrapped(f"{_event(step)}: {_sentence(step, island, times)}", "  ")
+    lines += _wrapped(f"Voltage and vars: {_vars(case)}.", "  ")
     return "\n".join(lines)
 
 
-def _words(inverters: InverterGroup, found: Modes) -> str:
-    apart, leaders = (
-        groups(inverters),
-        [name for name, leads in zip(inverters.names, inverters.leads, strict=True) if leads],
-    )
+def _words(case: CasePrediction) -> str:
+    inverters, apart = case.inverters, groups(case.inverters)
+    leaders = [name for name, leads in zip(inverters.names, inverters.leads, strict=True) if leads]
     acting = int(inverters.acts.sum())
     text = f"{acting} of {inverters.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
-    text += f"kappa {found.kappa:.3g} 1/s; T_c {inverters.T_c:g} s. "
+    text += f"kappa {case.modes.kappa:.3g} 1/s; T_c {inverters.T_c:g} s. "
     if not leaders:
         text += "Nobody leads, so nobody corrects the frequency. "
     if len(apart) > 1:
@@ -78,12 +52,14 @@ def _words(inverters: InverterGroup, found: Modes) -> str:
     return text.rstrip()
 
 
-def _rows(inverters: InverterGroup, found: Modes) -> list[TextRow]:
-    loop = Loop(inverters=inverters)
+def _rows(case: CasePrediction) -> list[TextRow]:
+    inverters, found, loop = case.inverters, case.modes, Loop(inverters=case.inverters)
     slowest = settling_in_ticks(loop.spectral_radius, inverters.T_c) if loop.stable else math.inf
-    kinds: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
-    limits = {kind: delay_limit(inverters, kind) for kind in kinds}
-    closed = {kind: delay_limit_closed(inverters, kind) for kind in kinds}
+
+    def limits(kind: DelayKind) -> tuple[str, str]:
+        continuous, discrete = case.delay_limits[kind]
+        return _s(continuous, "any"), _limit(discrete)
+
     return [
         ("links", f"{found.links}", "", "undirected, among those that run the law"),
         ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
@@ -94,65 +70,48 @@ def _rows(inverters: InverterGroup, found: Modes) -> list[TextRow]:
         ("2 % settling", _s(found.frequency_settling_s, "never"), _s(slowest, "never"), "four time constants of it"),
         ("sharing 2 %", _s(found.sharing_settling_s, "never"), "", "the same of the sharing mode"),
         ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
-        (
-            "delay: links",
-            _s(closed["neighbours"], "any"),
-            _limit(limits["neighbours"]),
-            "agent to agent, own value fresh",
-        ),
-        (
-            "delay: both",
-            _s(closed["disagreement"], "any"),
-            _limit(limits["disagreement"]),
-            "own value as late as neighbours'",
-        ),
-        (
-            "delay: plant",
-            _s(closed["local loop"], "any"),
-            _limit(limits["local loop"]),
-            "f as measured, or P_set, late",
-        ),
+        ("delay: links", *limits("neighbours"), "agent to agent, own value fresh"),
+        ("delay: both", *limits("disagreement"), "own value as late as neighbours'"),
+        ("delay: plant", *limits("local loop"), "f as measured, or P_set, late"),
         ("loss 50 %", "", _s(equivalent_delay(inverters.T_c, 0.5), ""), "held: as so much more delay on the links"),
         ("loss 90 %", "", _s(equivalent_delay(inverters.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
     ]
 
 
-def _event(step: IslandStep, island: InverterGroup, *, whole: bool) -> list[str]:
-    where = "" if whole else f" ({', '.join(step.members)})"
-    head = f"  {step.label} at {step.t_s:g} s{where}"
-    if not island.GFM.any():
-        return _wrapped(f"{head.strip()}: no GFM, so the island is dead", "  ")
-    if step.load is None:
-        return _wrapped(f"{head.strip()}: islands join, which is not predicted", "  ")
-    load = f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings"
-    return _wrapped(f"{head.strip()}: {load}: {_sentence(predicted_times(island, load=step.load))}", "  ")
+def _event(step: IslandStep) -> str:
+    where = "" if set(step.members) == set(step.roster) else f" ({', '.join(step.members)})"
+    return f"{step.label} at {step.t_s:g} s{where}"
 
 
-def _sentence(times: Times) -> str:
+def _sentence(step: IslandStep, island: InverterGroup, times: Times) -> str:
+    if step.load is None or not island.GFM.any():
+        return times.note
     if times.report_s is not None:
-        return (
+        text = (
             f"restored in {times.report_s:.2f} s (abs(f - f_nom) < 0.01 Hz for good in {times.restore_s:.2f} s, "
             f"MPSI < 0.01 in {times.share_s:.2f} s)"
         )
-    if times.restore_s is not None:
-        return f"frequency back in {times.restore_s:.2f} s, equal power never: {times.note}"
-    return f"not restored: {times.note}"
+    elif times.restore_s is not None:
+        text = f"frequency back in {times.restore_s:.2f} s, equal power never: {times.note}"
+    else:
+        text = f"not restored: {times.note}"
+    return f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings: {text}"
 
 
-def _vars(inverters: InverterGroup, plant: VarResponse | None) -> list[str]:
+def _vars(case: CasePrediction) -> str:
+    inverters, plant = case.inverters, case.plant
     if plant is None:
-        return ["  Voltage and vars: left out by --no-vars."]
+        return "left out by --no-vars"
     if not all(name in plant.names for name in inverters.names):
-        return ["  Voltage and vars: not predicted with spare inverters."]
+        return "not predicted with spare inverters"
     radius, limit = var_spectral_radius(inverters, plant), var_delay_limit(inverters, plant)
     if radius >= 1.0:
-        text = f"unstable on a plant without lags, spectral radius {radius:.4f}"
-    else:
-        slowest = settling_in_ticks(radius, inverters.T_c)
-        text = f"slowest mode to 2 % in {slowest:.2f} s; stable up to {_limit(limit)} of delay of measurement "
-        text += "or set-point (on a plant without lags; right to about one control period)"
-        text = text.replace("up to any of delay", "with any delay up to 1 s")
-    return _wrapped(f"Voltage and vars: {text}.", "  ")
+        return f"unstable on a plant without lags, spectral radius {radius:.4f}"
+    delays = "with any delay up to 1 s" if math.isinf(limit) else f"up to {_limit(limit)} of delay"
+    return (
+        f"slowest mode to 2 % in {settling_in_ticks(radius, inverters.T_c):.2f} s; stable {delays} of measurement or "
+        "set-point (on a plant without lags; right to about one control period)"
+    )
 
 
 def _rate(rate: float) -> str:
