@@ -1,4 +1,4 @@
-"""What is changed while a run goes on, and the schedule that a run with changes amounts to."""
+"""Live changes of faults, and the schedule of faults of a run with live changes."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 Change = Fault | Heal
-"""What can be done live. A `Fault` takes precedence over what the scenario has of its kinds, until it ends."""
+"""A live change. A `Fault` takes precedence over what the scenario has of its kinds, until it ends."""
 
 
 def changed(schedule: FaultSchedule, change: Change, link: Link, microgrids: Mapping[str, str]) -> FaultSchedule:
-    """The schedule of a link after a change, the same object if the change does not concern it."""
+    """Return the schedule of a link after a change, the same object if the change is not about the link."""
     if isinstance(change, Fault):
         spans = change.spans(*link, microgrids)
         return schedule.with_spans(spans) if spans else schedule
@@ -42,7 +42,7 @@ def changed(schedule: FaultSchedule, change: Change, link: Link, microgrids: Map
 
 
 def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids: Mapping[str, str]) -> FaultSchedule:
-    """Everything about one link: the scenario's entries, and what was changed since, in that order."""
+    """Return the schedule of one link: the scenario's entries, then the changes since, in that order."""
     schedule = FaultSchedule(netem.spans(link, microgrids))
     for change in changes:
         schedule = changed(schedule, change, link, microgrids)
@@ -50,7 +50,7 @@ def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids:
 
 
 def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Netem:
-    """A scenario's entries, without a change, that do what the scenario with the changes did.
+    """Return entries that do without changes what a scenario did with its changes.
 
     Links of one receiver that fared alike share an entry. A partition becomes a cut.
     """
@@ -77,14 +77,14 @@ def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, s
 
 
 def _entry(span: Span) -> dict[str, Any]:
-    """What an entry says of one fault."""
+    """Return the key and value of an entry for one fault."""
     if isinstance(span.model, Plugin):
         return {"own": (span.model,)}
     return {"cut" if span.kind == "partition" else span.kind: span.model}
 
 
 def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
-    """Cuts and partitions as one kind, so that no two entries of a link overlap."""
+    """Return the spans with cuts and partitions as one kind, so that no two entries of a link overlap."""
     both = [span for span in spans if span.kind in ("cut", "partition")]
     rest = [span for span in spans if span.kind not in ("cut", "partition")]
     # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence

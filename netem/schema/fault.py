@@ -1,4 +1,4 @@
-"""An entry `[[link]]`: on which links, when, and what they do."""
+"""An entry `[[link]]`: the faults of some links for a time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RunTime = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, LONGES
 EndTime = Annotated[float | None, Unit("s"), After("from_s"), Plausible("a time of the run", 0.0, LONGEST_RUN)]
 
 KINDS = ("cut", "flap", "loss", "rate", "slots", "delay", "duplicate", "corrupt")
-"""What an entry may do to a link, in the order in which it is done."""
+"""Kinds of faults of an entry, in the order in which a message meets them."""
 
 
 class Span(NamedTuple):
@@ -74,7 +74,7 @@ def _written_own(plugin: Plugin) -> tuple[str, dict[str, Any]]:
 
 
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What some links do for a time. A message is judged by the entries that hold at the time it was sent."""
+    """Faults of some links for a time. A message is judged by the entries that hold at the time it was sent."""
 
     on: Annotated[str, Label("which links"), Example('"inv4 <-> inv7"')]
     """Which links, e.g. "inv4 <-> inv7"; see `netem.schema.pattern`."""
@@ -109,7 +109,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return math.inf if self.to_s is None else self.to_s
 
     def models(self) -> dict[str, Any]:
-        """What the entry does, by kind, shorthands and profile resolved, in the order of `KINDS`; then its own faults.
+        """Return the models of the entry by kind, shorthands and profile resolved, in the order of `KINDS`.
 
         Examples
         --------
@@ -131,13 +131,13 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return found | {plugin.name: plugin for plugin in self.own}
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
-        """What the entry does to one link."""
+        """Return the faults of one link."""
         if not parse(self.on).matches(src, dst, microgrids):
             return []
         return [Span(kind, self.from_s, self.end, model) for kind, model in self.models().items()]
 
     def problems(self) -> list[Problem]:
-        """Return the values that cannot be meant; `on` is judged where the names are known."""
+        """Return the problems of the values; those of `on` need the names, which `Netem` knows."""
         found = problems_of(self)
         if self.profile and self.profile not in PROFILES:
             text = f'there is no profile "{self.profile}"; {suggestion(self.profile, PROFILES, "profiles")}'

@@ -1,4 +1,4 @@
-"""All entries of a scenario about links and nodes, and everything that is wrong with them."""
+"""All entries of a scenario about links and nodes, and their problems."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wire.schema.table_schema import NO_KEY, Problem, below
 
 
 class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What the links and nodes of a run do. Every agent is told all of it, and uses what concerns the links to it."""
+    """Faults of the links and nodes of a run. Every agent gets all of them, and uses those of the links to it."""
 
     seed: Annotated[int, NO_KEY] = 1
     """Seed of everything drawn at random."""
@@ -28,7 +28,7 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Entries `[[node]]`."""
 
     def spans(self, link: Link, microgrids: Mapping[str, str]) -> tuple[Span, ...]:
-        """What all entries do to one link.
+        """Return the faults of one link by all entries.
 
         Parameters
         ----------
@@ -41,7 +41,7 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return (*found, *(span for part in self.partitions for span in part.spans(*link, microgrids)))
 
     def over(self, timeline: Sequence[tuple[float, Mapping[str, str]]]) -> Netem:
-        """The same with partitions by island resolved; see `Partition.over`."""
+        """Return the same entries with partitions by island resolved; see `Partition.over`."""
         parts = tuple(part for entry in self.partitions for part in entry.over(timeline))
         return msgspec.structs.replace(self, partitions=parts)
 
@@ -60,7 +60,7 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         end_s : float
             End of the run (s).
         noted : Collection[str], optional
-            Paths of the problems that the reader found: values that it has replaced by defaults are not judged.
+            Paths of the problems that the reader found: their values are defaults, which are not judged.
         """
         found: list[Problem] = []
         for i, fault in enumerate(self.links):
@@ -80,7 +80,7 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return found or self._contradictions(names, microgrids)
 
     def _contradictions(self, names: Sequence[str], microgrids: Mapping[str, str]) -> list[Problem]:
-        """Pairs of entries that say two things of one link at one time, each with the first such link."""
+        """Return pairs of entries that contradict each other about a link, each with the first such link."""
         found: dict[tuple[str, str], Problem] = {}
         entries = [(f"link[{i}]", entry) for i, entry in enumerate(self.links)]
         parts = [(f"partition[{i}]", entry) for i, entry in enumerate(self.partitions)]
@@ -119,7 +119,7 @@ def _overlap(from_s: float, to_s: float | None, other_from_s: float, other_to_s:
 
 
 def _contradict(one: Span, other: Span) -> bool:
-    """Whether two faults of a link cannot both be meant: two of one kind, or a cut that keeps and one that loses."""
+    """Return whether two faults contradict each other: two of one kind, or a cut that keeps messages and one that loses them."""
     if not _overlap(one.from_s, one.to_s, other.from_s, other.to_s):
         return False
     if "partition" in (one.kind, other.kind):

@@ -1,4 +1,4 @@
-"""An entry `[[node]]`: what befalls one agent's process, clock or computer."""
+"""An entry `[[node]]`: faults of one agent's process, clock or computer."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Skew(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What befalls the agent of one inverter."""
+    """Faults of the agent of one inverter."""
 
     name: Annotated[str, Example('"inv3"')]
     """The inverter."""
@@ -40,14 +40,14 @@ class NodeFault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     kill: bool = False
     """Whether its process ends at from_s, without a word and for good."""
     pause: bool = False
-    """Whether its process stands still from from_s to to_s; what it is sent waits."""
+    """Whether its process stands still from from_s to to_s; messages to it wait."""
     slow_s: Annotated[float, Unit("s"), Plausible("a computing delay", 0.0, LONGEST_DELAY)] = 0.0
     """By how much longer it computes each tick (s), its state being sent that much later."""
     skew: Skew | None = None
     """How wrong its clock is."""
 
     def problems(self, names: Sequence[str] | None) -> list[Problem]:
-        """Return the values that cannot be meant; without names of agents any may be one."""
+        """Return the problems of the values; without names of agents any name may be one."""
         found = problems_of(self)
         if names is not None and self.name not in names:
             found.append(Problem("name", f'no agent "{self.name}"; {suggestion(self.name, names, "agents")}'))

@@ -1,4 +1,4 @@
-"""An entry `[[partition]]`: groups of agents that do not hear each other for a time."""
+"""An entry `[[partition]]`: groups of agents without links to each other for a time."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _REST = "the rest"
 
 
 class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Cuts, both ways, every link between two groups. Who is in no group belongs to one more group, of the rest.
+    """Cuts, both ways, every link between two groups. Agents in no group form one more group.
 
-    The plant is cut off from nobody unless a group names it.
+    The plant keeps all its links unless a group names it.
     """
 
     groups: Annotated[tuple[tuple[str, ...], ...], Example('[["inv1", "inv2"], ["MG2"]]')] = ()
@@ -40,7 +40,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
 
     def group(self, name: str, microgrids: Mapping[str, str]) -> str | None:
-        """In which group somebody is; None for the plant, unless a group names it.
+        """Return the group of an agent; None for the plant, unless a group names it.
 
         Parameters
         ----------
@@ -65,14 +65,14 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return _REST
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
-        """What the partition does to one link."""
+        """Return the cut of one link, if it joins two groups."""
         one, other = self.group(src, microgrids), self.group(dst, microgrids)
         if one is None or other is None or one == other:
             return []
         return [Span("partition", self.from_s, math.inf if self.to_s is None else self.to_s, Cut(hold=self.hold))]
 
     def over(self, timeline: Sequence[tuple[float, Mapping[str, str]]]) -> tuple[Partition, ...]:
-        """By island, the partitions of listed groups that this one amounts to; any other is what it is.
+        """Return the partitions of listed groups that do the same as this one by island; any other unchanged.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return tuple(found)
 
     def problems(self, names: Sequence[str] | None, microgrids: Mapping[str, str]) -> list[Problem]:
-        """Return values that cannot be meant, names that nobody has, and that the partition parts nobody.
+        """Return the problems of the values: unknown names, and groups that part no two agents.
 
         Without names of agents any may be one.
         """

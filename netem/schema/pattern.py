@@ -1,4 +1,4 @@
-"""Which links an entry is about: `"inv4 <-> inv7"`, `"MG1 -> MG2"`, `"* -> inv2"`, `"plant -> inv2"`."""
+"""The links of an entry: `"inv4 <-> inv7"`, `"MG1 -> MG2"`, `"* -> inv2"`, `"plant -> inv2"`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Link(NamedTuple):
     """A directed link; the plant is an end as the agents are."""
 
     src: str
-    """Who sends."""
+    """The sender."""
     dst: str
-    """Who receives, and judges."""
+    """The receiver, which judges the message."""
 
     def __str__(self) -> str:
         return f"{self.src} -> {self.dst}"
@@ -35,7 +35,7 @@ class Side(NamedTuple):
     """Inverters, microgrids, "plant" or "*"."""
 
     def holds(self, name: str, microgrids: Mapping[str, str]) -> bool:
-        """Whether somebody stands on this side."""
+        """Return whether an agent, or the plant, is on this side."""
         if name in self.names or (ANY in self.names and name != PLANT):
             return True
         microgrid = microgrids.get(name)
@@ -51,7 +51,7 @@ class Pattern(NamedTuple):
     """Whether it also means the links back."""
 
     def matches(self, src: str, dst: str, microgrids: Mapping[str, str]) -> bool:
-        """Whether it means the link from `src` to `dst`; `microgrids` says in which microgrid an inverter stands."""
+        """Return whether it means the link from `src` to `dst`, given the microgrid of every inverter."""
         if src == dst:
             return False
         if self.left.holds(src, microgrids) and self.right.holds(dst, microgrids):
@@ -95,7 +95,7 @@ def _side(text: str, whole: str) -> Side:
 
 
 def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, str]) -> list[str]:
-    """All that is wrong with a pattern: it is none, it names somebody unknown, or it means no link at all.
+    """Return the problems of a pattern: wrong form, unknown names, or no link at all.
 
     Parameters
     ----------
@@ -140,6 +140,6 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
 
 
 def links_among(names: Iterable[str]) -> list[Link]:
-    """Every directed link among inverters and between each and the plant."""
+    """Return every directed link among inverters, and between each and the plant."""
     ends = [*names, PLANT]
     return [Link(src, dst) for src in ends for dst in ends if src != dst]

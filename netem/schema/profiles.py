@@ -1,6 +1,6 @@
-"""Links as they are found: named profiles, each with its source, or the plain word that it is assumed.
+"""Profiles of real links by name, each with its source, or the plain word that it is assumed.
 
-A profile is a starting point, not a measurement of anybody's network: what is not given by physics, a standard or a
+A profile is a starting point, not a measurement of a network: a number that is not from physics, a standard or a
 published requirement is marked as assumed. Delays are one way, for messages of some 100 bytes.
 """
 
@@ -14,7 +14,7 @@ from netem.models.medium import Rate, Slots
 
 
 class Profile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a kind of link does."""
+    """Faults of a kind of link."""
 
     title: str
     """A few words."""

@@ -22,7 +22,7 @@ MOST_ROWS = 20
 
 
 def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
-    """Delays (s) of a CSV file with a column `delay_s`, one message a row; and what is wrong with it, row by row."""
+    """Return the delays (s) of a CSV file with a column `delay_s`, one message a row, and its problems by row."""
     try:
         if path.exists() and not path.is_file():  # a device or a pipe may never end
             return (), [f"{path}: cannot be read: it is no file"]
@@ -67,7 +67,7 @@ def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
 
 
 def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Problem]]:
-    """The same with the delays of every trace read, and what is wrong with the files.
+    """Return the same with the delays of every trace, and the problems of the files.
 
     Parameters
     ----------

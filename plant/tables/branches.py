@@ -32,7 +32,7 @@ def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
     last_row: dict[str, CsvRow[LineConfigColumns]] = {}
     mistaken: dict[str, bool] = {}
-    spoiled: set[str] = set()  # an element stands nobody knows where, so none can be called missing
+    spoiled: set[str] = set()  # an element's place is unknown, so none can be called missing
     table = CsvTable(folder, "line_configs.csv", LineConfigColumns, problems, required=True)
     for row in table:
         it, misplaced = row.columns, not row.wrong.isdisjoint(("config", "phase_1", "phase_2"))

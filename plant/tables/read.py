@@ -1,4 +1,4 @@
-"""From a feeder's folder to a checked `Feeder`; everything that is wrong with it is told at once."""
+"""From a feeder's folder to a checked `Feeder`; all of its problems come at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scenario file: its types, its reading with every problem at once, and what it starts processes with."""
+"""The scenario file: its types, its reading with every problem at once, and the configurations of a run's processes."""
 
 from scenarios.schema.loading import catalogue, find_scenario, load_scenario
 from scenarios.schema.scenario_errors import ScenarioError

@@ -23,7 +23,7 @@ LONGEST_CLEARING_TIME = 3600.0
 """Longest clearing time (s)."""
 
 _LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max", "i_max", "P_set_lim", "P_min")}
-"""Parameters by kind of inverter that limit a set-point of P, the first broken one of which is told."""
+"""Parameters by kind of inverter that limit a set-point of P; the first broken one is noted."""
 
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """What a run folder holds beside the folders of the cases."""

@@ -44,7 +44,7 @@ def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
 
 def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
     """Return from when on (s) each inverter stands in which island."""
-    from plant.network import Network  # scipy: only for who parts by island
+    from plant.network import Network  # scipy: only for partitions by island
 
     network = Network(feeder)
     closed = set(network.closed0)
@@ -104,7 +104,7 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
 
 
 def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
-    """Return what a run asks of an entry beyond what it says by itself."""
+    """Return where an entry does not suit the ticks and the clock of a run."""
     found = []
     ticks = node.from_s / T_c
     if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):

@@ -1,4 +1,4 @@
-"""Who takes part in a run: its inverters, which of them have an agent, and when agents leave and join."""
+"""The participants of a run: its inverters, which of them have an agent, and when agents leave and join."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scenarios.schema.time_checks import multiple
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
-    """Inverters of a scenario: the feeder's, and those of its spare ones that join, in the table's order."""
+    """Return the inverters of a scenario: the feeder's, and those of its spare ones that join, in the table's order."""
     joining = {name for event in scenario.events for name in event.join}
     return (*feeder.inverters, *(row for row in feeder.spares if row.name in joining))
 
 
 def schedule_of(scenario: ScenarioModel) -> tuple[ScheduledAction, ...]:
-    """Everybody who leaves and joins, in the order of time."""
+    """Return the agents that leave and join, in the order of time."""
     actions = []
     for event in scenario.events:
         actions += [ScheduledAction(t=event.t_s, inverter=name, action="leave") for name in event.leave]
@@ -27,12 +27,12 @@ def schedule_of(scenario: ScenarioModel) -> tuple[ScheduledAction, ...]:
 
 
 def without_agent(scenario: ScenarioModel, case: str) -> frozenset[str]:
-    """Names of the inverters that have no agent in a case: those of the whole scenario and the case's own."""
+    """Return the names of the inverters without an agent in a case: the scenario's and the case's own."""
     return frozenset((*scenario.without_agent, *scenario.cases[case].without_agent))
 
 
 def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
-    """Inverters that have an agent in a case, those that join later last, in the table's order.
+    """Return the inverters that have an agent in a case, those that join later last, in the table's order.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[Inve
 
 
 def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Who leaves is there then, who joins is not, and both do so at a tick."""
+    """Note agents that leave while absent or join while present, and times that are no ticks."""
     present = {row.name for row in feeder.inverters}
     known = (*(row.name for row in feeder.inverters), *(row.name for row in feeder.spares))
     for i, event in enumerate(scenario.events):
@@ -92,7 +92,7 @@ def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems)
             problems.add(where, f'event "{moved[name]}" lets the agent of {name} leave or join, so it must have one')
         for node in (*scenario.netem.nodes, *rule.netem.nodes):
             if node.name in without:
-                problems.add(where, f"an entry [[node]] befalls the agent of {node.name}, so it must have one")
+                problems.add(where, f"an entry [[node]] is about the agent of {node.name}, so it must have one")
         _check_secondary(f"{path}.secondary", rule.secondary, names, without, problems)
 
 

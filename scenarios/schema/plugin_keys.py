@@ -231,7 +231,7 @@ def _check_law(path: str, key: PluginKey, problems: Problems) -> None:
 
 
 def _check(path: str, key: PluginKey, registry: Registry[Any], problems: Problems) -> Plugin | None:
-    """Note what is wrong with a key and with what it names; return the plugin if nothing is."""
+    """Note the problems of a key and of its plugin; return the plugin if there are none."""
     table = table_of(key)
     found: list[tuple[str, str]] = []
     for name in ("use", "folder"):

@@ -61,7 +61,7 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table `[plant.inverter.NAME]`: what one inverter is otherwise than in the feeder's table.
+    """A table `[plant.inverter.NAME]`: changes of one inverter of the feeder's table.
 
     It is taken as it stands: the factors of `[plant]` do not act on it.
     """
@@ -97,7 +97,7 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     m_q_factor: Annotated[float, Plausible("a factor on droops", 0.01, 100.0)] = 1.0
     """Factor on the Q-V droops of all inverters."""
     inverter: dict[str, InverterTable] = {}
-    """Tables `[plant.inverter.NAME]`: what single inverters are otherwise than in the feeder's table."""
+    """Tables `[plant.inverter.NAME]`: changes of single inverters of the feeder's table."""
     gfm: GfmParameters = GfmParameters()
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
     gfl: GflParameters = GflParameters()
@@ -187,7 +187,7 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Claims of your own that the run is judged by: ["mine:restored"] (`gridpeers doc claims`)."""
     without_agent: Annotated[tuple[str, ...], Example('["inv2"]')] = ()
     """Inverters that have no agent, in every case, e.g. ["inv2"]: the plant runs them on primary droop at their first
-    set-points, nobody hears of them, and the sharing indices leave them out."""
+    set-points, other agents do not hear of them, and the sharing indices leave them out."""
     time: Time
     """Table `[time]`."""
     plant: PlantTable = PlantTable()

@@ -77,7 +77,7 @@ def _states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_State]:
     source = (feeder.source.bus, "A") if feeder.source else None
     before: frozenset[Node] = frozenset()
     for event in (None, *scenario.events):
-        if event is not None:  # names that there are not are told elsewhere
+        if event is not None:  # `check_switches` notes unknown names
             closed = closed - {names.get(name, "") for name in event.open}
             closed = closed | {names[name] for name in event.close if name in names}
             present = (present - set(event.leave)) | set(event.join)

@@ -1,11 +1,11 @@
-"""Code of anybody's that gridpeers calls: what it may raise, and how that is told. Pure."""
+"""Foreign code that gridpeers calls: its exceptions, and their text on one line. Pure."""
 
 from __future__ import annotations
 
 from wire.printable import printable
 
 ANYTHING = (Exception, SystemExit, GeneratorExit)
-"""What anybody's code may raise; only who presses Ctrl+C ends the run."""
+"""Exceptions of foreign code; only Ctrl+C ends the run."""
 
 
 def named(error: BaseException) -> str:

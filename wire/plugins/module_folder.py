@@ -20,7 +20,7 @@ def folder_of(reference: str, folder: str) -> str:
     'here'
     """
     top = reference.partition(":")[0].partition(".")[0]
-    if is_no_path(folder) or is_no_path(f"{top}.py"):  # a problem, which is told where the key is checked
+    if is_no_path(folder) or is_no_path(f"{top}.py"):  # a problem, which the check of the key notes
         return folder
     beside = Path(folder)
     if (beside / f"{top}.py").is_file() or (beside / top).is_dir() or top == NOTEBOOK:

@@ -103,7 +103,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
         it = found()
         for name, value in values.items():
             setattr(it, name, value)
-    except ANYTHING as error:  # its __init__ is anybody's code
+    except ANYTHING as error:  # its __init__ is foreign code
         text = printable(str(error), 300) if type(error) is ValueError else named(error)
         raise PluginError(f"{plugin.name} cannot be made: {text}") from error
     return it
@@ -132,9 +132,9 @@ def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...]
     it : Any
         What somebody has written.
     base : type
-        What it is derived from; `gridpeers` has it under its name.
+        Its base class; `gridpeers` has it under its name.
     method : str
-        What it must define.
+        The method that it must define.
     arguments : tuple[str, ...]
         Arguments of the method, without self.
     keys : tuple[str, ...], optional

@@ -248,7 +248,7 @@ def _fallback(field: Field) -> Any:
 
 
 def _placeholder(kind: Any) -> Any:
-    """Return something of a type; nobody sees it."""
+    """Return a value of a type in place of a missing one."""
     kind = kinds_of(kind)[0]
     if get_origin(kind) is Literal:
         return get_args(kind)[0]

@@ -109,7 +109,7 @@ def test_an_inverter_without_agent_is_in_the_plant_and_nowhere_else(tmp_path: Pa
         (
             '"all"',
             '"all"\nwithout_agent = ["inv2"]\n[[case.IV.node]]\nname = "inv2"\nslow_s = 0.01',
-            "case.IV.without_agent: an entry [[node]] befalls the agent of inv2, so it must have one",
+            "case.IV.without_agent: an entry [[node]] is about the agent of inv2, so it must have one",
         ),
         (
             '"all"',
