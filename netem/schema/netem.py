@@ -119,7 +119,7 @@ def _overlap(from_s: float, to_s: float | None, other_from_s: float, other_to_s:
 
 
 def _contradict(one: Span, other: Span) -> bool:
-    """Return whether two faults contradict each other: two of one kind, or a cut that keeps messages and one that loses them."""
+    """Return whether two faults contradict each other: two of one kind, or a cut with `hold` and one without."""
     if not _overlap(one.from_s, one.to_s, other.from_s, other.to_s):
         return False
     if "partition" in (one.kind, other.kind):
