@@ -44,13 +44,14 @@ class Flow:
         self,
         link: RelayedLink,
         line: Line,
-        forward: Callable[[bytes], None],
+        forward: Callable[[list[bytes]], None],
         after_look: Callable[[], None] = lambda: None,
     ) -> None:
         self.line, self._link, self._forward, self._after_look = line, link, forward, after_look
         self._counts = line.direction.counts
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
+        self.is_closed = False
         self.is_blocked = False
         """Whether the receiver takes nothing for now."""
         self.last = self._loop.time()
@@ -60,8 +61,9 @@ class Flow:
     def put(self, data: bytes) -> None:
         """Take data in."""
         self.last = self._loop.time()
-        self.line.send(data, self.last)
-        self.look()
+        if not self.is_closed:
+            self.line.send(data, self.last)
+            self.look()
 
     def unblock(self) -> None:
         """Let the receiver take data again."""
@@ -70,26 +72,29 @@ class Flow:
 
     def look(self) -> None:
         """Forward what has arrived, and plan the next look."""
+        if self.is_closed:
+            return
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         link, now = self._link, self._loop.time()
-        if link.stalled_until <= now and not self.is_blocked:
-            for data in self.line.take(now):
-                if link.is_cut:
-                    self._counts.cut += 1
-                else:
-                    self._forward(data)
-                    self._counts.forwarded += 1
+        if link.stalled_until <= now and not self.is_blocked and (arrived := self.line.take(now)):
+            if link.is_cut:
+                self._counts.cut += len(arrived)
+            else:
+                self._counts.forwarded += len(arrived)
+                self._forward(arrived)
         until = max(link.stalled_until, self.line.until)
-        if until < NEVER and not self.is_blocked:
+        if until < NEVER and not self.is_blocked and not self.is_closed:
             self._timer = self._loop.call_at(until, self.look)
         self._after_look()
 
     def close(self) -> None:
         """End; data on the way are lost."""
-        if self.look in self._link.listeners:
-            self._link.listeners.remove(self.look)
-            self._counts.cut += len(self.line)
+        if self.is_closed:
+            return
+        self.is_closed = True
+        self._link.listeners.remove(self.look)
+        self._counts.cut += len(self.line)
         if self._timer is not None:
             self._timer.cancel()

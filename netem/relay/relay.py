@@ -133,7 +133,7 @@ class Relay:
                 self._relay.cut()
             case ["heal"]:
                 link.is_cut, link.stalled_until, answer = False, -NEVER, "healed"
-                await self._relay.heal()
+                self._relay.heal()
             case _:
                 answer = self._set_faults(*new_faults(line))
         link.changed()

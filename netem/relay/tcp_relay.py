@@ -33,10 +33,10 @@ class _End(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = cast("asyncio.Transport", transport)
-        if self._relay.admit(self):
-            self.resume_writing()
+        if self.flow.is_closed:  # ended meanwhile
+            self.close(reset=True)
         else:
-            self._relay.end(self, reset=True)
+            self.resume_writing()
 
     def data_received(self, data: bytes) -> None:
         for start in range(0, len(data), SIZE):
@@ -69,9 +69,10 @@ class _End(asyncio.Protocol):
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER)
             self.transport.abort()
 
-    def _forward(self, data: bytes) -> None:
+    def _forward(self, segments: list[bytes]) -> None:
         assert self.other.transport is not None
-        self.other.transport.write(data)
+        if not self.other.transport.is_closing():  # else it ends in this turn of the loop
+            self.other.transport.writelines(segments)
 
     def _after_look(self) -> None:
         """Read on only if there is room; after the last byte, end the other end too."""
@@ -81,7 +82,10 @@ class _End(asyncio.Protocol):
             (self.transport.resume_reading if self.flow.line.has_room else self.transport.pause_reading)()
         elif not self.flow.line and not self.is_done:
             self.is_done = True
-            self.other.transport.write_eof()
+            try:
+                self.other.transport.write_eof()
+            except OSError:  # that end has gone
+                self._relay.end(self, reset=True)
             if self.other.is_done:
                 self._relay.end(self, reset=False)
 
@@ -93,16 +97,24 @@ class TcpRelay:
 
     def __init__(self, link: RelayedLink, near: socket.socket, target: tuple[int, tuple[Any, ...]]) -> None:
         self.link, self._near, self._target = link, near, target
-        self._server: asyncio.Server | None = None
-        self._connections: dict[_End, asyncio.Task[None]] = {}
-        """Near ends of all connections, with the tasks that connect their far ends."""
+        self._is_listening = False
+        self._connections: set[_End] = set()
+        """The near ends."""
+        self._tasks: set[asyncio.Task[None]] = set()
 
     def __len__(self) -> int:
         return len(self._connections)
 
     async def start(self) -> None:
-        """Accept connections."""
-        self._server = await asyncio.get_running_loop().create_server(self._accepted, sock=self._near)
+        """Begin."""
+        self._listen()
+
+    def _listen(self) -> None:
+        # not by asyncio's own server, which forgets a connection that comes at the moment at which it is closed
+        self._near.listen()
+        self._near.setblocking(False)
+        asyncio.get_running_loop().add_reader(self._near, self._accept)
+        self._is_listening = True
 
     def reset(self) -> None:
         """Close all connections with RST."""
@@ -118,42 +130,43 @@ class TcpRelay:
         self._near.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self._near.bind(address)
 
-    async def heal(self) -> None:
+    def heal(self) -> None:
         """Accept again."""
-        if self._server is None:
-            await self.start()
+        if not self._is_listening:
+            self._listen()
 
     def close(self) -> None:
         """End."""
-        if self._server is not None:
-            self._server.close()
-            self._server = None
+        if self._is_listening:
+            asyncio.get_running_loop().remove_reader(self._near)
+            self._is_listening = False
         self._near.close()
         self.reset()
 
-    def _accepted(self) -> _End:
+    def _accept(self) -> None:
+        try:
+            sock, _ = self._near.accept()
+        except OSError:  # it has gone again
+            return
         link, name = self.link, self.link.new_connection()
         near, far = _End(self, name, link.there, link.back), _End(self, name, link.back, link.there)
         near.other, far.other = far, near
-        return near
+        self._connections.add(near)
+        task = asyncio.get_running_loop().create_task(self._connect(near, sock))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
-    def admit(self, end: _End) -> bool:
-        """Connect the far end of a new connection; return whether the relay still runs."""
-        if end.other.transport is None and self._server is not None:
-            self._connections[end] = asyncio.get_running_loop().create_task(self._connect(end))
-        return end in self._connections or end.other in self._connections
-
-    async def _connect(self, near: _End) -> None:
-        family, address = self._target
+    async def _connect(self, near: _End, sock: socket.socket) -> None:
+        loop, (family, address) = asyncio.get_running_loop(), self._target
         try:
-            await asyncio.get_running_loop().create_connection(lambda: near.other, *address[:2], family=family)
+            await loop.connect_accepted_socket(lambda: near, sock)
+            await loop.create_connection(lambda: near.other, *address[:2], family=family)
         except OSError:  # nobody listens there: the near end learns it as from the kernel
             self.end(near, reset=True)
 
     def end(self, end: _End, *, reset: bool) -> None:
         """Close both ends of a connection, and forget it when both are closed."""
-        near = end if end in self._connections else end.other
         for one in (end, end.other):
             one.close(reset=reset)
-        if end.transport is None and end.other.transport is None and near in self._connections:
-            self._connections.pop(near).cancel()
+        if end.transport is None and end.other.transport is None:
+            self._connections -= {end, end.other}

@@ -24,10 +24,10 @@ BUFFER = 4 << 20
 class _Conversation(asyncio.DatagramProtocol):
     """One sender's datagrams, and the target's answers."""
 
-    def __init__(self, link: RelayedLink, answer: Callable[[bytes], None]) -> None:
+    def __init__(self, link: RelayedLink, answer: Callable[[list[bytes]], None]) -> None:
         name = link.new_connection()
 
-        def flow(direction: Direction, forward: Callable[[bytes], None]) -> Flow:
+        def flow(direction: Direction, forward: Callable[[list[bytes]], None]) -> Flow:
             way = Datagrams(partial(Stream, link.seed, name, direction.name), direction)
             return Flow(link, Line(direction, way), forward)
 
@@ -42,9 +42,10 @@ class _Conversation(asyncio.DatagramProtocol):
     def datagram_received(self, data: bytes, address: object) -> None:
         self.back.put(data)
 
-    def _forward(self, data: bytes) -> None:
+    def _forward(self, datagrams: list[bytes]) -> None:
         assert self._far is not None
-        self._far.sendto(data)
+        for data in datagrams:
+            self._far.sendto(data)
 
     def close(self) -> None:
         self.there.close()
@@ -77,7 +78,7 @@ class UdpRelay(asyncio.DatagramProtocol):
     def cut(self) -> None:
         """Do nothing: flows drop all data while `RelayedLink.is_cut` holds."""
 
-    async def heal(self) -> None:
+    def heal(self) -> None:
         """Do nothing."""
 
     def close(self) -> None:
@@ -94,12 +95,16 @@ class UdpRelay(asyncio.DatagramProtocol):
         if address not in self._conversations:
             self._forget_idle()
             loop, (family, target) = asyncio.get_running_loop(), self._target
-            conversation = _Conversation(self._link, lambda data: self._near.sendto(data, address))
+            conversation = _Conversation(self._link, partial(self._answer, address))
             connecting = loop.create_datagram_endpoint(
                 lambda: conversation, remote_addr=cast("tuple[str, int]", target), family=family
             )
             self._conversations[address] = conversation, loop.create_task(connecting)
         self._conversations[address][0].there.put(data)
+
+    def _answer(self, address: tuple[Any, ...], datagrams: list[bytes]) -> None:
+        for data in datagrams:
+            self._near.sendto(data, address)
 
     def _forget_idle(self) -> None:
         before = asyncio.get_running_loop().time() - IDLE

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -268,3 +269,39 @@ def test_the_command_answers_every_line_with_one_and_ends_when_told(server: sock
     bad = subprocess.run([*command, "--loss", "3"], capture_output=True, text=True, timeout=60)
     assert bad.returncode == 2
     assert "did you mean 0.03 (3 %)?" in bad.stderr
+
+
+def test_connections_that_come_and_go_through_faults_all_end_and_are_accounted_for(server: socket.socket) -> None:
+    """While the relay stalls, resets, is cut and heals: whole echoes or a reset, and no connection is left."""
+
+    def echo(number: int) -> None:
+        with contextlib.suppress(OSError), closing(server.accept()[0]) as far:
+            far.settimeout(PATIENCE)
+            while data := far.recv(65536):
+                far.sendall(data)
+
+    def call(number: int) -> bool:
+        sent = bytes([number]) * 20_000
+        with contextlib.suppress(ConnectionError), dial(relay) as near:
+            near.sendall(sent)
+            near.shutdown(socket.SHUT_WR)
+            got = read(near, len(sent) + 1)
+            assert got == sent, "an end without a reset comes after all bytes"
+            return True
+        return False
+
+    faults = Faults(delay=0.002, loss=0.02, rate=1e7)
+    with (
+        Relay("tcp/127.0.0.1:0", endpoint_of(server), there=faults, back=faults) as relay,
+        ThreadPoolExecutor(6) as servers,
+        ThreadPoolExecutor(6) as clients,
+    ):
+        servers.map(echo, range(200))
+        calls = clients.map(call, range(100))
+        for line in ("stall 0.05", "reset", "cut", "heal", "delay 0.005", "reset"):
+            relay.do(line)
+        assert any(calls)
+        wait_for(relay, ": 0 connections")
+        for counts in relay.counts():
+            assert counts.came == counts.forwarded + counts.cut
+        server.shutdown(socket.SHUT_RDWR)  # ends the echoes that wait
