@@ -21,7 +21,7 @@ from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, 
 from wire import keys, messages
 from wire.schema.table_schema import fields_of
 
-DOCS = Path(__file__).parents[4] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (
     ScenarioModel,
     Time,
