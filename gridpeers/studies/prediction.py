@@ -39,7 +39,7 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
     case : str
         Its case.
     voltage : bool
-        Whether the modes of voltage and vars are wanted in the text, which takes a second or two.
+        Whether the text has the modes of voltage and vars, which take a second or two.
 
     Raises
     ------

@@ -184,5 +184,5 @@ def _chosen(columns: list[str], metrics: tuple[str, ...], plan: Plan) -> list[st
     several = {name.partition(".")[0] for name in known}
     if unknown := [name for name in metrics if name not in known and name not in several]:
         raise ScenarioError(f'metrics: no metric "{name}"; {suggestion(name, known, "metrics")}' for name in unknown)
-    wanted = {name for name in known if name in metrics or name.partition(".")[0] in metrics}
-    return head + [name for name in columns if (name.partition(".")[2] or name) in wanted and name not in head]
+    asked = {name for name in known if name in metrics or name.partition(".")[0] in metrics}
+    return head + [name for name in columns if (name.partition(".")[2] or name) in asked and name not in head]

@@ -55,10 +55,10 @@ def _by_factor(all_numbers: Sequence[ComparedNumber]) -> list[str]:
         return []
     near, _ = within(left, Cell.within_factor)
     times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
-    told = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
+    times_off = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
     far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
     return [
-        f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {told}"
+        f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {times_off}"
         f"{near} of {len(left)} within a factor of {MQSI_FACTOR.value:g}; farthest off: {far}."
     ]
 

@@ -77,7 +77,7 @@ V_RELATIVE = Bound(
     "digit: a zero passes a bound of 0.003 pu, and not this one (1)",
 )
 MQSI_FACTOR = Bound(
-    2.0, f"how many times an MQSI may be the paper's, or the paper's it, to be told as near: it {_PLACES}"
+    2.0, f"how many times an MQSI may be the paper's, or the paper's it, to count as near: it {_PLACES}"
 )
 
 WITHIN = Bound(1.0, 'the paper: "in less than 1 s" (s)')

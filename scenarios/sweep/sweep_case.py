@@ -160,7 +160,7 @@ def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
 def plant_at_start(config: PlantConfig) -> Plant:
     """Return a plant at t = 0, copied from one that this thread has built before for the same settings.
 
-    To factor the network and find the operating point is a fifth of a run, and what agents are told is no part of it.
+    To factor the network and find the operating point is a fifth of a run, and does not depend on the agents.
     A copy gives the same bytes as a new plant: a test holds it to that.
     """
     plants = _kept.plants

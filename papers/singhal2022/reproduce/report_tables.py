@@ -55,7 +55,7 @@ def tolerances(table: PaperTable) -> list[str]:
     for quantity in table.quantities:
         cell = next(cell for cell in table.cells if cell.quantity == quantity)
         value = cell.tolerance.value
-        bound = f"told by a factor of {MQSI_FACTOR.value:g} only" if value is None else f"within {value:g}"
+        bound = f"compared by a factor of {MQSI_FACTOR.value:g} only" if value is None else f"within {value:g}"
         found.append(f"{HEADINGS[quantity]}: {bound}; {cell.tolerance.reason}")
         if cell.relative is not None:
             found.append(f"{HEADINGS[quantity]}, beside its own size: {100 * V_RELATIVE.value:g} % {V_RELATIVE.reason}")

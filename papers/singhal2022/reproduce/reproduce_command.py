@@ -100,13 +100,13 @@ def _reproduce(
     except KeyboardInterrupt as error:
         set_broken(folder, "interrupted")
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
-    for line in _told(whole):
+    for line in _summary(whole):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Report: {shown(folder / 'report.html')}", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(CLAIM_FAILED if whole.failed else PASSED)
 
 
-def _told(whole: object) -> list[str]:
+def _summary(whole: object) -> list[str]:
     """Return the end in lines: every claim that does not hold, and the counts."""
     from papers.singhal2022.headline import headline
     from papers.singhal2022.reproduce.reproduction import Reproduction

@@ -83,7 +83,7 @@ def test_every_number_verdict_and_reason_is_told(tmp_path: Path, template: str) 
     for verdict in one.verdicts:
         assert verdict.status in text
     assert "within 0.02; " in text
-    assert "told by a factor of 2 only" in text
+    assert "compared by a factor of 2 only" in text
     assert "24 of the 24 numbers" in text
     assert "The other 8, all MQSI" in text
     assert "V_error beside its own size: 8 of 8" in text
