@@ -78,7 +78,7 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
     --------
     >>> from wire import bounds
     >>> dict(alias_docs(bounds))["Rating"]
-    'W: more than none, and at most a gigawatt.'
+    'Rating (W): positive, at most a gigawatt.'
     """
     body = ast.parse(inspect.getsource(module)).body
     return tuple(
