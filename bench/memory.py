@@ -20,7 +20,7 @@ from time import monotonic, sleep
 import numpy as np
 from harness import machine, options, say
 
-from scenarios.drivers.rendezvous import rendezvous
+from  import rendezvous
 
 KB = 1024.0
 FLAT = 2.0
