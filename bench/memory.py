@@ -20,7 +20,7 @@ from time import monotonic, sleep
 import numpy as np
 from harness import machine, options, say
 
-from  import rendezvous
+from scenarios.drivers.free_endpoint import free_endpoint
 
 KB = 1024.0
 FLAT = 2.0
@@ -58,7 +58,7 @@ def main() -> None:
     command = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "up", given.scenario]
     samples: dict[str, list[tuple[float, float]]] = {}
     with tempfile.TemporaryDirectory(prefix="gridpeers-memory-") as folder:
-        words = ["--run", f"memory{os.getpid()}", "--listen", rendezvous(), "--speed", str(given.speed)]
+        words = ["--run", f"memory{os.getpid()}", "--listen", free_endpoint(), "--speed", str(given.speed)]
         with (Path(folder) / "up.log").open("wb") as log:
             up = subprocess.Popen([*command, *words, "--out", f"{folder}/here"], stdout=log, stderr=log)
             try:
