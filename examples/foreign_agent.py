@@ -1,8 +1,8 @@
 """An agent that is not ours: it joins a run with `eclipse-zenoh` and `msgpack` alone, as docs/protocol.md says.
 
-`python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (real time: endpoint, run, inverter; the plant tells the rest), or
-`python foreign_agent.py < inv2.json`, which holds what the plant would tell. It runs the paper's law, in simulated time
-to the byte, with the default `[handling]`. It sends no AgentStatus: `gridpeers watch` knows of it what the plant knows.
+`python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (real time: endpoint, run, inverter; the plant sends the rest), or
+`python foreign_agent.py < inv2.json`, which has the plant's configuration of it. It runs the paper's law, in simulated
+time to the byte, with the default `[handling]`. It sends no AgentStatus: `gridpeers watch` shows only the plant's data.
 """
 
 import json
@@ -30,7 +30,7 @@ def pack(message: dict) -> bytes:
 def unpack(payload: bytes) -> dict:
     """Return the message of these bytes, or raise ValueError."""
     if zlib.crc32(payload[:-4]).to_bytes(4, "little") != payload[-4:]:
-        raise ValueError("its CRC-32 is another")
+        raise ValueError("wrong CRC-32")
     return dict(msgpack.unpackb(payload[:-4]))
 
 
@@ -67,7 +67,7 @@ def law(config: dict, P_set: float, V_set: float, m: dict, near: list) -> tuple[
 
 
 class ForeignAgent:
-    """One agent of a run; Zenoh's threads put what comes into `inbox`, and `run` takes it out."""
+    """One agent of a run; Zenoh's threads put messages and tokens into `inbox`, and `run` takes them out."""
 
     def __init__(self, config: dict, session: zenoh.Session) -> None:
         self.config, self.session, self.name = config, session, config["name"]
@@ -95,7 +95,7 @@ class ForeignAgent:
         self.inbox.put((key, there if key.startswith(self.root + "alive/") else sample.payload.to_bytes()))
 
     def publish(self, key: str, kind: str, seq: int, t: float, **fields: object) -> None:
-        """Publish a message; in real time a state is rather dropped than waited for."""
+        """Publish a message; in real time Zenoh drops a state rather than wait."""
         control = zenoh.CongestionControl.DROP if self.wall and key == "state" else zenoh.CongestionControl.BLOCK
         message = {**self.head, "type": kind, "seq": seq, "t": t, **fields}
         self.session.put(f"{self.root}{key}/{self.name}", pack(message), congestion_control=control)
@@ -110,7 +110,7 @@ class ForeignAgent:
                 self.take(key.removeprefix(self.root).split("/"), item)
             except queue.Empty:
                 pass
-            except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # it costs that message alone
+            except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # reject that message alone
                 print(f"{self.name}: dropped {key}: {error!r}", file=sys.stderr)
         return max(0, self.status)
 
@@ -132,11 +132,11 @@ class ForeignAgent:
         elif key[0] == "nameplate" and who in self.alive:
             self.alive[who] = message
         elif key != ["leave"] and any(message[same] != speaker[same] for same in ("sender", "epoch")):
-            raise ValueError("not of who speaks for this name")
+            raise ValueError("not of the process that holds this name")
         elif message["type"] == "State" and linked(self.config["control"], self.own, speaker):
             old = [heard for heard in self.states.get(key[1], []) if heard[0] == speaker][-1:]
-            last = old[0][1] if old else message | {"island": "off"}  # who stands still or is quiet
-            value = last if message.get("idle") or message.get("quiet") else message  # says nothing of use
+            last = old[0][1] if old else message | {"island": "off"}  # an idle or quiet neighbour
+            value = last if message.get("idle") or message.get("quiet") else message  # its own values are not valid
             self.states[key[1]] = [*old, (speaker, {**value, "seq": message["seq"]}, time.monotonic())]
         elif message["type"] == "Prepare":
             self.members, self.prepare = dict(zip(message["roster"], message["instances"], strict=True)), message
@@ -150,14 +150,14 @@ class ForeignAgent:
         elif message["type"] == "Stop":
             self.status = (2 if self.wall else 3) if message.get("refused") else 0
         elif message["type"] == "LinkRequest":
-            said = {"ok": False, "text": "no emulated links", "reply_to": message["reply_to"], "data": b""}
-            self.publish("link_acknowledgement", "LinkAcknowledgement", message["seq"], message["t"], **said)
+            answer = {"ok": False, "text": "no emulated links", "reply_to": message["reply_to"], "data": b""}
+            self.publish("link_acknowledgement", "LinkAcknowledgement", message["seq"], message["t"], **answer)
         if self.prepare and all(self.alive.get(member) for member in self.members.items()):
             self.publish("ready", "Ready", self.prepare["seq"], self.prepare["t"])
             self.prepare = None
 
     def plate(self, name: str) -> dict | None:
-        """Return the nameplate of who speaks for a name: the instance on the roster, or else the first."""
+        """Return the nameplate of the process that holds a name: the instance on the roster, or else the first."""
         instances = [i for other, i in self.alive if other == name and i == self.members.get(name, i)]
         return self.alive[name, instances[0]] if instances else None
 

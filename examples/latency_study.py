@@ -12,7 +12,7 @@ DELAYS = [0.0, 0.02, 0.05, 0.1, 0.2]  # s
 
 @gp.metric("swing_pu")
 def swing(window: gp.WindowData) -> float:
-    """Return by how much a set-point of P still moves in the last second of a window, at worst (pu of its rating)."""
+    """Return the largest movement of a P set-point in the last second of a window (pu of its rating)."""
     late = window.t > window.end - 1.0
     return float((np.ptp(window.P_set[late], axis=0) / window.nameplates.s).max())
 

@@ -13,13 +13,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LONGEST = 1 << 20 }; /* bytes of a line: 1000 neighbours with all that they may share need half of it */
+enum { LONGEST = 1 << 20 }; /* bytes of a line: 1000 neighbours with all shared values need half of it */
 
 /* ---- JSON: enough of it to find a member of an object, and to walk over an array --------------------------------- */
 
 static const char *blank(const char *s) { return s + strspn(s, " \t\r\n"); }
 
-/* What stands behind the value at s; NULL if it is none. */
+/* Return the end of the value at s; NULL if there is no value. */
 static const char *skip(const char *s)
 {
     s = blank(s);
@@ -42,7 +42,7 @@ static const char *skip(const char *s)
     return length ? s + length : NULL;
 }
 
-/* The value of a member of the object at s; NULL if there is none. */
+/* Return the value of a member of the object at s; NULL if there is none. */
 static const char *member(const char *s, const char *name)
 {
     size_t length = strlen(name);
@@ -64,7 +64,7 @@ static const char *member(const char *s, const char *name)
 
 static int is(const char *value, const char *word) { return value && !strncmp(value, word, strlen(word)); }
 
-/* A number of the object at s, or what holds if it has none of this name. */
+/* Return a number of the object at s, or the default if it has none of this name. */
 static double number_or(const char *s, const char *name, double otherwise)
 {
     const char *value = member(s, name);
@@ -93,7 +93,7 @@ static struct gains gains_of(const char *given)
 static double least(double a, double b) { return b < a ? b : a; }
 static double most(double a, double b) { return b > a ? b : a; }
 
-/* Part of the way to the neighbours' mean in one period. */
+/* Return the part of the way to the neighbours' mean in one period. */
 static double towards(double rate, double d, double T) { return 0.5 * (1.0 - exp(-2.0 * rate * d * T)); }
 
 static double P_set_step(const struct gains *g, const char *own, double y_bar, double d, double T)
@@ -151,7 +151,7 @@ static void step(const struct gains *g, const char *line)
     P_set = P_set_step(g, own, y, d, T);
     V_set = V_set_step(g, own, z, d, T);
     if (isfinite(P_set) && isfinite(V_set))
-        printf("{\"P_set\":%.17g,\"V_set\":%.17g}\n", P_set, V_set); /* 17 digits tell every double from the next */
+        printf("{\"P_set\":%.17g,\"V_set\":%.17g}\n", P_set, V_set); /* 17 digits distinguish every double */
     else
         puts("{\"error\":\"a number is missing, or what follows from them is none\"}");
 }
@@ -169,7 +169,7 @@ int main(void)
             step(&g, line);
         else
             puts("{\"error\":\"neither start nor step\"}");
-        fflush(stdout); /* else the answer waits in a buffer, and the agent for it */
+        fflush(stdout); /* else the answer stays in a buffer while the agent waits */
     }
     return 0;
 }
