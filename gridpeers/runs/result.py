@@ -13,7 +13,7 @@ import pandas as pd
 
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
-from gridpeers.runs.showing import drawn
+from gridpeers.runs.showing import draw
 from plant.equipment import Feeder
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import live_drawing
@@ -112,7 +112,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         ValueError
             If the run has no such figure.
         """
-        return drawn(self.drawing(self._results), figure)
+        return draw(self.drawing(self._results), figure)
 
     def save(self, folder: str | Path) -> Path:
         """Write the run folder as the command does, figures included.
@@ -260,7 +260,7 @@ class Result(_FromFolder):
         ValueError
             If the run has no such figure.
         """
-        return drawn(self.drawing(), figure)
+        return draw(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
         """Return the data of the figures of the case (`scenarios.results.plots`)."""

@@ -7,27 +7,23 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from scenarios.results.plots.drawing import Drawing
-from wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def drawn(drawing: Drawing, name: str) -> Figure:
-    """Draw a figure of a run.
+def draw(drawing: Drawing, name: str) -> Figure:
+    """Draw a figure of a run, as a picture if it is the value of a notebook's cell.
 
     Raises
     ------
     ValueError
         If the run has no figure of this name.
     """
-    from scenarios.results.plots.run_figures import draw, figures_of
+    from scenarios.results.plots import run_figures  # imports matplotlib
 
     shown_in_notebooks()
-    names = figures_of(drawing)
-    if name not in names:
-        raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, names, "figures")}')
-    return draw(drawing, name)
+    return run_figures.draw(drawing, name)
 
 
 def shown_in_notebooks() -> None:

@@ -13,10 +13,11 @@ from scenarios.results.plots.case_figures import MEASURES, overview, single
 from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.inverter_figures import available_power, microgrids, plug_and_play, powers
 from scenarios.results.plots.style import PAGE, save
+from wire.schema.suggestion import suggestion
 
 
 def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
-    """Return how each figure of a run is drawn, by its name."""
+    """Return the functions that draw the figures of a run, by the figure's name."""
     figures: dict[str, Callable[[], Figure]] = {name: partial(single, drawing, name) for name in MEASURES}
     figures |= {
         "power_GFM": lambda: powers(drawing, GFM=True),
@@ -37,11 +38,14 @@ def draw(drawing: Drawing, name: str) -> Figure:
 
     Raises
     ------
-    KeyError
+    ValueError
         If the run has no figure of this name.
     """
+    figures = figures_of(drawing)
+    if name not in figures:
+        raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, figures, "figures")}')
     with mpl.rc_context(PAGE):
-        return figures_of(drawing)[name]()
+        return figures[name]()
 
 
 def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
