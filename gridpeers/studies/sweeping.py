@@ -65,7 +65,7 @@ def sweep(
     jobs : int, optional
         Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
     progress : Callable[[int, int], None], optional
-        Told how many runs are done, and how many there are.
+        Is called with the number of runs that are done, and of all runs.
 
     Returns
     -------

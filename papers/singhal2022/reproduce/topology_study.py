@@ -62,7 +62,7 @@ def study(seed: int, tell: TellProgress, *, jobs: int | None) -> GraphFindings:
     seed : int
         Of the graphs.
     tell : TellProgress
-        Told of progress.
+        Is called with the progress.
     jobs : int or None
         How many runs at a time; None is one per core, or one where joblib is not installed.
     """

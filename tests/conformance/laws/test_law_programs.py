@@ -18,7 +18,7 @@ from tests.conformance.laws.law_runs import Driver, islanding, written
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples" / "law-program"
 PAGE = (ROOT / "docs" / "law-programs.md").read_text()
-PYTHON = (sys.executable, str(EXAMPLES / "law.py"))
+PYTHON = (sys.executable, str(EXAMPLES / "paper_law.py"))
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,9 @@ def in_c(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
     if cc is None:
         pytest.skip("no C compiler is here")
     program = tmp_path_factory.mktemp("law") / "law"
-    options = re.search(r"^cc (.*) law\.c -o law -lm$", PAGE, re.MULTILINE)
+    options = re.search(r"^cc (.*) paper_law\.c -o law -lm$", PAGE, re.MULTILINE)
     assert options is not None
-    source = str(EXAMPLES / "law.c")
+    source = str(EXAMPLES / "paper_law.c")
     subprocess.run(
         [cc, *options[1].split(), "-Wall", "-Wextra", "-Werror", source, "-o", str(program), "-lm"], check=True
     )

@@ -1,6 +1,6 @@
 /* The paper's law, (12)-(15), as a program: lines of JSON as docs/law-programs.md says.
  *
- *     cc -std=c99 -O2 -ffp-contract=off law.c -o law -lm
+ *     cc -std=c99 -O2 -ffp-contract=off paper_law.c -o law -lm
  *
  *     [case.IV]
  *     law = { command = ["./law"], k_p = 0.0007 }

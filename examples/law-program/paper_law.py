@@ -1,7 +1,7 @@
 """The paper's law, (12)-(15), as a program: lines of JSON as docs/law-programs.md says. It imports nothing of ours.
 
     [case.IV]
-    law = { command = ["python3", "law.py"], k_p = 0.0007 }
+    law = { command = ["python3", "paper_law.py"], k_p = 0.0007 }
 
 The order of operations is that of agents/laws/consensus.py: so the history is the same to the byte.
 """
