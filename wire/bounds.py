@@ -45,9 +45,6 @@ Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
 Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
 """A sentence for people: up to 4000 printable characters on one line."""
 
-Reply = Annotated[str, msgspec.Meta(max_length=LIMIT, pattern=_PRINTABLE)]
-"""An answer to a request: printable, at most as long as a message."""
-
 Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
 """Bytes that no core reads."""
 
@@ -58,7 +55,7 @@ bounds it."""
 TREE_DEPTH = 8
 """Most levels of a tree."""
 
-TREE_SIZE = 1000
+TREE_SIZE = 4000
 """Most values in a tree."""
 
 MOST_COUNT = 2**53 - 1

@@ -35,7 +35,6 @@ from wire.bounds import (
     QuickNameOrNone,
     QuickNames,
     Rating,
-    Reply,
     Shared,
     Text,
     Time,
@@ -267,9 +266,14 @@ class Answer(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only
 
     ok: bool
     """Whether the plant carried it out."""
-    text: Reply
-    """One sentence for a person; the answers to "status", "link", "links" are one JSON object each, that to "telemetry"
-    is the number of the first Telemetry that comes again."""
+    text: Text
+    """One sentence for a person; to "telemetry" the number of the first Telemetry that comes again."""
+    data: Tree = {}
+    """To "status" the run's status; to "link" and "links" the number of the command, its start and its receivers."""
+
+    def __post_init__(self) -> None:
+        check_names(self.sender)
+        check_tree(self.data)
 
 
 class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from wire.bounds import LIMIT
 from wire.clock import time_of
 from wire.messages import PLANT, Answer, Command
 from wire.printable import printable
@@ -27,16 +26,18 @@ class RunCommands:
         try:
             if node.phase not in ("gathering", "running") and command.verb != "telemetry":
                 raise ValueError("the run is ending")
-            text, ok = self._do(command, now), True
+            text, data = self._do(command, now)
+            ok = True
         except ValueError as error:
-            text, ok = str(error), False
+            text, data, ok = str(error), {}, False
         return Answer(
             sender=PLANT,
             epoch=node.config.epoch,
             seq=command.seq,
             t=node.t,
             ok=ok,
-            text=printable(text, LIMIT),
+            text=printable(text),
+            data=data,
         )
 
     def follow_up(self, command: Command, now: float) -> None:
@@ -50,12 +51,19 @@ class RunCommands:
         elif command.verb == "down":
             node.close("the run was ended by command", now)
 
-    def _do(self, command: Command, now: float) -> str:
-        node, verb, argument = self._node, command.verb, command.argument
-        if verb in ("link", "links"):
-            return msgspec.json.encode(self._command_links(command, now)).decode()
+    def _do(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
+        """Carry a command out; return the text and the data of the answer."""
+        verb = command.verb
         if verb == "status":
-            return msgspec.json.encode(self.status()).decode()
+            status = self.status()
+            return f"run {status['run']} is {status['phase']} at t = {status['t']:.2f} s", status
+        if verb in ("link", "links"):
+            return self._command_links(command, now)
+        return self._say(command), {}
+
+    def _say(self, command: Command) -> str:
+        """Carry out a command whose answer is a sentence alone."""
+        node, verb, argument = self._node, command.verb, command.argument
         if verb == "telemetry":
             if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
                 raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
@@ -76,8 +84,8 @@ class RunCommands:
             return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already at t = {node.t:.2f} s"
         return f"switch {argument}: {verb} at t = {node.t:.2f} s"
 
-    def _command_links(self, command: Command, now: float) -> dict[str, Any]:
-        """Return the command's number, its start (s), its effect in words, and the agents that are sent it.
+    def _command_links(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
+        """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
 
         It holds from one control period after the due tick on: by then all agents have it.
         """
@@ -85,12 +93,12 @@ class RunCommands:
         agents = self._agents(present=True)
         if command.verb == "links":
             assert node.link_commands.links is not None  # a run without any is an error
-            return {"number": 0, "t": node.t, "asked": agents}
+            return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}
         overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
         t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
         request, said, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
         node.note_links(f"link command {request.seq}: {said}" + (f", from t = {t:.2f} s on" if receivers else ""))
-        return {"number": request.seq, "t": request.t, "asked": agents, "said": said, "receivers": receivers}
+        return said, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
 
     def _agents(self, *, present: bool) -> list[str]:
         met = self._node.members.nameplates
@@ -106,10 +114,10 @@ class RunCommands:
             "tick": node.tick,
             "end": node.config.end,
             "speed": node.config.speed,
-            "pacing": node.pacer.report(),
+            "pacing": msgspec.to_builtins(node.pacer.report()),
             "agents": self._agents(present=True),
             "absent": self._agents(present=False),
-            "events": list(node.events),
+            "events": msgspec.to_builtins(node.events),
             "impaired": list(node.link_commands.impaired(node.t)),
             "rejected": sum(node.rejects.counts.values()),
         }

@@ -15,7 +15,7 @@ from scenarios.emulation.link_reports import LinkStatus, decode_statuses
 from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.run_requests import configurations, request
-from wire.messages import PLANT, LinkAcknowledgement
+from wire.messages import PLANT, Answer, LinkAcknowledgement
 from wire.schema.table_schema import Problem
 
 
@@ -25,8 +25,12 @@ class _LinkReply(msgspec.Struct, frozen=True):
     number: int
     t: float
     asked: tuple[str, ...]
-    said: str = ""
     receivers: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, answer: Answer) -> _LinkReply:
+        """Return the data of an answer."""
+        return msgspec.convert(answer.data, cls)
 
     @property
     def reached(self) -> tuple[str, ...]:
@@ -89,12 +93,13 @@ def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> N
 
 def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
-    reply, answers = _request_links(client, verb="link", link_command=command.to_tree())
+    answer, answers = _request(client, verb="link", link_command=command.to_tree())
+    reply = _LinkReply.of(answer)
     refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
     silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
     return LinkCommandResult(
         t=reply.t,
-        text=reply.said,
+        text=answer.text,
         acknowledged=tuple(name for name in reply.reached if name not in refused and name not in silent),
         silent=silent,
         absent=tuple(name for name in reply.receivers if name not in reply.reached),
@@ -104,22 +109,18 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
 
 def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
-    reply, answers = _request_links(client, verb="links")
+    answer, answers = _request(client, verb="links")
+    reply = _LinkReply.of(answer)
     found: dict[tuple[str, str], LinkStatus] = {}
-    for name, answer in answers.items():
-        if answer.ok:
+    for name, acknowledgement in answers.items():
+        if acknowledgement.ok:
             try:
-                of_sender: dict[str, LinkStatus] = decode_statuses(answer.data)
+                of_sender: dict[str, LinkStatus] = decode_statuses(acknowledgement.data)
             except msgspec.DecodeError:  # counts as no answer
                 continue
             found |= {(src, name): state for src, state in of_sender.items()}
     return reply.t, found, tuple(name for name in reply.asked if name not in answers)
 
 
-def _request_links(client: RunClient, **command_fields: Any) -> tuple[_LinkReply, dict[str, LinkAcknowledgement]]:
-    text, answers = request(client, lambda text: _link_reply(text).answers_needed, **command_fields)
-    return _link_reply(text), answers
-
-
-def _link_reply(text: str) -> _LinkReply:
-    return msgspec.json.decode(text, type=_LinkReply)
+def _request(client: RunClient, **command_fields: Any) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
+    return request(client, lambda answer: _LinkReply.of(answer).answers_needed, **command_fields)

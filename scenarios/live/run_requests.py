@@ -49,17 +49,17 @@ def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
     NobodyError
         If it does not answer.
     """
-    answer, _ = request(client, lambda text: set(), verb=verb, argument=argument)
-    return answer
+    answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument)
+    return answer.text
 
 
 def request(
-    client: RunClient, receivers: Callable[[str], set[str]], **command_fields: Any
-) -> tuple[str, dict[str, LinkAcknowledgement]]:
-    """Return the plant's answer, and the answers that come in time of the receivers that follow from it."""
+    client: RunClient, receivers: Callable[[Answer], set[str]], **command_fields: Any
+) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
+    """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it."""
     command = Command(sender="visitor", epoch=0, seq=0, t=0.0, reply_to=client.id, **command_fields)
     client.publish(client.keys.command, encode(command))
-    text: str | None = None
+    answer: Answer | None = None
     answers: dict[str, LinkAcknowledgement] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
@@ -70,19 +70,20 @@ def request(
             elif isinstance(message, Answer):
                 if not message.ok:
                     raise RefusedError(message.text)
-                text, end = message.text, monotonic() + ACKNOWLEDGED
-        if text is not None and answers.keys() >= receivers(text):
+                answer, end = message, monotonic() + ACKNOWLEDGED
+        if answer is not None and answers.keys() >= receivers(answer):
             break
-    if text is None:
+    if answer is None:
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {ANSWER:g} s; is it frozen?"
         )
-    return text, answers
+    return answer, answers
 
 
 def plant_status(client: RunClient) -> PlantStatus:
     """Return the state of the run as the plant reports it."""
-    return msgspec.json.decode(ask(client, "status"), type=PlantStatus)
+    answer, _ = request(client, lambda answer: set(), verb="status")
+    return msgspec.convert(answer.data, PlantStatus)
 
 
 def has_left(client: RunClient, name: str) -> bool:

@@ -34,7 +34,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "LinkRequest": dict(link_command={"heal": {"on": "*"}}, reply_to="z1"),
     "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
     "Command": dict(verb="status", argument="", link_command={"x": 1.0}, reply_to="z1"),
-    "Answer": dict(ok=True, text="done"),
+    "Answer": dict(ok=True, text="done", data={"t": 1.0}),
     "AgentStatus": dict(
         phase="running", waits_for="", island="inv1", neighbours=("inv2",), ages=(0.02,), used=("inv2",), received=9,
         sent=9, rejected=0, lost=0, ticks=9, missed=0, lateness=0.001, impaired=(),
@@ -174,7 +174,7 @@ def _values(type_: Any) -> Iterator[tuple[Any, bool | None]]:
             case inspect.AnyType():
                 yield from ((1.0, True), ("x", True), ({"a b": [None, True]}, True), (math.nan, False), (b"x", False))
                 yield from (("\x1b[2J", False), ("x" * 4001, False), ({"x": {"\x1b": 1}}, False), ({1: 2}, False))
-                yield from ((_nested(6), True), (_nested(7), False), ([1] * 900, True), ([1] * 1001, False))
+                yield from ((_nested(6), True), (_nested(7), False), ([1] * 3900, True), ([1] * 4001, False))
             case inspect.DictType(value_type=inspect.AnyType()):
                 yield from (({}, True), ({"\x1b": 0.1}, False), (7, False))
                 yield {f"x{i}": 0.1 for i in range(part.max_length + 1)}, False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 import re
 import signal
@@ -67,7 +66,7 @@ def give(town: Town, order: LinkCommand, *receivers: str) -> float:
     before = len(town.acknowledgements)
     answer = town.command("link", order.to_tree())
     assert answer.ok, answer.text
-    taken = json.loads(answer.text)
+    taken = answer.data
     town.until(
         lambda: (
             {other.sender for other in town.acknowledgements[before:] if other.seq == taken["number"]} >= {*receivers}

@@ -5,7 +5,6 @@ Every wait is for a message, with a deadline.
 
 from __future__ import annotations
 
-import json
 import signal
 from itertools import pairwise
 from pathlib import Path
@@ -203,7 +202,7 @@ def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
 def test_commands_reach_a_running_plant(tmp_path: Path) -> None:
     """Status, stop, open, what there is not, and down, which ends everybody with exit status 0."""
     with Town(3, tmp_path).all() as town:
-        status = json.loads(town.command("status").text)
+        status = town.command("status").data
         wrong = town.command("open", "sw7")
         opened = town.command("open", "sw1")
         stopped = town.command("stop", "inv2")

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
@@ -279,7 +278,7 @@ def test_commands_are_done_and_answered() -> None:
     lab = running()
     opened, again, stopped = lab.ask("open", "sw1"), lab.ask("open", "sw1"), lab.ask("stop", "inv2")
     lab.step()
-    status = json.loads(lab.ask("status").text)
+    status = lab.ask("status").data
 
     assert opened.ok
     assert opened.text == "switch sw1: open at t = 0.00 s"
