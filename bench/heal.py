@@ -115,11 +115,11 @@ def main() -> int:
         say("the run starts")
         with observer:
             took, disturbed, deaf = measure(observer, hosts, arguments.repeat, random.Random(arguments.seed))
-        opened = sessions(Path(folder))
+        new_sessions = sessions(Path(folder))
     print(f"\n{'(ms)':40}{'n':>6} {'p50':>9} {'p95':>9} {'max':>9}")
     print(f"{'healed':40}{describe(took)}")
     print(f"{'noticed by the others':40}{disturbed:6}")
-    print(f"{'new sessions':40}{opened:6}")
+    print(f"{'new sessions':40}{new_sessions:6}")
     print(f"{'deaf':40}{deaf:6}")
     print(LEGEND)
     return 0

@@ -190,14 +190,14 @@ class RunObserver:
 
     def event(self, kind: str, text: str) -> float:
         """Wait for an event since `mark`; its run time (s)."""
-        found: list[PlantEvent] = []
+        events: list[PlantEvent] = []
 
         def came() -> bool:
-            found[:] = [event for event in self.events if event.kind == kind and text in event.text]
-            return bool(found)
+            events[:] = [event for event in self.events if event.kind == kind and text in event.text]
+            return bool(events)
 
         self.until(came, f"event {kind}: {text}")
-        return found[0].t
+        return events[0].t
 
     def restored(self, names: Sequence[str], since: float) -> float:
         """Wait until f and sharing of the judged inverters have held for `HOLD` s; return when that began (s)."""

@@ -251,7 +251,7 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: every 0.5 s of wall time, and when its phase or its neighbours in use change",
         ),
         row(
-            keys.config(agent), "queryable", "-", "plant", "an agent started by hand",
+            keys.config(agent), "queryable", "-", "plant", "an agent of a live run",
             "wall-clock: asked once the plant's token is there; its AgentConfig as JSON",
         ),
         row(

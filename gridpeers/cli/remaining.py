@@ -59,16 +59,16 @@ def remaining(console: Console, total: float) -> Iterator[Tell]:
 def _lines(console: Console, total: float) -> Tell:
     """Print a line for each piece of work that begins, and for each tenth of all."""
     began = before = 0.0
-    told: tuple[str, int] | None = None
+    latest: tuple[str, int] | None = None
 
     def tell(what: str, done: float) -> None:
-        nonlocal began, before, told
+        nonlocal began, before, latest
         now = what.partition(",")[0], int(10.0 * done / total)
-        if now == told:
+        if now == latest:
             return
-        if told is None:
+        if latest is None:
             began, before = monotonic(), done
-        told = now
+        latest = now
         left = (monotonic() - began) / (done - before) * (total - done) if before < done < total else None
         words = f", about {duration(round(left))} left" if left is not None else ""
         text = f"{what}: {100.0 * done / total:.0f} % done{words}"

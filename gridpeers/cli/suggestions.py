@@ -22,12 +22,12 @@ class Commands(TyperGroup):
 
     def make_context(self, *words: Any, **extra: Any) -> Any:
         """Read the options before the command."""
-        with _told():
+        with _in_one_line():
             return super().make_context(*words, **extra)
 
     def invoke(self, ctx: Any) -> Any:
         """Read what follows the command, and run it."""
-        with _told():
+        with _in_one_line():
             return super().invoke(ctx)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -38,7 +38,7 @@ class Commands(TyperGroup):
 
 
 @contextmanager
-def _told() -> Iterator[None]:
+def _in_one_line() -> Iterator[None]:
     try:
         yield
     except _UsageError as error:

@@ -68,11 +68,11 @@ class LinkCommandSender:
         ValueError
             If it is no command to links, or the run has no emulated links.
         """
-        said, receivers, _ = self.links.command(tree, t)
+        text, receivers, _ = self.links.command(tree, t)
         request = self._request(len(self._given) + 1, tree, t, reply_to)
         self._given.append(request)
         self._publish(self._keys.telemetry, encode(request))
-        return request, said, receivers
+        return request, text, receivers
 
     def send(self, names: Iterable[str], now: float) -> None:
         """Send to each agent the commands that are new, or that it has not acknowledged (s, driver's clock)."""

@@ -96,9 +96,9 @@ class RunCommands:
             return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}
         overdue = max(0, int((now - node.pacer.due) / node.pacer.period))
         t = time_of(node.tick + 1 + overdue, node.config.T_c) if node.phase == "running" else node.t
-        request, said, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
-        node.note_links(f"link command {request.seq}: {said}" + (f", from t = {t:.2f} s on" if receivers else ""))
-        return said, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
+        request, text, receivers = node.link_commands.give(command.link_command, t, command.reply_to)
+        node.note_links(f"link command {request.seq}: {text}" + (f", from t = {t:.2f} s on" if receivers else ""))
+        return text, {"number": request.seq, "t": request.t, "asked": agents, "receivers": receivers}
 
     def _agents(self, *, present: bool) -> list[str]:
         met = self._node.members.nameplates

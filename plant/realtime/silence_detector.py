@@ -44,7 +44,7 @@ class SilenceDetector:
     >>> silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
     >>> silence.joined("inv2"); list(silence.take(now=5.0))
     []
-    >>> [told for step in range(1, 14) for told in silence.take(now=5.0 + 0.02 * step)]
+    >>> [news for step in range(1, 14) for news in silence.take(now=5.0 + 0.02 * step)]
     [('inv2', 'inv2 is silent: no state for 0.25 s, nothing comes from it')]
     >>> silence.heard("inv2"); list(silence.take(now=5.28))
     [('inv2', 'inv2 is heard again')]
@@ -70,7 +70,7 @@ class SilenceDetector:
         self._silent: set[str] = set()
         self._unheard: dict[str, dict[str, float]] = {}
         """By agent, the neighbours that it does not hear, and the time from which on that is an event."""
-        self._told: dict[str, set[str]] = {}
+        self._reported: dict[str, set[str]] = {}
         """By agent, the neighbours whose silence has been an event."""
 
     def joined(self, name: str) -> None:
@@ -85,15 +85,15 @@ class SilenceDetector:
 
     def forget(self, name: str) -> None:
         """Note that an agent does not take part any more."""
-        for known in (self._joined, self._last, self._unheard, self._told):
+        for known in (self._joined, self._last, self._unheard, self._reported):
             known.pop(name, None)
         self._silent.discard(name)
         self._holding.discard(name)
         self._failed.discard(name)
         for unheard in self._unheard.values():
             unheard.pop(name, None)
-        for told in self._told.values():
-            told.discard(name)
+        for reported in self._reported.values():
+            reported.discard(name)
 
     def reported(self, status: AgentStatus) -> None:
         """Note an agent's report of its neighbours; while it does not tick, it uses no state anyway."""
@@ -139,16 +139,16 @@ class SilenceDetector:
     def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
         """Yield the neighbours that an agent no longer hears, or hears again; one that nobody hears is silent."""
         unheard = {other: at for other, at in self._unheard[name].items() if other in self._last}
-        told = self._told.setdefault(name, set())
-        back = sorted(other for other in told if other not in unheard and other in self._last)
-        told.intersection_update(unheard)
+        reported = self._reported.setdefault(name, set())
+        back = sorted(other for other in reported if other not in unheard and other in self._last)
+        reported.intersection_update(unheard)
         recent = self._clock - RECENT * self._period
         news = [
             other
             for other, at in unheard.items()
-            if at <= self._clock and other not in told and other not in self._silent and self._last[other] >= recent
+            if at <= self._clock and other not in reported and other not in self._silent and self._last[other] >= recent
         ]
-        told.update(news)
+        reported.update(news)
         if back:
             yield name, f"{name} hears {', '.join(back)} again"
         if news:

@@ -49,8 +49,8 @@ class TelemetryEndpoint(PlantFollower):
 
     def take(self) -> list[Recordable]:
         """Take out the messages that can be recorded now, in order."""
-        found, self._recordable = self._recordable, []
-        return found
+        messages, self._recordable = self._recordable, []
+        return messages
 
     def question(self, now: float) -> bytes | None:
         """Return the `Command` that asks the plant for missing messages, if it is to be asked now (s)."""

@@ -111,15 +111,15 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
     answer, answers = _request(client, verb="links")
     reply = _LinkReply.of(answer)
-    found: dict[tuple[str, str], LinkStatus] = {}
+    statuses: dict[tuple[str, str], LinkStatus] = {}
     for name, acknowledgement in answers.items():
         if acknowledgement.ok:
             try:
                 of_sender: dict[str, LinkStatus] = decode_statuses(acknowledgement.data)
             except msgspec.DecodeError:  # counts as no answer
                 continue
-            found |= {(src, name): state for src, state in of_sender.items()}
-    return reply.t, found, tuple(name for name in reply.asked if name not in answers)
+            statuses |= {(src, name): state for src, state in of_sender.items()}
+    return reply.t, statuses, tuple(name for name in reply.asked if name not in answers)
 
 
 def _request(client: RunClient, **command_fields: Any) -> tuple[Answer, dict[str, LinkAcknowledgement]]:

@@ -36,9 +36,9 @@ def compare(
     from scenarios.schema import ScenarioError
 
     try:
-        found = compare_runs(first, second, names=_names(first, second))
-        typer.echo(str(found))
-        figure = found.plot()
+        comparison = compare_runs(first, second, names=_names(first, second))
+        typer.echo(str(comparison))
+        figure = comparison.plot()
         out.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(out)
     except ScenarioError as error:

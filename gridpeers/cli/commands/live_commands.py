@@ -100,10 +100,10 @@ def _start(
                     say(note)
                 outcome = plant_here(config, kept.record, link_log)
             if kept.whole is not None:
-                ran = RunMetrics(
+                metrics = RunMetrics(
                     scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=speed
                 )
-                outcome = conclude(outcome, ran, kept)
+                outcome = conclude(outcome, metrics, kept)
         _finish(outcome)
 
 

@@ -39,9 +39,9 @@ def predict(
     if not feeder.inverters:
         fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)
     try:
-        found = predictions(spec, feeder, voltage=vars_)
+        predicted = predictions(spec, feeder, voltage=vars_)
     except ScenarioError as error:
         refuse(error)
     except BrokenRunError as error:
         fail([str(error)], BROKEN)
-    typer.echo("\n\n".join(map(str, found.values())))
+    typer.echo("\n\n".join(map(str, predicted.values())))

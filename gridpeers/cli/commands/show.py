@@ -19,9 +19,9 @@ def list_() -> None:
     """
     from scenarios.catalogue_files import summaries
 
-    found = summaries()
-    width = max(map(len, found), default=0)
-    for name, (title, cases) in found.items():
+    scenarios = summaries()
+    width = max(map(len, scenarios), default=0)
+    for name, (title, cases) in scenarios.items():
         typer.echo(f"{name:{width}}  {title}. Cases: {', '.join(cases)}")
 
 
@@ -30,7 +30,7 @@ def check(
 ) -> None:
     """Check a scenario file and its feeder for problems.
 
-    All problems are told at once. A file without any is tried: whether its feeder has an operating point to start from.
+    All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
     Notes tell what its events de-energise.
 
     Exit code: 0 it can be run, 2 it has problems.

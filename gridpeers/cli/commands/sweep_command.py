@@ -56,7 +56,7 @@ def sweep(
 
     again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
-    for line in _told(summary):
+    for line in _result_lines(summary):
         typer.echo(line)
     raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
 
@@ -108,7 +108,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         fail([str(error)], BAD_INPUT)
 
 
-def _told(summary: Summary) -> list[str]:
+def _result_lines(summary: Summary) -> list[str]:
     """Return the results of a sweep, in lines."""
     from scenarios.results.run_files import shown
 

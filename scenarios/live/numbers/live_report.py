@@ -24,21 +24,21 @@ from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
 
-def write_report(ran: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> RunReport:
+def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> RunReport:
     """Measure the record of a live run; write metrics.json, report.txt and figures into its folder.
 
     It judges no claim of the paper: a live run has one case, and people may have changed it.
 
     Parameters
     ----------
-    ran : RunMetrics
+    metrics : RunMetrics
         The run: its scenario has one case, and its folder exists.
     recorded : Recorded
         The whole record.
     pacing : Pacing or None
         How the plant kept pace.
     """
-    scenario, feeder, (case,) = ran.scenario, ran.feeder, ran.scenario.cases
+    scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
     record = CaseRecord.of(departures.happened, feeder, case, recorded, departures.windows.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
@@ -50,15 +50,17 @@ def write_report(ran: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> 
         verdicts=(),
         benchmark=NO_BENCHMARK if departures.disturbed else benchmark_of(scenario.paper),
         notes=[f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
-        folder=shown(ran.folder) + "/",
+        folder=shown(metrics.folder) + "/",
     )
     facts = {case: case_facts(recorded, pacing)}
-    write_whole(ran.folder / "metrics.json", metrics_json(ran, findings, facts, _live_table(recorded, departures)))
-    write_whole(ran.folder / "report.txt", plain(report))
+    write_whole(
+        metrics.folder / "metrics.json", metrics_json(metrics, findings, facts, _live_table(recorded, departures))
+    )
+    write_whole(metrics.folder / "report.txt", plain(report))
 
     from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else
 
-    draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), ran.folder / "plots")
+    draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")
     return report
 
 
@@ -117,7 +119,7 @@ def _named(windows: Iterable[Window]) -> str:
     return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
 
 
-def conclude(outcome: ProcessOutcome, ran: RunMetrics, folders: Folders) -> ProcessOutcome:
+def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> ProcessOutcome:
     """Write and show the report of a run that has ended, and note in its folder how it ended.
 
     Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers.
@@ -126,7 +128,7 @@ def conclude(outcome: ProcessOutcome, ran: RunMetrics, folders: Folders) -> Proc
         folders.broken(outcome.broke or "no whole record")
         return outcome
     try:
-        show(write_report(ran, outcome.recorded, outcome.pacing), Console())
+        show(write_report(metrics, outcome.recorded, outcome.pacing), Console())
         folders.complete()
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")

@@ -188,7 +188,7 @@ class RunMonitor:
         if not present:
             return "no agent"
         if status is None:
-            return f"silent for {age:.0f} s" if name in self._status else "has not told yet"
+            return f"silent for {age:.0f} s" if name in self._status else "has not reported yet"
         if status.phase != "running":
             return f"waits for {status.waits_for}" if status.waits_for else status.phase
         unused = [neighbour for neighbour in status.neighbours if neighbour not in status.used]

@@ -75,7 +75,7 @@ def test_a_run_that_has_not_begun_shows_who_waits() -> None:
 
     assert text.startswith("run lab   has not begun")
     assert text.splitlines()[2].endswith("waits for the plant")
-    assert text.splitlines()[3].endswith("has not told yet")
+    assert text.splitlines()[3].endswith("has not reported yet")
 
 
 def test_a_frozen_agent_is_silent() -> None:
