@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from agents.agent_config import MAX_AGE, AgentConfig, Control
 from plant.equipment import Feeder
 from plant.plant_config import FeederChanges, InverterChange, PlantConfig, PlantSettings, PowerLimit, SwitchEvent
@@ -11,7 +9,7 @@ from plant.tables.feeder_changes import changed
 from scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
 from scenarios.schema.participants import inverters_of, schedule_of, with_agent
 from scenarios.schema.plugin_keys import graph_of, law_of
-from scenarios.schema.scenario_model import Event, InverterTable, ScenarioModel
+from scenarios.schema.scenario_model import InverterTable, ScenarioModel
 
 
 def configs(
@@ -150,15 +148,16 @@ def as_in(scenario: ScenarioModel, feeder: Feeder) -> Feeder:
 
 def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
     return tuple(
-        SwitchEvent(t=event.t_s, switch=switch, action=action, synchronised=event.synchronised and action == "close")
+        SwitchEvent(
+            t=event.t_s,
+            switch=switch,
+            action="close" if closes else "open",
+            synchronised=event.synchronised and closes,
+        )
         for event in scenario.events
-        for action, switches in _actions(event)
+        for closes, switches in ((False, event.open), (True, event.close))
         for switch in switches
     )
-
-
-def _actions(event: Event) -> tuple[tuple[Literal["open", "close"], tuple[str, ...]], ...]:
-    return ("open", event.open), ("close", event.close)
 
 
 def _inverter_change(table: InverterTable) -> InverterChange:
