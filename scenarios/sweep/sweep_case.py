@@ -21,15 +21,13 @@ from plant.feeder import Plant
 from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results import metrics
-from scenarios.results.evaluation.window_metrics import own_measures
 from scenarios.results.event_windows import CaseRecord
-from scenarios.results.history import History, Nameplates
+from scenarios.results.findings import find
+from scenarios.results.history import History
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
-from scenarios.schema.participants import without_agent
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""
@@ -101,20 +99,17 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
     record = CaseRecord.of(scenario, feeder, case, recorded)
-    nameplates = Nameplates.of_columns(recorded.inverters, feeder).without(without_agent(scenario, case))
-    measures: dict[str, float | None] = {}
     with np.errstate(all="ignore"):  # a value that is no number is None
-        for window in record.windows:
-            steady, settled = (
-                of(record.history, nameplates, window, feeder.f_nom) for of in (metrics.measure, metrics.settling)
-            )
-            numbers = asdict(steady) | asdict(settled)
-            reasons = numbers.pop("reasons")
-            measures |= flat(window.label, numbers | {"steady": float(not reasons)})
-    own = own_measures(scenario, feeder, {case: record}).get(case, {})
-    for label, found in own.items():
-        measures |= flat(label, dict(found.values))
-    failed = [f"{label}: {name} {text}" for label, found in own.items() for name, text in found.reasons.items()]
+        found = find(scenario, feeder, {case: record})
+    measures: dict[str, float | None] = {}
+    for label, steady in found.results[case].items():
+        numbers = asdict(steady) | asdict(found.settled[case][label])
+        reasons = numbers.pop("reasons")
+        measures |= flat(label, numbers | {"steady": float(not reasons)})
+    own = found.own.get(case, {})
+    for label, metrics in own.items():
+        measures |= flat(label, dict(metrics.values))
+    failed = [f"{label}: {name} {text}" for label, metrics in own.items() for name, text in metrics.reasons.items()]
     done = SweepRow(
         number=number,
         status="ran",
