@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from netem.relay.direction import Direction
-from netem.relay.line import Line
+from netem.relay.line import ImpairedLine
 from netem.relay.packets import NEVER
 
 
@@ -43,7 +43,7 @@ class Flow:
     def __init__(
         self,
         link: RelayedLink,
-        line: Line,
+        line: ImpairedLine,
         forward: Callable[[list[bytes]], None],
         after_look: Callable[[], None] = lambda: None,
     ) -> None:

@@ -10,7 +10,7 @@ WINDOW = 4 << 20
 """Bytes of a TCP connection that may be on the way: what Linux gives one at most (tcp_wmem)."""
 
 
-class Line:
+class ImpairedLine:
     """One direction of a connection or conversation. Time is an argument (s) and never goes back."""
 
     def __init__(self, direction: Direction, way: Datagrams | Segments) -> None:

@@ -11,7 +11,7 @@ from typing import Any, cast
 from netem.draws import Stream
 from netem.relay.direction import Direction
 from netem.relay.flow import Flow, RelayedLink
-from netem.relay.line import Line
+from netem.relay.line import ImpairedLine
 from netem.relay.segments import SIZE, Segments
 
 _LINGER = struct.pack("ii", 1, 0)
@@ -23,7 +23,7 @@ class _End(asyncio.Protocol):
 
     def __init__(self, relay: TcpRelay, name: str, direction: Direction, back: Direction) -> None:
         way = Segments(partial(Stream, relay.link.seed, name, direction.name), direction, back)
-        self.flow = Flow(relay.link, Line(direction, way), self._forward, self._after_look)
+        self.flow = Flow(relay.link, ImpairedLine(direction, way), self._forward, self._after_look)
         self.flow.is_blocked = True
         self.other = self
         self.transport: asyncio.Transport | None = None

@@ -11,7 +11,7 @@ from typing import Any, cast
 from netem.draws import Stream
 from netem.relay.direction import Direction
 from netem.relay.flow import Flow, RelayedLink
-from netem.relay.line import Line
+from netem.relay.line import ImpairedLine
 from netem.relay.packets import Datagrams
 
 IDLE = 60.0
@@ -29,7 +29,7 @@ class _Conversation(asyncio.DatagramProtocol):
 
         def flow(direction: Direction, forward: Callable[[list[bytes]], None]) -> Flow:
             way = Datagrams(partial(Stream, link.seed, name, direction.name), direction)
-            return Flow(link, Line(direction, way), forward)
+            return Flow(link, ImpairedLine(direction, way), forward)
 
         self.there, self.back = flow(link.there, self._forward), flow(link.back, answer)
         self.there.is_blocked = True

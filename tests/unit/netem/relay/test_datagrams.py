@@ -7,7 +7,7 @@ from scipy.stats import binom, kstest
 
 from netem.draws import Stream
 from netem.relay.direction import Direction, Faults, FaultsError
-from netem.relay.line import Line
+from netem.relay.line import ImpairedLine
 from netem.relay.packets import NEVER, Datagrams
 
 N = 4000
@@ -18,7 +18,7 @@ SURE = 1e-4
 def carried(faults: Faults, count: int = N, gap: float = 1.0, *, size: int = 4, seed: int = 1) -> dict[int, float]:
     """Delay of each datagram that arrived, in the order of arrival."""
     direction, delays = Direction("there", faults), {}
-    line = Line(direction, Datagrams(partial(Stream, seed, "1", "there"), direction))
+    line = ImpairedLine(direction, Datagrams(partial(Stream, seed, "1", "there"), direction))
 
     def take(now: float) -> None:
         for data in line.take(now):
