@@ -28,12 +28,12 @@ from agents.agent_config import AgentConfig
 from agents.agent_node import AgentNode
 from agents.laws.law import Law
 from agents.topology import is_pairwise
-from wire.clock import time_of
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.node import Route
-from wire.tick_barrier import Awaited, TickBarrier
+from wire.timing.clock import time_of
+from wire.timing.tick_barrier import Awaited, TickBarrier
 
 CLOSING = 2.0
 """Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""

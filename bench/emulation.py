@@ -2,7 +2,7 @@
 
 In one process there is no transport, so that netem's part is as large as it can be. Times are processor time.
 
-    .venv/bin/python bench/emulation.py [--rounds 9] [--case IV]
+    .venv/bin/python -m bench.emulation [--rounds 9] [--case IV]
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Callable
 from functools import partial
 from time import process_time
 
-from harness import machine, options, ratios
 from msgspec.structs import replace
 
+from bench.harness import machine, options, ratios
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from plant.build import build_plant

@@ -1,17 +1,17 @@
 """One-line map of a feeder with its microgrids, inverters and switches, from its tables. A figure for docs/concepts.md.
 
-.venv/bin/python bench/feeder_map.py [--feeder FEEDER] [--figure docs/images/microgrid123.png]
+.venv/bin/python -m bench.feeder_map [--feeder FEEDER] [--figure docs/images/microgrid123.png]
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from harness import options
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from bench.harness import options
 from plant.equipment import Bus, Feeder, Switch
 from plant.tables import read_feeder
 

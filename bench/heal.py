@@ -4,7 +4,7 @@ Two hosts (network namespaces): the plant and six agents of the paper's feeder o
 cut off for 1.7 to 3.2 s, again and again: around the 2 s after which Zenoh gives a silent link up, the worst time to
 heal, as one end may have given up and the other not.
 
-    .venv/bin/python bench/heal.py [--repeat 40] [--seed 1]
+    .venv/bin/python -m bench.heal [--repeat 40] [--seed 1]
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from itertools import permutations
 from pathlib import Path
 from time import monotonic
 
-from harness import load, machine, say
-from latency import two_hosts
-from run_observer import NotInTimeError, RunObserver, describe
-
+from bench.harness import load, machine, say
+from bench.latency import two_hosts
+from bench.run_observer import NotInTimeError, RunObserver, describe
 from scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.hosts import Hosts
 

@@ -5,7 +5,7 @@ killed, started, stopped, started, frozen and woken, again and again; another, o
 namespace), is cut off and healed. Where the lost agent's inverter stays on, nothing would have to be restored: there
 the load changes by a third at the same moment (switch 60-160 opens or closes).
 
-    .venv/bin/python bench/latency.py [--repeat 20] [--quick]
+    .venv/bin/python -m bench.latency [--repeat 20] [--quick]
 """
 
 from __future__ import annotations
@@ -23,10 +23,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Literal
 
-from harness import load, machine, say
-from ping import TICK, one_way, round_trip
-from run_observer import HOLD, RUN, NotInTimeError, RunObserver, describe
-
+from bench.harness import load, machine, say
+from bench.ping import TICK, one_way, round_trip
+from bench.run_observer import HOLD, RUN, NotInTimeError, RunObserver, describe
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.results.metrics import F_BAND, MPSI_BAND
 from tests.processes.hosts import Hosts, NoHostsError

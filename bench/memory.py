@@ -1,7 +1,7 @@
 """The memory of every process of a recorded run in real time, and its growth in an hour of run time.
 
-    python bench/memory.py --minutes 60              an hour at real time
-    python bench/memory.py --minutes 6 --speed 10    an hour of run time in six minutes
+    python -m bench.memory --minutes 60              an hour at real time
+    python -m bench.memory --minutes 6 --speed 10    an hour of run time in six minutes
 
 Linux only: sizes are from /proc. The first part of the run does not count (`--skip`, percent): caches fill, and the
 plant keeps the latest 4 MB for recorders.
@@ -18,8 +18,8 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import numpy as np
-from harness import machine, options, say
 
+from bench.harness import machine, options, say
 from scenarios.drivers.free_endpoint import free_endpoint
 
 KB = 1024.0

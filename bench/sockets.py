@@ -4,7 +4,7 @@ Two Zenoh sessions over TCP and two over UDP, a message of 100 bytes each per co
 loopback that loses nothing, on one where the kernel loses 2 % of the packets (in a network namespace, by `tc`), and
 through `netem.relay`, whose TCP is a model.
 
-    .venv/bin/python bench/sockets.py [--figure docs/images/sockets.png]
+    .venv/bin/python -m bench.sockets [--figure docs/images/sockets.png]
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from harness import machine
 from matplotlib.figure import Figure
-from ping import TICK
 
+from bench.harness import machine
+from bench.ping import TICK
 from netem.relay import Relay
 from tests.processes.relay.relay_pair import LOST, Pair, free_endpoint, measure
 

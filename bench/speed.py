@@ -3,7 +3,7 @@
 Three runs of the same 350 ticks in one go, so that ratios hold whatever else the machine does: all in one process, with
 processes over Zenoh, and bare Zenoh with empty messages, the floor under any lock-step (`bench/floor.py`).
 
-    .venv/bin/python bench/speed.py [--repeat 5] [--case IV]
+    .venv/bin/python -m bench.speed [--repeat 5] [--case IV]
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ from time import perf_counter
 from typing import Any
 from unittest.mock import patch
 
-import floor
-from harness import machine, options, ratios
-
 import wire.codec
 from agents.agent import Agent
 from agents.agent_config import AgentConfig
+from bench import floor
+from bench.harness import machine, options, ratios
 from plant.build import build_plant
 from plant.feeder import Plant
 from plant.plant_config import PlantConfig

@@ -3,7 +3,7 @@
 The loop is what anybody would write: change the scenario, run it, measure it, one after the other, a new plant each
 time. The sweep reuses plants.
 
-    .venv/bin/python bench/sweep_speed.py [--runs 500] [--loop 20]
+    .venv/bin/python -m bench.sweep_speed [--runs 500] [--loop 20]
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import os
 from resource import RUSAGE_CHILDREN, getrusage
 from time import perf_counter, process_time
 
-from harness import machine, options, ratios
-
 import gridpeers as gp
+from bench.harness import machine, options, ratios
 
 CASE = "IV"
 

@@ -26,7 +26,7 @@ from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links, is_usable
 from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Prepare, Ready, State
 from wire.node import Route
-from wire.tick_barrier import Awaited, TickBarrier
+from wire.timing.tick_barrier import Awaited, TickBarrier
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
 

@@ -15,13 +15,13 @@ from plant.agent_schedule import AgentSchedule
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
 from plant.telemetry_reporter import Reporter
-from wire.clock import ticks_until, time_of
 from wire.codec import encode
 from wire.keys import check_name
 from wire.links import Links, arrived
 from wire.messages import PLANT, LinkReport, Pacing, PlantEvent, State, Stop
 from wire.node import Node
 from wire.printable import printable
+from wire.timing.clock import ticks_until, time_of
 
 CLOSING = 2.0
 """Longest wait (s) for the other nodes to close."""

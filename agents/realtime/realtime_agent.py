@@ -31,7 +31,7 @@ from wire.codec import encode
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Leave, LinkRequest, Measurement, Nameplate, State, Stop, Waiting
 from wire.node import CLOCK_ALONE, Route
-from wire.timer import Timer
+from wire.timing.timer import Timer
 
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""

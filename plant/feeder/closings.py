@@ -7,8 +7,8 @@ from typing import NamedTuple
 from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Difference, Synchronism
 from plant.feeder.trips import Closing
-from wire.clock import time_of
 from wire.messages import PlantEvent
+from wire.timing.clock import time_of
 
 
 class _Pending(NamedTuple):

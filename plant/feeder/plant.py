@@ -19,8 +19,8 @@ from plant.feeder.synchronism import Synchronism
 from plant.feeder.trips import trip_event
 from plant.network import Network
 from plant.plant_config import PlantSettings, PowerLimit
-from wire.clock import time_of
 from wire.messages import OFF, PlantEvent
+from wire.timing.clock import time_of
 
 
 class Reading(NamedTuple):

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from plant.network import Network
 from plant.plant_config import SwitchEvent
-from wire.clock import time_of
 from wire.messages import PlantEvent
+from wire.timing.clock import time_of
 
 _PAST = {"open": "opened", "close": "closed"}
 

@@ -21,7 +21,7 @@ from wire.admission import FASTER
 from wire.links import Links, is_usable
 from wire.messages import AgentStatus, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
 from wire.node import Route
-from wire.timer import Timer
+from wire.timing.timer import Timer
 
 Phase = Literal["gathering", "running", "closing", "over"]
 

@@ -23,7 +23,7 @@ from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, Command, PlantEvent, Waiting
 from wire.node import ANYBODY, CLOCK_ALONE, Route
 from wire.rate_limit import RateLimit
-from wire.timer import Timer
+from wire.timing.timer import Timer
 
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from wire.clock import time_of
 from wire.messages import PLANT, Answer, Command
 from wire.printable import printable
+from wire.timing.clock import time_of
 
 if TYPE_CHECKING:
     from plant.realtime.realtime_plant import RealtimePlant

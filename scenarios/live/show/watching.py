@@ -18,7 +18,7 @@ from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import Snapshot
 from wire.messages import PLANT, AgentStatus, Telemetry
-from wire.session_patience import SessionPatience
+from wire.timing.session_patience import SessionPatience
 
 LOOK = 1.2
 """Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wire.tick_barrier import Awaited, TickBarrier
+from wire.timing.tick_barrier import Awaited, TickBarrier
 
 
 def barrier() -> TickBarrier:

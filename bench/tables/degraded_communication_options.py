@@ -1,7 +1,7 @@
 """The tables of docs/handling.md: the cost of each option of `[handling]` without faults, and its gain with them.
 
-.venv/bin/python bench/degraded_communication_options.py              # all, some 4 minutes on two cores
-.venv/bin/python bench/degraded_communication_options.py saturation   # or parts: sound, graphs, faults, cut, saturation
+.venv/bin/python -m bench.tables.degraded_communication_options              # all, some 4 minutes on two cores
+.venv/bin/python -m bench.tables.degraded_communication_options cut   # or parts: sound, graphs, faults, cut, saturation
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from harness import cells, run_parts
 
 import gridpeers as gp
+from bench.harness import cells, run_parts
 from gridpeers.measures import MQSI
 
 SHARED = 0.1

@@ -5,7 +5,7 @@ islanding of `scenarios/catalogue/reduced-communication.toml` with the clustered
 judges by, five seconds after the event: among the points whose V_error is the table's 0.002 when printed as there, the
 one with the least MQSI; where two print the same MQSI, the smaller beta, then the larger alpha.
 
-    .venv/bin/python bench/retune.py             # 31 runs, some 15 s on two cores
+    .venv/bin/python -m bench.tables.retune             # 31 runs, some 15 s on two cores
 """
 
 from __future__ import annotations

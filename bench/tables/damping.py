@@ -4,7 +4,7 @@ Each row islands the feeder at 0.1 s with some inverters removed and prints the 
 power in the windows 0.5-1 s, 2-2.5 s and 5.5-6 s. A settled plant has zeros in the last; "no solution" means that the
 network could not carry the inverters' powers. Protection is off, as it would trip the inverters that swing.
 
-    .venv/bin/python bench/damping.py
+    .venv/bin/python -m bench.tables.damping
 """
 
 from __future__ import annotations

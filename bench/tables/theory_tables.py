@@ -1,7 +1,7 @@
 """The tables of docs/theory.md: what is predicted beside what the agents do on the plant, on eight graphs.
 
-.venv/bin/python bench/theory_tables.py            # all, some 4 minutes on two cores
-.venv/bin/python bench/theory_tables.py limits     # or one part: times, late, limits, vars
+.venv/bin/python -m bench.tables.theory_tables            # all, some 4 minutes on two cores
+.venv/bin/python -m bench.tables.theory_tables limits     # or one part: times, late, limits, vars
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from harness import cells, run_parts
-
 import gridpeers as gp
+from bench.harness import cells, run_parts
 from gridpeers.theory import (
     LoadStep,
     ScenarioModel,
