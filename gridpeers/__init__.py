@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from scenarios.run import BrokenRunError
     from scenarios.schema.loading import catalogue
     from scenarios.schema.scenario_errors import ScenarioError
-    from wire.schema.plausible import Range, Unit
+    from wire.schema.plausible import Plausible, Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     link_fault, metric = FAULTS.register, METRICS.register
@@ -57,6 +57,7 @@ _HOME = {
     "Neighbour": "agents.laws.law",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
+    "Plausible": "wire.schema.plausible",
     "Range": "wire.schema.plausible",
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
@@ -89,6 +90,7 @@ __all__ = [
     "LinkFault",
     "Neighbour",
     "Own",
+    "Plausible",
     "Prediction",
     "Range",
     "Result",
