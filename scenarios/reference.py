@@ -119,8 +119,8 @@ def _scenario() -> Iterator[str]:
     yield "# The scenario file"
     yield ""
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
-    yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default must be"
-    yield "given. A value out of its range is an error, and so is an unknown key."
+    yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
+    yield "must be given. A value out of its range is an error, and so is an unknown key."
     for title, cls in _SCENARIO_TABLES:
         yield from ("", f"## {title}", "", class_doc(cls), "")
         elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
