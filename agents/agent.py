@@ -83,13 +83,16 @@ class Agent:
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.acts(config.name, config.kind)
-        handling = config.control.handling
-        self._weights = StalenessWeights(handling)
-        self._silent_at_most = SIGN_OF_LIFE * (handling.max_age or (config.max_age if config.clock == "wall" else inf))
-        self._stops = handling.anti_windup == "conditional"
-        self._islands_from_switches = handling.islands == "switches"
-        self._detector = IslandDetector(config.f_nom, handling.slip_max) if handling.islands == "frequency" else None
-        self._saturation_P, self._saturation_V = SaturationDetector(handling.T_sat), SaturationDetector(handling.T_sat)
+        options = config.control.degraded_communication
+        self._weights = StalenessWeights(options)
+        self._silent_at_most = SIGN_OF_LIFE * (options.max_age or (config.max_age if config.clock == "wall" else inf))
+        self._stops = options.anti_windup == "conditional"
+        self._islands_from_switches = options.islands == "switches"
+        self._detector = IslandDetector(config.f_nom, options.slip_max) if options.islands == "frequency" else None
+        self._saturation_P, self._saturation_V = (
+            SaturationDetector(options.T_sat),
+            SaturationDetector(options.T_sat),
+        )
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
@@ -126,7 +129,7 @@ class Agent:
         self._islands = ("", "")
 
     def shares_island(self, name: str) -> bool:
-        """Whether a neighbour's last state is from the own island, as far as is known (`Handling.islands`).
+        """Whether a neighbour's last state is from the own island, as far as is known (`islands`).
 
         A state is older than the own measurement. When all inverters change from one island to another, an agent would
         leave out all neighbours for a tick; so the previous island counts too.

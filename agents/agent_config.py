@@ -49,10 +49,10 @@ class Gains(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Upper limit of V_set (pu), anti-windup."""
 
 
-class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DegradedCommunication(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How an agent handles late, lost and missing states, and its own saturation. The default is the paper's way.
 
-    Equations, sources and costs are in docs/handling.md.
+    Equations, sources and costs are in docs/degraded-communication.md.
     """
 
     stale: Literal["hold", "skip", "age-weighted"] = "hold"
@@ -98,7 +98,7 @@ class LawChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """The control law of an agent, and its carrier: a Python class, a program, or an FMU."""
 
     use: str = "consensus"
-    """Registered name of a class, or `module:Class`; "consensus" is the paper's law, with `Gains` and `Handling`."""
+    """Registered name of a class, or `module:Class`; "consensus" is the paper's law."""
     command: Annotated[tuple[str, ...], Example('["./mylaw", "--fast"], the program first')] = ()
     """Program and arguments, in place of a class; one JSON line a tick on its standard input and output."""
     fmu: str = ""
@@ -135,7 +135,7 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Undirected links to remove from the rule's graph."""
     gains: Gains = Gains()
     """Gains of the law."""
-    handling: Handling = Handling()
+    degraded_communication: DegradedCommunication = DegradedCommunication()
     """Options for degraded communication and saturation."""
     law: LawChoice = LawChoice()
     """Control law."""

@@ -1,4 +1,4 @@
-"""An agent's options for late, lost and missing states, and for a saturated inverter: table `[handling]`. Pure.
+"""An agent's options for late, lost and missing states, and for saturation: `[degraded_communication]`. Pure.
 
 The law is `agents.laws.consensus`; this module sets its weights c_ij, gains and limits. r_ij, from 0 to 1, is the
 weight of neighbour j's state for i (`StalenessWeights`), and d_i the number of neighbours that count:
@@ -10,7 +10,7 @@ weight of neighbour j's state for i (`StalenessWeights`), and d_i the number of 
 A neighbour counts while its nameplate is known, it is in the own island, it has sent a state, and that state
 is no older than `max_age`. So a lossy link keeps its place in d_i, and a dead one loses it.
 
-docs/handling.md has the sources, and the cost of each option.
+docs/degraded-communication.md has the sources, and the cost of each option.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from math import exp, inf
 
 from msgspec.structs import replace
 
-from agents.agent_config import Gains, Handling
+from agents.agent_config import DegradedCommunication, Gains
 
 REMEMBERED = 51
 """Number of arrivals in the median of a link's ages: a second at 20 ms."""
@@ -38,22 +38,22 @@ class StalenessWeights:
 
     Parameters
     ----------
-    handling : Handling
+    options : DegradedCommunication
         `stale`, `T_age` and `max_age`.
 
     Examples
     --------
     A link whose states are always 0.5 s old keeps its full weight; a silent one fades:
 
-    >>> weights = StalenessWeights(Handling(stale="age-weighted", T_age=0.25))
+    >>> weights = StalenessWeights(DegradedCommunication(stale="age-weighted", T_age=0.25))
     >>> weights.arrived("inv2")
     >>> weights.at_tick({"inv2": 0.5}), weights.at_tick({"inv2": 0.75})
     ({'inv2': 1.0}, {'inv2': 0.36787944117144233})
     """
 
-    def __init__(self, handling: Handling) -> None:
-        self._stale, self._T_age = handling.stale, handling.T_age
-        self._max_age = handling.max_age or inf
+    def __init__(self, options: DegradedCommunication) -> None:
+        self._stale, self._T_age = options.stale, options.T_age
+        self._max_age = options.max_age or inf
         self._fresh: set[str] = set()
         """Neighbours with a new state since the last tick."""
         self._usual: dict[str, deque[float]] = {}
@@ -146,18 +146,22 @@ class SaturationDetector:
         return side if at <= limit and (does - did) * side < 0.5 * abs(short) else 0
 
 
-def gains_in_force(gains: Gains, handling: Handling) -> Gains:
+def gains_in_force(gains: Gains, options: DegradedCommunication) -> Gains:
     """Return the gains and limits of the law under these options.
 
     Examples
     --------
-    >>> gains_in_force(Gains(), Handling()) == Gains()
+    >>> gains_in_force(Gains(), DegradedCommunication()) == Gains()
     True
-    >>> gains_in_force(Gains(beta_GFM=0.5), Handling(weights="degree-normalised", beta_c=8.0)).beta_GFM
+    >>> gains_in_force(Gains(beta_GFM=0.5), DegradedCommunication(weights="degree-normalised", beta_c=8.0)).beta_GFM
     4.0
     """
-    if handling.weights == "degree-normalised":
-        gains = replace(gains, beta_GFM=gains.beta_GFM * handling.beta_c, beta_GFL=gains.beta_GFL * handling.beta_c)
-    if handling.anti_windup == "none":
+    if options.weights == "degree-normalised":
+        gains = replace(
+            gains,
+            beta_GFM=gains.beta_GFM * options.beta_c,
+            beta_GFL=gains.beta_GFL * options.beta_c,
+        )
+    if options.anti_windup == "none":
         gains = replace(gains, P_set_min=-P_BOUND, P_set_max=P_BOUND, V_set_min=0.0, V_set_max=V_BOUND)
     return gains

@@ -2,7 +2,7 @@
 
 `python foreign_agent.py tcp/127.0.0.1:7447 lab inv2` (real time: endpoint, run, inverter; the plant sends the rest), or
 `python foreign_agent.py < inv2.json`, which has the plant's configuration of it. It runs the paper's law, in simulated
-time to the byte, with the default `[handling]`. It sends no AgentStatus: `gridpeers watch` shows only the plant's data.
+time to the byte, with default options. It sends no AgentStatus: `gridpeers watch` shows only the plant's data.
 """
 
 import json

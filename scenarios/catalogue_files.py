@@ -18,7 +18,7 @@ def names_in(folder: Path) -> tuple[str, ...]:
     Examples
     --------
     >>> names_in(SWEEPS)[:2]
-    ('communication-delay', 'delay')
+    ('communication-delay', 'degraded-communication')
     """
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from agents import graphs
-from agents.agent_config import Gains, Handling
+from agents.agent_config import DegradedCommunication, Gains
 from agents.carriers.law_registry import LAWS
 from agents.graphs import GRAPHS
 from netem.models import own_fault
@@ -62,7 +62,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[plant.sync_check]", SyncCheck),
     ("[protection]", Protection),
     ("[gains]", Gains),
-    ("[handling]", Handling),
+    ("[degraded_communication]", DegradedCommunication),
     ("[processes]", Processes),
     ("[[event]]", Event),
     ("[case.NAME]", Case),

@@ -144,7 +144,7 @@ class RejectedMessages:
         self.counts[kind] += 1
 
     def failed(self, key: str, error: Exception) -> None:
-        """Count a message that raised an error of ours; call it while handling that error."""
+        """Count a message that raised an error of ours; call it while that error is caught."""
         self.add("failed", key, f"{type(error).__name__}: {error}", traceback.format_exc())
 
     @property

@@ -19,7 +19,7 @@ from wire.schema.table_reading import read_parameters, read_table
 from wire.schema.table_schema import Problem
 
 PAPER = LawChoice().use
-"""Name of the paper's law; its parameters are `[gains]` and `[handling]`."""
+"""Name of the paper's law; its parameters are `[gains]` and `[degraded_communication]`."""
 
 
 def law_problems(table: Mapping[str, Any]) -> list[Problem]:
@@ -62,7 +62,7 @@ def _command_problems(command: tuple[str, ...]) -> list[str]:
 
 def _class_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
     if choice.use == PAPER:
-        text = f'the parameters of "{PAPER}" are those of [gains] and [handling]; write them there'
+        text = f'the parameters of "{PAPER}" are those of [gains] and [degraded_communication]; write them there'
         return [Problem(key, text) for key in parameters]
     try:
         law = LAWS.resolve(choice.use, choice.folder)

@@ -242,7 +242,7 @@ def V_set_step(
 class Consensus(Law):
     """The paper's law, (12)-(15): leaders restore frequency and voltage, all agree on shares of load and vars.
 
-    Its parameters are those of `Gains`, which a scenario sets, under its `[handling]`.
+    Its parameters are those of `Gains`, which a scenario sets, under its `[degraded_communication]`.
     """
 
     source = (

@@ -1,4 +1,4 @@
-"""The paper's law with the gains of a scenario under its `[handling]`. Pure."""
+"""The paper's law with the gains of a scenario under its `[degraded_communication]`. Pure."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ def law_in_force(control: Control) -> Consensus:
     >>> law_in_force(Control(secondary="all", graph="full")).k_p
     0.0007
     """
-    gains = gains_in_force(control.gains, control.handling)
-    kappa_c = control.handling.kappa_c if control.handling.weights == "degree-normalised" else 0.0
+    gains = gains_in_force(control.gains, control.degraded_communication)
+    kappa_c = (
+        control.degraded_communication.kappa_c if control.degraded_communication.weights == "degree-normalised" else 0.0
+    )
     return Consensus(**msgspec.structs.asdict(gains), kappa_c=kappa_c)

@@ -71,7 +71,7 @@ class Neighbour(NamedTuple):
     age: float
     """Age of the state (s of run time)."""
     weight: float
-    """Weight from 0 to 1 that the agent gives the state for its age; see `[handling]`."""
+    """Weight from 0 to 1 that the agent gives the state for its age; see `[degraded_communication]`."""
     P_set: float
     """Its set-point of real power (pu)."""
     V_set: float

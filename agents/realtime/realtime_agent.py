@@ -301,7 +301,7 @@ class RealtimeAgent(AgentNode):
             self._ran = True
         if self._agent.fault:
             return
-        limit = self._config.control.handling.max_age or self._config.max_age
+        limit = self._config.control.degraded_communication.max_age or self._config.max_age
         ages = {name: age for name in self._neighbours if (age := self.states.age(name, at)) <= limit}
         state = replace(self._agent.tick(measurement, tuple(ages), ages), seq=self.statistics.sent)
         self._used_neighbours = tuple(name for name in ages if self._agent.shares_island(name))

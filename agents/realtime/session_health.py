@@ -1,7 +1,7 @@
 """Detect a broken Zenoh session: agents that should be heard but are not, or an agent that nobody hears. Pure.
 
 Each measurement lists the agents that the plant hears. If a neighbour on that list is silent here, or the agent itself
-is not on it, the session fails (`wire.timing.session_patience`).
+is not on it, the session fails (`wire.timing.session_deadline`).
 
 Times are s of wall time on the agent's clock.
 """
@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 
 from wire.messages import PLANT
-from wire.timing.session_patience import SessionPatience
+from wire.timing.session_deadline import SessionDeadline
 
 SILENT = 1.0
 """Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""
@@ -44,7 +44,7 @@ class SessionHealth:
         """Whether the agent has ever been in touch with a plant; before that, silence proves nothing."""
         self._plant_seen = -inf
         """Time (s) at which the plant was last known to be there, though it measures nothing yet."""
-        self._patience = SessionPatience()
+        self._patience = SessionDeadline()
         self._begin()
 
     def _begin(self) -> None:

@@ -1,4 +1,4 @@
-"""The tables of docs/handling.md: the cost of each option of `[handling]` without faults, and its gain with them.
+"""The tables of docs/degraded-communication.md: each option's cost and gain.
 
 .venv/bin/python -m bench.tables.degraded_communication_options              # all, some 4 minutes on two cores
 .venv/bin/python -m bench.tables.degraded_communication_options cut   # or parts: sound, graphs, faults, cut, saturation
@@ -75,7 +75,7 @@ def of(event: str, *names: str) -> tuple[str, ...]:
 
 def sound() -> None:
     """Every way on the full graph without faults."""
-    cases = {name: {**GRAPHS["full"], "handling": way} for name, way in WAYS.items() if name != "both"}
+    cases = {name: {**GRAPHS["full"], "degraded_communication": way} for name, way in WAYS.items() if name != "both"}
     names = ("t_f_s", "t_share_s", "t_Q_s", "MQSI")
     table("t_f / t_P / t_Q / MQSI after event 1 | event 2", cases, of("event1", *names), of("event2", *names))
 
@@ -83,7 +83,11 @@ def sound() -> None:
 def graphs() -> None:
     """Two ways on four graphs without faults."""
     ways = ("paper", "degree-normalised")
-    cases = {f"{way}, {name}": {**graph, "handling": WAYS[way]} for way in ways for name, graph in GRAPHS.items()}
+    cases = {
+        f"{way}, {name}": {**graph, "degraded_communication": WAYS[way]}
+        for way in ways
+        for name, graph in GRAPHS.items()
+    }
     table("event 2, t_f / t_P / MQSI", cases, of("event2", "t_f_s", "t_share_s", "MQSI"), end_s=25.0)
 
 
@@ -92,7 +96,7 @@ def faults() -> None:
     cases = {
         f"{way}, {graph}, {fault}": {
             **GRAPHS[graph],
-            "handling": WAYS[way],
+            "degraded_communication": WAYS[way],
             "link": [{"on": "* <-> *", **keys}],
         }
         for fault, (keys, on) in FAULTS.items()
@@ -106,7 +110,7 @@ def cut() -> None:
     """One link cut for good before event 2."""
     link = [{"on": "inv4 <-> inv7", "cut": True, "from_s": 3.5}]
     cases = {
-        f"{way}, {graph}": {**GRAPHS[graph], "handling": WAYS[way], "link": link}
+        f"{way}, {graph}": {**GRAPHS[graph], "degraded_communication": WAYS[way], "link": link}
         for way in ("paper", "degree-normalised", "skip", "age-weighted", "max_age")
         for graph in ("full", "reduced")
     }
@@ -117,10 +121,14 @@ def saturation() -> None:
     """Every anti-windup with the GFM short of power, and with the GFL short of vars."""
     leaders = {"II": {"secondary": "GFM", "graph": "none"}, "III": {"secondary": "GFM", "graph": "GFM-only"}}
     ways = ("clamp", "none", "conditional")
-    cases = {f"{name}, {way}": {**it, "handling": {"anti_windup": way}} for name, it in leaders.items() for way in ways}
+    cases = {
+        f"{name}, {way}": {**it, "degraded_communication": {"anti_windup": way}}
+        for name, it in leaders.items()
+        for way in ways
+    }
     heading = "f error (Hz) after event 1 | t_f of event 2 (s)"
     table(heading, cases, of("event1", "f_error_Hz"), of("event2", "t_f_s"))
-    cases = {f"IV, {way}": {**GRAPHS["full"], "handling": {"anti_windup": way}} for way in ways}
+    cases = {f"IV, {way}": {**GRAPHS["full"], "degraded_communication": {"anti_windup": way}} for way in ways}
     table("GFL with S_max 0.9 pu: t_Q / MQSI of event 2", cases, of("event2", "t_Q_s", "MQSI"), S_max_pu=0.9)
 
 

@@ -28,7 +28,7 @@ class Link(NamedTuple):
         return f"{self.src} -> {self.dst}"
 
 
-class Side(NamedTuple):
+class EndSet(NamedTuple):
     """One end of a pattern."""
 
     names: tuple[str, ...]
@@ -45,8 +45,8 @@ class Side(NamedTuple):
 class Pattern(NamedTuple):
     """A set of directed links, of those who are there and of those who are yet to come."""
 
-    left: Side
-    right: Side
+    left: EndSet
+    right: EndSet
     both: bool
     """Whether it also means the links back."""
 
@@ -83,7 +83,7 @@ def parse(text: str) -> Pattern:
     return Pattern(_side(found[1], text), _side(found[3], text), found[2] == "<->")
 
 
-def _side(text: str, whole: str) -> Side:
+def _side(text: str, whole: str) -> EndSet:
     if text.startswith("{") and text.endswith("}"):
         names = tuple(name.strip() for name in text[1:-1].split(","))
     else:
@@ -91,7 +91,7 @@ def _side(text: str, whole: str) -> Side:
     if not all(re.fullmatch(r"\*|[A-Za-z0-9_.-]+", name) for name in names):
         rule = "write an inverter, a microgrid, plant, *, or several as {inv1, inv2}"
         raise ValueError(f'"{text}" in "{whole}" is no name; {rule}')
-    return Side(names)
+    return EndSet(names)
 
 
 def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, str]) -> list[str]:

@@ -52,7 +52,7 @@ def configs(
         links=rule.links,
         without=rule.without,
         gains=rule.gains,
-        handling=rule.handling,
+        degraded_communication=rule.degraded_communication,
         law=law_of(scenario, case),
     )
     plant = PlantConfig(
@@ -80,7 +80,7 @@ def configs(
         deadline=scenario.processes.deadline_s,
         listen=endpoints,
         links=links,
-        max_age=rule.handling.max_age or MAX_AGE,
+        max_age=rule.degraded_communication.max_age or MAX_AGE,
     )
     agents = tuple(
         AgentConfig(

@@ -176,9 +176,9 @@ def check_laws(scenario: ScenarioModel, problems: Problems) -> None:
         if law.name != PAPER and case.gains not in (scenario.gains, Gains()):
             text = f'[gains] are those of the law "{PAPER}", and this case has {law.name}; write them into [{path}]'
             problems.add(f"case.{name}.gains", text)
-        if law.name != PAPER and case.handling.weights != "paper":
+        if law.name != PAPER and case.degraded_communication.weights != "paper":
             text = f'weights other than "paper" are the law "{PAPER}"\'s, and this case has {law.name}; leave them out'
-            problems.add(f"case.{name}.handling.weights", text)
+            problems.add(f"case.{name}.degraded_communication.weights", text)
 
 
 def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from agents.agent_config import Gains, Handling, Secondary
+from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from wire.schema.plausible import Plausible, Unit
@@ -153,8 +153,8 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Control law of this case only, as `law` at the top; without it, that one."""
     gains: Annotated[Gains, INHERITED] = Gains()
     """Table `[case.NAME.gains]`: gains of this case only; what it leaves out comes from `[gains]`."""
-    handling: Annotated[Handling, INHERITED] = Handling()
-    """Table `[case.NAME.handling]`: of this case only; what it leaves out comes from `[handling]`."""
+    degraded_communication: Annotated[DegradedCommunication, INHERITED] = DegradedCommunication()
+    """Table of this case only; what it leaves out comes from `[degraded_communication]`."""
     netem: Annotated[Netem, INLINE] = Netem()
     """Entries `[[case.NAME.link]]`, `[[case.NAME.partition]]`, `[[case.NAME.node]]`: of this case only."""
 
@@ -200,8 +200,8 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     and with the law's parameters; time_limit_s is the longest time of one step."""
     gains: Gains = Gains()
     """Table `[gains]`: of the law "consensus", for every case."""
-    handling: Handling = Handling()
-    """Table `[handling]`: what agents make of bad links and of saturation, for every case."""
+    degraded_communication: DegradedCommunication = DegradedCommunication()
+    """Table `[degraded_communication]`: what agents make of bad links and of saturation, for every case."""
     processes: Processes = Processes()
     """Table `[processes]`."""
     events: tuple[Event, ...] = msgspec.field(default=(), name="event")

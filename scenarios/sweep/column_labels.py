@@ -72,8 +72,8 @@ def label_of(name: str) -> str:
     --------
     >>> label_of("time.T_c_s"), label_of("case.IV.gains.k_p"), label_of("link[1].delay")
     ('control period, T_c (s)', 'gain of P_set, k_p (s), case IV', 'delay of the links (s)')
-    >>> label_of("handling.T_age_s"), label_of("plant.gfm.k_pp"), label_of("handling.kappa_c")
-    ('T_age of [handling] (s)', 'k_pp of [plant.gfm] (rad/s per pu)', 'kappa_c of [handling] (1/s)')
+    >>> label_of("degraded_communication.T_age_s"), label_of("plant.gfm.k_pp")
+    ('T_age of [degraded_communication] (s)', 'k_pp of [plant.gfm] (rad/s per pu)')
     """
     if (index := name.rpartition(".")[2]) in INDEXES:
         return INDEXES[index].label

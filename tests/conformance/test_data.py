@@ -17,7 +17,7 @@ from scenarios.schema.configs import configs
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
 from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import FleetRun, first_difference
+from tests.toy.toy_runs import ProcessRun, first_difference
 from wire.messages import Telemetry
 
 EVENTS = (("event1", 1.0), ("event2", 4.0))
@@ -93,7 +93,7 @@ def test_both_drivers_leave_out_who_has_no_agent(tmp_path: Path) -> None:
     from msgspec.structs import replace
 
     plant, agents = replace(plant, agents=("inv1", "inv3", "inv4")), tuple(a for a in agents if a.name != "inv2")
-    run = FleetRun(plant, agents, tmp_path)
+    run = ProcessRun(plant, agents, tmp_path)
     outcome = run()
 
     assert not outcome.broke

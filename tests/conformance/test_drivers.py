@@ -18,7 +18,7 @@ from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from tests.toy.toy_runs import FleetRun, Rows, first_difference
+from tests.toy.toy_runs import ProcessRun, Rows, first_difference
 
 
 @dataclass
@@ -44,7 +44,7 @@ def driver(request: pytest.FixtureRequest, tmp_path: Path) -> Driver:
     """Each of the two drivers."""
 
     def with_processes(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
-        run = FleetRun(plant, agents, tmp_path)
+        run = ProcessRun(plant, agents, tmp_path)
         return Ran(run(), run.rows)
 
     return in_one_process if request.param == "inprocess" else with_processes
@@ -93,7 +93,7 @@ def test_neither_start_order_nor_hash_seed_matter(tmp_path: Path, monkeypatch: p
     order = ["plant", *(agent.name for agent in agents)]
     random.Random(1).shuffle(order)
     monkeypatch.setenv("PYTHONHASHSEED", "1")
-    run = FleetRun(plant, agents, tmp_path)
+    run = ProcessRun(plant, agents, tmp_path)
     outcome = run(start_order=order)
 
     assert outcome.broke == "", f"order {order}"
@@ -123,7 +123,7 @@ def test_plug_n_play_gives_the_same_history_with_processes(tmp_path: Path) -> No
         plant, end=0.4, schedule=sooner, settings=msgspec.structs.replace(plant.settings, events=events)
     )
     expected = in_one_process(plant, agents)
-    run = FleetRun(plant, agents, tmp_path)
+    run = ProcessRun(plant, agents, tmp_path)
     outcome = run(plant_command=("-m", "plant"))
 
     assert outcome.broke == ""

@@ -16,12 +16,12 @@ from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Children
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
-from tests.toy.toy_runs import FleetRun
+from tests.toy.toy_runs import ProcessRun
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"
 
 
-class Mixed(FleetRun):
+class Mixed(ProcessRun):
     """A run in which the agents of some inverters are foreign; all logs lie in one folder."""
 
     def __init__(

@@ -21,7 +21,7 @@ from wire.actions import Fetch, Publish
 from wire.codec import decode
 from wire.messages import PlantEvent, Telemetry
 
-Side = LockstepPlant | LockstepAgent
+EndSet = LockstepPlant | LockstepAgent
 
 
 class Links:
@@ -46,7 +46,7 @@ class Links:
         ]
         self.telemetry: list[Telemetry] = []
         self._rng = rng
-        self._living: dict[str, Side] = {side.token: side for side in (self.plant, *self.agents)}
+        self._living: dict[str, EndSet] = {side.token: side for side in (self.plant, *self.agents)}
         self._links: defaultdict[tuple[str, str], deque[Callable[[], None]]] = defaultdict(deque)
         self._subscribed: set[tuple[str, str, str]] = set()
         """Sender, receiver and key of the subscriptions that have arrived at the sender."""

@@ -22,7 +22,7 @@ Rows = list[tuple[float, ...]]
 COLUMNS = ("f (Hz)", "P (W)", "Q (var)", "V (V)", "P_set (W)", "V_set (V)")
 
 
-class FleetRun:
+class ProcessRun:
     """One run with processes.
 
     Parameters

@@ -218,12 +218,13 @@ def _age_note(command: LinkCommand, agent: AgentConfig) -> str:
     from netem.models.delay import Constant, RandomDelay
 
     delay = command.fault.models().get("delay") if command.fault is not None else None
-    limit = agent.control.handling.max_age or agent.max_age
+    limit = agent.control.degraded_communication.max_age or agent.max_age
     usual = (
         delay.delay_s if isinstance(delay, Constant) else delay.quantile(0.5) if isinstance(delay, RandomDelay) else 0.0
     )
     if usual < limit:
         return ""
     return (
-        f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s; see [handling] max_age_s"
+        f"note: a state {usual:g} s old is ignored, as agents use none older than {limit:g} s; see "
+        "[degraded_communication] max_age_s"
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from papers.singhal2022.experiments.degraded_communication_experiment import degraded_communication
 from papers.singhal2022.experiments.delay_experiment import communication, delay
 from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from papers.singhal2022.experiments.experiment_output import ExperimentResult
-from papers.singhal2022.experiments.handling_experiment import handling
 from papers.singhal2022.experiments.loss_experiment import loss
 from papers.singhal2022.experiments.outage_experiments import flapping, partition
 from papers.singhal2022.experiments.places_experiment import places
@@ -40,7 +40,7 @@ EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {
     "topology": FromSweep("topology-delay", topology),
     "flapping": FromScenario("flapping", flapping),
     "partition": FromScenario("partition", partition),
-    "handling": FromSweep("handling", handling),
+    "degraded-communication": FromSweep("degraded-communication", degraded_communication),
     "communication": FromSweep("communication-delay", communication),
 }
 """In the order of docs/experiments.md."""

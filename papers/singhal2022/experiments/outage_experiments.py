@@ -79,7 +79,7 @@ def predicted(runs: CaseData, case: str, length: float) -> tuple[Floats, tuple[F
     """
     inverters, load = runs.inverters(case), runs.loads[runs.scenario.events[-1].label]
     cut = cut_between(inverters, groups_of(runs, case))
-    expires = runs.scenario.cases[case].handling.max_age > 0.0
+    expires = runs.scenario.cases[case].degraded_communication.max_age > 0.0
     ticks = Ticks() if expires else Ticks(loss=dict.fromkeys(cut, LOST))
     loop = Loop(inverters=without(inverters, cut) if expires else inverters, ticks=ticks)
     nominal = load.load_pu * float(inverters.weight @ inverters.m_p)

@@ -18,7 +18,7 @@ from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import Snapshot
 from wire.messages import PLANT, AgentStatus, Telemetry
-from wire.timing.session_patience import SessionPatience
+from wire.timing.session_deadline import SessionDeadline
 
 LOOK = 1.2
 """Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""
@@ -55,7 +55,7 @@ class RunSubscriber:
         """Time at which each sender was last heard."""
         self._used: dict[str, tuple[str, ...]] = {}
         """Neighbours that each agent uses."""
-        self._patience = SessionPatience()
+        self._patience = SessionDeadline()
         client.listen(client.keys.telemetry)
         client.fetch(client.keys.config("*"))
 

@@ -155,8 +155,10 @@ def test_gains_of_the_papers_law_in_a_case_of_another_are_refused() -> None:
     with pytest.raises(gp.ScenarioError, match=r'\[gains\] are those of the law "consensus", and this case has dapi'):
         gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.gains": {"k_p": 0.001}}).check()
     weights = {"weights": "degree-normalised"}
-    with pytest.raises(gp.ScenarioError, match=r'case.IV.handling.weights: weights other than "paper" are the law'):
-        gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.handling": weights}).check()
+    with pytest.raises(
+        gp.ScenarioError, match=r'case.IV.degraded_communication.weights: weights other than "paper" are the law'
+    ):
+        gp.load("islanding").replace({"case.IV.law": "dapi", "case.IV.degraded_communication": weights}).check()
 
 
 def test_a_users_module_beside_the_scenario_is_found(tmp_path: Path) -> None:

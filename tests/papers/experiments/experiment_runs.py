@@ -23,7 +23,7 @@ ALL = "* <-> *"
 
 
 def measured(scenario: str, case: str, end_s: float, *links: Fault, **of: Any) -> dict[str, float | None]:
-    """Indexes of event 1 in one case, by their names; `gains` and `handling` of the case can be changed."""
+    """Indexes of event 1 in one case, by their names; keys of the case can be changed."""
     spec, _ = load_scenario(scenario)
     rule = spec.cases[case]
     changed = {name: msgspec.structs.replace(getattr(rule, name), **values) for name, values in of.items()}

@@ -78,7 +78,7 @@ def test_normalising_by_degree_takes_most_of_what_delay_costs_a_dense_graph() ->
     """At 0.1 s of delay on full f is back a third sooner."""
     link = Fault(on=ALL, delay=0.1)
     paper = measured("graphs", "full", 4.0, link)["t_f_s"]
-    normalised = measured("graphs", "full", 4.0, link, handling={"weights": "degree-normalised"})["t_f_s"]
+    normalised = measured("graphs", "full", 4.0, link, degraded_communication={"weights": "degree-normalised"})["t_f_s"]
 
     assert paper is not None
     assert normalised is not None

@@ -20,7 +20,7 @@ from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.drivers.process_driver import run_processes
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
-from tests.toy.toy_runs import FleetRun
+from tests.toy.toy_runs import ProcessRun
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -40,7 +40,7 @@ def killed_after(name: str, text: str) -> float:
 
 def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Path) -> None:
     """Kill -9: the run reaches its end, says who died and when, and is not reproducible; the rest restore 60 Hz."""
-    run = FleetRun(*toy_configs(4, end=6.0), tmp_path)
+    run = ProcessRun(*toy_configs(4, end=6.0), tmp_path)
     run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
     outcome = run()
     deaths = [event for event in outcome.events if event.kind == "roster"]
@@ -59,7 +59,7 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
 
 def test_a_plant_killed_in_mid_run_ends_it(tmp_path: Path) -> None:
     """Kill -9: the run ends by itself within seconds, and says who died, when, and where its log lies."""
-    run, killed = FleetRun(*toy_configs(4, end=LONG), tmp_path), []
+    run, killed = ProcessRun(*toy_configs(4, end=LONG), tmp_path), []
 
     def kill() -> None:
         run.child("plant").signal(signal.SIGKILL)
@@ -76,7 +76,7 @@ def test_a_plant_killed_in_mid_run_ends_it(tmp_path: Path) -> None:
 
 def test_a_frozen_agent_is_named_by_the_deadline(tmp_path: Path) -> None:
     """SIGSTOP: who neither answers nor dies is named, with its last tick and its last sign of life."""
-    run = FleetRun(*toy_configs(3, end=LONG, deadline=1.0), tmp_path)
+    run = ProcessRun(*toy_configs(3, end=LONG, deadline=1.0), tmp_path)
     run.at(0.4, lambda: run.child("inv2").signal(signal.SIGSTOP))
     outcome = run()
 
@@ -88,7 +88,7 @@ def test_a_frozen_agent_is_named_by_the_deadline(tmp_path: Path) -> None:
 
 def test_a_frozen_plant_is_noticed(tmp_path: Path) -> None:
     """SIGSTOP: a plant that is silent for longer than its own deadline is ended."""
-    run = FleetRun(*toy_configs(2, end=LONG, deadline=0.5), tmp_path)
+    run = ProcessRun(*toy_configs(2, end=LONG, deadline=0.5), tmp_path)
     run.at(0.4, lambda: run.child("plant").signal(signal.SIGSTOP))
     outcome = run()
 
@@ -99,7 +99,7 @@ def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
     """An agent that dies before t = 0 is reported with its exit status, its last lines and its log."""
     plant, agents = toy_configs(3)
     bad = msgspec.structs.replace(agents[1], listen=("tcp/256.0.0.1:0",))
-    outcome = FleetRun(plant, (agents[0], bad, agents[2]), tmp_path)()
+    outcome = ProcessRun(plant, (agents[0], bad, agents[2]), tmp_path)()
 
     assert outcome.broke.startswith("inv2 exited with status 2 before t = 0. Its last lines:")
     assert "cannot open a Zenoh session (listening on tcp/256.0.0.1:0)" in outcome.broke
@@ -108,7 +108,7 @@ def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
 def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
     """What is wrong with the plant's configuration is in its last lines."""
     plant, agents = toy_configs(2)
-    outcome = FleetRun(msgspec.structs.replace(plant, end=0.41), agents, tmp_path)()
+    outcome = ProcessRun(msgspec.structs.replace(plant, end=0.41), agents, tmp_path)()
 
     assert outcome.broke.startswith("plant exited with status 2 before t = 0. Its last lines:")
     assert "end: must be a positive multiple of the control period 0.02 s, got 0.41 s" in outcome.broke
@@ -118,7 +118,7 @@ def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
     """A namesake started in mid-run leaves with status 3 and a word why; the run does not notice."""
     endpoint = free_endpoint()
     plant, agents = toy_configs(3, end=LONG)
-    run, refused = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
+    run, refused = ProcessRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path), []
 
     def start_namesake() -> None:
         config = msgspec.structs.replace(agent_config("inv2"), connect=(endpoint,))
@@ -140,7 +140,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
         plant, agents = toy_configs(2)
-        run = FleetRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
+        run = ProcessRun(msgspec.structs.replace(plant, listen=(endpoint,)), agents, tmp_path / "log")
 
         with pytest.raises(ListenError, match=r"listen: tcp/127.* in use; .* choose another port, or 0"):
             run()

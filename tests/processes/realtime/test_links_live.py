@@ -26,7 +26,7 @@ from tests.processes.terminals import Desk
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
-from tests.toy.toy_runs import FleetRun
+from tests.toy.toy_runs import ProcessRun
 
 FOUR = ("inv1", "inv2", "inv3", "inv4")
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1", "inv4": "mg2"}
@@ -151,7 +151,10 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
     told = setup(links=faults, partitions=(parted,), nodes=nodes)
     plant, agents = toy_configs(4, end=3.0)
     wall = {"clock": "wall", "links": told.to_tree()}
-    run, links = FleetRun(replace(plant, **wall), [replace(agent, **wall) for agent in agents], tmp_path), LinkRecord()
+    run, links = (
+        ProcessRun(replace(plant, **wall), [replace(agent, **wall) for agent in agents], tmp_path),
+        LinkRecord(),
+    )
     outcome = run(on_links=links)
     calm = simulated(setup(links=faults), 3.0)
 

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import FleetRun
+from tests.toy.toy_runs import ProcessRun
 
 FOUR = ("inv1", "inv2", "inv3", "inv4")
 OTHERS = ("inv1", "inv3", "inv4")
@@ -232,7 +232,7 @@ def test_an_agent_without_a_plant_ends_after_its_deadline(tmp_path: Path) -> Non
 def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: Path) -> None:
     """All rows come, after end / speed, with the percentiles of the pace; who died is in the notes."""
     plant, agents = toy_configs(4, end=3.0)
-    run = FleetRun(
+    run = ProcessRun(
         replace(plant, clock="wall", speed=2.0), [replace(a, clock="wall", speed=2.0) for a in agents], tmp_path
     )
     run.at(1.0, lambda: run.child("inv3").signal(signal.SIGKILL))
@@ -252,7 +252,7 @@ def test_an_inverter_without_agent_stays_on_droop_while_the_others_share(tmp_pat
     """Nobody waits for its agent or misses it; its set-point never moves, and the frequency comes back without it."""
     plant, agents = toy_configs(4, end=3.0)
     present = [replace(agent, clock="wall", speed=4.0) for agent in agents if agent.name != "inv2"]
-    run = FleetRun(replace(plant, clock="wall", speed=4.0, agents=OTHERS), present, tmp_path)
+    run = ProcessRun(replace(plant, clock="wall", speed=4.0, agents=OTHERS), present, tmp_path)
     outcome = run()
 
     assert outcome.broke == ""
@@ -265,7 +265,7 @@ def test_a_strict_run_that_cannot_keep_pace_breaks(tmp_path: Path) -> None:
     """At a speed that nothing can keep the plant ends with status 3, says how late it was and what to do."""
     plant, agents = toy_configs(2, end=400.0)
     plant = replace(plant, clock="wall", speed=1e6, strict=True)
-    outcome = FleetRun(plant, [replace(agent, clock="wall") for agent in agents], tmp_path)()
+    outcome = ProcessRun(plant, [replace(agent, clock="wall") for agent in agents], tmp_path)()
 
     assert outcome.broke.startswith("plant: cannot keep pace at speed 1e+06: ")
     assert outcome.broke.endswith("give it a lower speed or more cores")

@@ -15,7 +15,7 @@ from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.schema import load_scenario
-from tests.toy.toy_runs import FleetRun
+from tests.toy.toy_runs import ProcessRun
 
 REAL = ("-m", "scenarios.emulation.emulated_plant")
 
@@ -34,7 +34,7 @@ class Feeder:
         self.rated = [agent.P_rated for agent in agents]
         standing = [self.agents[name] for name in plant.agents]
         self.folder = folder
-        self.run = FleetRun(plant, standing, folder)
+        self.run = ProcessRun(plant, standing, folder)
 
     def start(self, name: str) -> None:
         """Start an agent of a name while the run goes on."""

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.agent_config import Control, Handling
+from agents.agent_config import Control, DegradedCommunication
 from agents.laws.consensus import P_set_step, V_set_step
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from wire.messages import OFF, Measurement, Nameplate, State
@@ -151,7 +151,7 @@ def test_out_of_service_an_agent_stands_still_and_begins_again_from_what_the_pla
 @pytest.mark.parametrize("islands", ["switches", "frequency", "ignored"])
 def test_a_neighbour_that_is_out_of_service_is_left_out(islands: Literal["switches", "frequency", "ignored"]) -> None:
     """It has no power to share, so its 0 var would bias the others: however islands are told apart."""
-    control = replace(ALL_FULL, handling=Handling(islands=islands))
+    control = replace(ALL_FULL, degraded_communication=DegradedCommunication(islands=islands))
     agent = met(control)
     agent.hear(state("inv2"))
     agent.hear(replace(state("inv3", P_set=0.0, Q=0.0), island=OFF))

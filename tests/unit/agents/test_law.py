@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from agents.agent_config import Gains, Handling
+from agents.agent_config import DegradedCommunication, Gains
 from agents.degraded_communication import gains_in_force
 from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
 from wire.schema.table_schema import fields_of
@@ -161,7 +161,9 @@ def nets(draw: st.DrawFn, spread: float) -> Vars:
     weight = st.floats(-1.0, 1.0).map(lambda x: 10.0**x)
     gains = msgspec.structs.replace(UNBOUNDED, alpha=draw(weight), beta_GFM=draw(weight), beta_GFL=draw(weight))
     if draw(st.booleans()):
-        gains = gains_in_force(gains, Handling(weights="degree-normalised", beta_c=draw(st.floats(1.0, 30.0))))
+        gains = gains_in_force(
+            gains, DegradedCommunication(weights="degree-normalised", beta_c=draw(st.floats(1.0, 30.0)))
+        )
         A = A / A.sum(axis=1, keepdims=True)
     return Vars.drawn(A, leader, rating, draw(st.integers(0, 2**32 - 1)), gains)
 

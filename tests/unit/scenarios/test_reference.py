@@ -8,7 +8,7 @@ from typing import get_args
 import msgspec
 import pytest
 
-from agents.agent_config import Gains, Handling
+from agents.agent_config import DegradedCommunication, Gains
 from gridpeers.cli.commands.show import Topic
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
@@ -41,7 +41,7 @@ def test_every_field_has_its_sentence(cls: type[msgspec.Struct]) -> None:
     assert [doc.name for doc in field_docs(cls) if not doc.text] == []
 
 
-@pytest.mark.parametrize("cls", [Gains, Handling, Protection, GfmParameters, GflParameters, SyncCheck])
+@pytest.mark.parametrize("cls", [Gains, DegradedCommunication, Protection, GfmParameters, GflParameters, SyncCheck])
 def test_the_unit_in_a_key_is_the_one_in_its_sentence(cls: type[msgspec.Struct]) -> None:
     """T_p_s is in seconds, and its docstring says so; what is in s, pu or Hz carries it in the key."""
     units = {doc.name: re.search(r"\((s|pu|Hz)\)", doc.text) for doc in field_docs(cls)}

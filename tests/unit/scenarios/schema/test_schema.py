@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from agents.agent_config import Gains, Handling
+from agents.agent_config import DegradedCommunication, Gains
 from plant.plant_config import GfmParameters, SwitchEvent, SyncCheck
 from plant.tables.read import DATA
 from scenarios.catalogue_files import CATALOGUE
@@ -86,15 +86,16 @@ def test_a_case_changes_only_the_gains_it_names(tmp_path: Path) -> None:
 
 
 def test_a_case_changes_only_the_handling_it_names_and_agents_are_told(tmp_path: Path) -> None:
-    """[case.NAME.handling] starts from [handling], also in a case of that name, and agents get the result."""
-    text = SHORT.replace("case.only", "case.handling")
-    text += '[case.handling.handling]\nstale = "skip"\n\n[handling]\nT_age_s = 0.1\nweights = "degree-normalised"\n'
+    """A case's table starts from the common one, also in a case of that name, and agents get the result."""
+    text = SHORT.replace("case.only", "case.degraded_communication")
+    text += '[case.degraded_communication.degraded_communication]\nstale = "skip"\n\n'
+    text += '[degraded_communication]\nT_age_s = 0.1\nweights = "degree-normalised"\n'
 
     scenario, feeder = load_scenario(written(tmp_path, text))
-    agents = configs(scenario, feeder, "handling")[1]
+    agents = configs(scenario, feeder, "degraded_communication")[1]
 
-    asked = Handling(stale="skip", T_age=0.1, weights="degree-normalised")
-    assert {agent.control.handling for agent in agents} == {asked}
+    asked = DegradedCommunication(stale="skip", T_age=0.1, weights="degree-normalised")
+    assert {agent.control.degraded_communication for agent in agents} == {asked}
     again, _ = load_scenario(written(tmp_path, to_toml(scenario, {})))
     assert again == scenario
 

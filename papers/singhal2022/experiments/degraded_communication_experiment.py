@@ -1,4 +1,4 @@
-"""Options of `[handling]` for late and lost states, measured under delay and loss."""
+"""Options of `[degraded_communication]` for late and lost states, measured under delay and loss."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Condition = tuple[float, float]
 """Delay (s) and loss of all agent-agent links."""
 
 
-def handling(sweep: SweepData) -> ExperimentResult:
+def degraded_communication(sweep: SweepData) -> ExperimentResult:
     """Return the times of every option under every condition."""
     conditions = {links: _condition(links) for links in sweep.rows["link"].unique().tolist()}
     theory = {
@@ -49,7 +49,7 @@ def handling(sweep: SweepData) -> ExperimentResult:
     }
 
     def measured(case: str, links: str, option: str, index: str) -> float:
-        options = {f"handling.{key}": value for key, value in (_PAPER | dict(OPTIONS[option])).items()}
+        options = {f"degraded_communication.{key}": value for key, value in (_PAPER | dict(OPTIONS[option])).items()}
         (value,) = sweep.measured(index, sweep.where({"case": case, "link": links, **options}))
         return float(value)
 
@@ -91,7 +91,7 @@ def handling(sweep: SweepData) -> ExperimentResult:
         share_y=True,
         height=2.6,
     )
-    columns = ("graph", "links", "handling", "f (s)", "sharing (s)")
+    columns = ("graph", "links", "option", "f (s)", "sharing (s)")
     return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
 
 

@@ -10,15 +10,15 @@ from msgspec.structs import replace
 from scenarios.drivers.children import Child
 from scenarios.drivers.outcome import Outcome
 from tests.toy.toy_configs import Schedule, toy_configs
-from tests.toy.toy_runs import FleetRun, exists
+from tests.toy.toy_runs import ProcessRun, exists
 
 AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))
 
 
-def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[FleetRun, Outcome]:
+def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[ProcessRun, Outcome]:
     """A short run of the toy in simulated or wall-clock time."""
     plant, agents = toy_configs(3, end=0.4 if clock == "simulated" else 3.0, schedule=schedule)
-    run = FleetRun(
+    run = ProcessRun(
         replace(plant, clock=clock),  # type: ignore[arg-type]
         [replace(agent, clock=clock) for agent in agents],  # type: ignore[arg-type]
         folder,
@@ -26,7 +26,7 @@ def run_of(folder: Path, schedule: Schedule, clock: str) -> tuple[FleetRun, Outc
     return run, run()
 
 
-def lives(run: FleetRun, name: str) -> tuple[Child, ...]:
+def lives(run: ProcessRun, name: str) -> tuple[Child, ...]:
     """All processes that ran under a name."""
     assert run.children is not None
     return run.children.lives(name)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from agents.agent_config import Control, Gains, Handling
+from agents.agent_config import Control, DegradedCommunication, Gains
 from agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
 from agents.island_detector import IslandDetector
 from agents.realtime.realtime_agent import RealtimeAgent
@@ -27,9 +27,11 @@ KAPPA, K_Q = M_P / Gains().k_p, Gains().k_q
 ROSTER = ("inv1", "inv2", "inv3")
 
 
-def agent(name: str = "inv1", **handling: Any) -> Agent:
+def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
     """An agent of the toy that knows the two others; inv1 is a leader."""
-    control = Control(secondary="all", graph="full", handling=Handling(**handling))
+    control = Control(
+        secondary="all", graph="full", degraded_communication=DegradedCommunication(**degraded_communication)
+    )
     made = Agent(agent_config(name, control))
     for other in ROSTER:
         made.meet(Agent(agent_config(other)).nameplate)
@@ -98,7 +100,7 @@ def test_a_state_fades_beside_the_usual_age_of_its_own_link() -> None:
 @given(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.01, 10.0))
 def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float) -> None:
     """From 1 for what is new down to 0, whatever the ages."""
-    worth = StalenessWeights(Handling(stale="age-weighted", T_age=T_age))
+    worth = StalenessWeights(DegradedCommunication(stale="age-weighted", T_age=T_age))
     worth.arrived("inv2")
     new, later = worth.at_tick({"inv2": age})["inv2"], worth.at_tick({"inv2": age + longer})["inv2"]
 
@@ -109,12 +111,12 @@ def test_the_older_the_less_it_is_worth(age: float, longer: float, T_age: float)
 
 def test_a_neighbour_older_than_max_age_is_none() -> None:
     """Beyond max_age it is left out of the sums and of the degree; by default the last value counts for ever."""
-    for handling, P_bar, rate in (
+    for degraded_communication, P_bar, rate in (
         ({}, 0.7, 2 * KAPPA),
         ({"max_age": 0.1}, 0.6, KAPPA),
         ({"max_age": 0.1, "weights": "degree-normalised", "kappa_c": 5.0}, 0.6, 5.0),
     ):
-        it = agent(**handling)
+        it = agent(**degraded_communication)
         it.hear(state("inv2", 94, P_set=80e3))
         it.hear(state("inv3", 96, P_set=60e3))
 
@@ -139,9 +141,9 @@ def test_degree_normalised_weights_have_a_gain_of_their_own() -> None:
     assert half.tick(measured(2), ROSTER[1:]).P_set / 1e5 == pytest.approx(moved(0.5, 0.8, 0.5 * 5.0), rel=1e-12)
 
 
-def overloaded(ticks: int, **handling: Any) -> list[float]:
+def overloaded(ticks: int, **degraded_communication: Any) -> list[float]:
     """P_set (pu) of a lone leader that gives 0.9 pu and not more, at 59.88 Hz."""
-    it = agent(**handling)
+    it = agent(**degraded_communication)
     P_set, held = [], 90e3
     for k in range(ticks):
         held = it.tick(measured(k, P=90e3, f=59.88, P_set=held)).P_set
@@ -158,7 +160,12 @@ def test_without_limits_p_set_winds_up() -> None:
 def test_a_saturated_leader_stops_after_t_sat_and_goes_on_as_a_follower() -> None:
     """With "conditional" it no more integrates the low frequency, but agrees with its neighbours."""
     wide = replace(agent_config("inv1").control.gains, P_set_max=50.0)
-    control = Control(secondary="all", graph="full", gains=wide, handling=Handling(anti_windup="conditional"))
+    control = Control(
+        secondary="all",
+        graph="full",
+        gains=wide,
+        degraded_communication=DegradedCommunication(anti_windup="conditional"),
+    )
     it = Agent(agent_config("inv1", control))
     it.meet(Agent(agent_config("inv2")).nameplate)
     P, held = [], 90e3
@@ -202,16 +209,16 @@ def test_a_slow_inverter_is_not_saturated(lag: float, up: bool) -> None:
 
 def test_the_default_is_the_papers() -> None:
     """Without a word all gains and limits are as given, and every state heard counts in full."""
-    worth = StalenessWeights(Handling())
+    worth = StalenessWeights(DegradedCommunication())
 
-    assert gains_in_force(Gains(P_set_max=0.7), Handling()) == Gains(P_set_max=0.7)
+    assert gains_in_force(Gains(P_set_max=0.7), DegradedCommunication()) == Gains(P_set_max=0.7)
     assert [worth.at_tick({"inv2": age}) for age in (0.02, 1e6)] == [{"inv2": 1.0}] * 2
 
 
 @pytest.mark.parametrize(("max_age", "pulls"), [(0.0, False), (0.5, True)])
 def test_in_wall_clock_time_the_age_is_that_on_the_own_clock(max_age: float, pulls: bool) -> None:
     """A state that came 0.3 s ago is out by default, and counts where max_age is more; its own time is no matter."""
-    control = Control(secondary="all", graph="full", handling=Handling(max_age=max_age))
+    control = Control(secondary="all", graph="full", degraded_communication=DegradedCommunication(max_age=max_age))
     side = RealtimeAgent(replace(agent_config("inv1", control), clock="wall"), "me")
     keys = side.keys
     side.start(0.0)
@@ -258,16 +265,24 @@ def test_a_neighbour_out_of_step_is_left_out_until_the_grid_is_back() -> None:
     assert shared == [True, False, False, False, False, True]
 
 
-@pytest.mark.parametrize("handling", [
-    Handling(stale="skip"), Handling(stale="age-weighted"), Handling(max_age=0.1), Handling(anti_windup="none"),
-    Handling(anti_windup="conditional"), Handling(weights="degree-normalised"),
-    Handling(weights="degree-normalised", stale="age-weighted", anti_windup="conditional"),
-    Handling(islands="frequency"), Handling(islands="ignored"),
-])  # fmt: skip
-def test_with_good_links_every_way_restores_and_shares(handling: Handling) -> None:
+@pytest.mark.parametrize(
+    "degraded_communication",
+    [
+        DegradedCommunication(stale="skip"),
+        DegradedCommunication(stale="age-weighted"),
+        DegradedCommunication(max_age=0.1),
+        DegradedCommunication(anti_windup="none"),
+        DegradedCommunication(anti_windup="conditional"),
+        DegradedCommunication(weights="degree-normalised"),
+        DegradedCommunication(weights="degree-normalised", stale="age-weighted", anti_windup="conditional"),
+        DegradedCommunication(islands="frequency"),
+        DegradedCommunication(islands="ignored"),
+    ],
+)
+def test_with_good_links_every_way_restores_and_shares(degraded_communication: DegradedCommunication) -> None:
     """Case IV on the real plant has 60 Hz and equal power within 1.2 s of the islanding, whatever the way."""
     scenario, _ = load_scenario("islanding")
-    cases = {"IV": replace(scenario.cases["IV"], handling=handling)}
+    cases = {"IV": replace(scenario.cases["IV"], degraded_communication=degraded_communication)}
     short = replace(scenario, cases=cases, events=scenario.events[:1], time=replace(scenario.time, end_s=2.6))
 
     done = run_one(0, short, "IV")

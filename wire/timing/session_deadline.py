@@ -18,7 +18,7 @@ LONGEST = 60.0
 """Longest patience (s): a path that stays cut must not keep a process busy with sessions."""
 
 
-class SessionPatience:
+class SessionDeadline:
     """Measure how long each sender has been silent in this session.
 
     Parameters
@@ -28,7 +28,7 @@ class SessionPatience:
 
     Examples
     --------
-    >>> patience = SessionPatience(3.5)
+    >>> patience = SessionDeadline(3.5)
     >>> [patience.lost(names, now) for names, now in [(("inv2", "inv3"), 0.0), (("inv3",), 3.0), (("inv3",), 3.5)]]
     ['', '', 'inv3']
     """
@@ -39,16 +39,16 @@ class SessionPatience:
         self._patience = patience
         self._since: dict[str, float] = {}
 
-    def next(self) -> SessionPatience:
+    def next(self) -> SessionDeadline:
         """Return the patience of the next session: twice as long if this session never worked.
 
         Examples
         --------
-        >>> patience = SessionPatience(3.5).next()
+        >>> patience = SessionDeadline(3.5).next()
         >>> patience.lost(("inv3",), 0.0), patience.lost(("inv3",), 6.9), patience.lost(("inv3",), 7.0)
         ('', '', 'inv3')
         """
-        return SessionPatience(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
+        return SessionDeadline(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
 
     def lost(self, silent: Iterable[str], now: float) -> str:
         """Note the senders that are wrongly silent now; return the first that has been so too long, else ""."""
