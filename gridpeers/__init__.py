@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from agents.carriers.law_registry import LAWS
     from agents.graphs import GRAPHS
     from agents.laws.law import Law, Neighbour, Own, SetPoints
+    from gridpeers.feeder import Feeder
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
     from gridpeers.scenario import Scenario, load
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
-    from plant.equipment import Feeder
     from scenarios.results.evaluation.benchmark_registry import CLAIMS
     from scenarios.results.evaluation.claims import Claim
     from scenarios.results.evaluation.metric import METRICS
@@ -50,7 +50,7 @@ _HOME = {
     "BrokenRunError": "scenarios.run",
     "Claim": "scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
-    "Feeder": "plant.equipment",
+    "Feeder": "gridpeers.feeder",
     "FolderError": "scenarios.results.run_files",
     "Law": "agents.laws.law",
     "LinkFault": "netem.models.own_fault",

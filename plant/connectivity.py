@@ -33,6 +33,13 @@ class Connectivity:
         for transformer in feeder.transformers:
             ends = (transformer.from_bus, transformer.to_bus)
             self._fixed += [((ends[0], "A"), (bus, phase)) for bus in ends for phase in PHASES]
+        for element in feeder.elements:
+            self._fixed += [
+                (one, other)
+                for i, one in enumerate(element.nodes)
+                for j, other in enumerate(element.nodes[:i])
+                if element.Y[i][j]
+            ]
 
     def closed_at_start(self) -> frozenset[str]:
         """Return the switches that are closed at the start."""

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import msgspec
 
+from plant.imported_equipment import LinearElement, LoadPart
+
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")
 """Order of the phases in every table and vector."""
+
+NODES = "ABC456789DEFGHIJKLMNOPQRSTUVWXYZ"
+"""Letters of a bus's nodes 1, 2, 3, ... in a feeder from another program: the phases, then neutrals and the like."""
 
 
 F_NOM = 60.0
@@ -201,5 +207,18 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """The substation, or None in a feeder with inverters alone."""
     f_nom: float = F_NOM
     """Nominal frequency (Hz) of the impedances."""
+    elements: tuple[LinearElement, ...] = ()
+    """Linear elements given by their admittance: of feeders that were written for another program."""
+    load_parts: tuple[LoadPart, ...] = ()
+    """Loads of such feeders."""
+    notes: tuple[str, ...] = ()
+    """What was done in place of what such a feeder's files say."""
     spares: tuple[InverterRow, ...] = ()
     """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""
+
+    def demands(self) -> Iterator[tuple[str, str, complex]]:
+        """Yield the bus, the phases ("A", or "AB" between two) and the nominal power (VA) of each branch of a load."""
+        for load in self.loads:
+            branches = ("A", "B", "C") if load.connection == "Y" else ("AB", "BC", "CA")
+            yield from ((load.bus, branch, S) for branch, S in zip(branches, load.S, strict=True) if S)
+        yield from ((part.bus, "".join(part.ends), part.S) for part in self.load_parts)

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.commands.compare_command import compare
+from gridpeers.cli.commands.feeder_commands import app as feeders
 from gridpeers.cli.commands.init import init
 from gridpeers.cli.commands.live_commands import register
 from gridpeers.cli.commands.predict import predict
@@ -89,3 +90,4 @@ for command in (check, doc, sweep, predict, compare, init):
 for name, command in contributed():
     app.command(name)(command)
 register(app)
+app.add_typer(feeders, name="feeder")

@@ -12,6 +12,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from plant.dynamics.load_law import LoadLaw
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Circuit:
@@ -32,10 +34,8 @@ class Circuit:
     C: sp.csc_array
     """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
     I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
-    S: NDArray[np.complex128]
-    """Constant power of each branch (VA)."""
-    I0: NDArray[np.complex128]
-    """Constant current of each branch (A), at branch voltage angle 0: I = I0 V / abs(V)."""
+    loads: LoadLaw
+    """What the branches draw."""
     V_branch: NDArray[np.complex128]
     """Nominal phasor of each branch (V): where the first solution starts."""
 

@@ -17,7 +17,9 @@ from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.phasors import PHASES, aligned_sum
-from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
+from plant.dynamics.reduce_network import reduce_network
+from plant.dynamics.reduction import Reduced
+from plant.dynamics.switch_state import Complex, Real
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class _PowerFlow:
     def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
-        self.reduction = Reduction(circuit, y, units.forming, units.connected)
+        self.reduction = reduce_network(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
         self.net = self._linearise()

@@ -8,8 +8,9 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
-from plant.dynamics.newton import solve_islands
-from plant.dynamics.reduction import Complex, Real, Reduced, Reduction
+from plant.dynamics.reduce_network import Reduction, reduce_network
+from plant.dynamics.reduction import Reduced
+from plant.dynamics.switch_state import Complex, Real
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
@@ -66,7 +67,7 @@ class LiveNetwork:
         if key not in self._reductions:
             if len(self._reductions) == KEPT:
                 del self._reductions[next(iter(self._reductions))]
-            self._reductions[key] = Reduction(circuit, units.y_f, units.forming, units.connected)
+            self._reductions[key] = reduce_network(circuit, units.y_f, units.forming, units.connected)
         return self._reductions[key]
 
     def change(self, circuit: Circuit) -> None:
@@ -133,8 +134,8 @@ class LiveNetwork:
             self.V_branch[self.reduction.branches] = self._branch_voltages()
 
     def _solve_islands(self, guess: Complex) -> Complex:
-        """Return the voltages of the live branches (V) from a guess; raise NoSolutionError if islands have none."""
-        V_b, failed = solve_islands(self.reduction, self._inverters.J, self.source_voltage, guess)
+        """Voltages of the live branches (V) from a guess, or NoSolutionError."""
+        V_b, failed = self.reduction.solve_islands(self._inverters.J, self.source_voltage, guess)
         if failed:
             raise NoSolutionError(failed)
         return V_b

@@ -20,15 +20,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from plant.dynamics.blas import one_thread
 from plant.dynamics.circuit import Circuit
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from plant.dynamics.island_newton import DenseIsland, solve_island
+from plant.dynamics.kernel.sparse import NO_MAPS, SparseMaps
+from plant.dynamics.switch_state import Complex, Real, SwitchState
 
 
 class Reduced(NamedTuple):
@@ -50,6 +49,10 @@ class Reduced(NamedTuple):
     """Constant power of the live branches (VA)."""
     I0: Complex
     """Constant current of the live branches (A)."""
+    limited_at: NDArray[np.int64]
+    """Live branches with the law of a `LoadPart`."""
+    law: Real
+    """Their rows of `plant.dynamics.kernel.limited_load.COLUMNS`."""
     i_c: Complex
     """Tangent of the load law, constant part (A)."""
     A: Complex
@@ -64,68 +67,27 @@ class Reduced(NamedTuple):
     """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
     theta_lin: Real
     """That inverter's angle at the point of linearisation (rad)."""
+    sparse: SparseMaps = NO_MAPS
+    """In place of the dense matrices, for a large network."""
 
 
-class Reduction:
-    """One switch state, factored: the island structure and the linear maps, before any linearisation.
+class DenseReduction(SwitchState):
+    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation.
 
     Parameters
     ----------
-    circuit
-        The network.
-    y_f
-        Filter admittance of each inverter (S per phase); 0 for a current source.
-    forming
-        Which inverters are GFM.
-    online
-        Which inverters are connected; the others neither inject nor load the network.
+    circuit, y_f, forming, online
+        As for `SwitchState`.
     """
 
     @one_thread()
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
-        self.circuit = circuit
-        n_inv = circuit.terminals.shape[0]
-        n = circuit.Y.shape[0]
-        self.count, self.label = circuit.components()
-        self.inverter_island = self.label[circuit.terminals[:, 0]] if n_inv else np.zeros(0, np.int64)
-
-        fed = np.zeros(self.count, bool)
-        fed[self.label[circuit.sources]] = True
-        self.has_source = fed.copy()
-        fed[self.inverter_island[forming & online]] = True
-        self.live = fed
-        """Whether each island has a source or a GFM."""
-        self.online = online & fed[self.inverter_island]
-        """Inverters that are connected and in a live island."""
-        self.leader = np.full(self.count, -1, np.int64)
-        for i in reversed(range(n_inv)):
-            if forming[i] and self.online[i] and not self.has_source[self.inverter_island[i]]:
-                self.leader[self.inverter_island[i]] = i
-
-        used = np.diff(circuit.Y.indptr) > 0
-        used[circuit.terminals[self.online].ravel()] = True  # a lone inverter without load has only its filter
-        held = np.zeros(n, bool)
-        held[circuit.sources] = True
-        unknown = np.flatnonzero(fed[self.label] & ~held & used)
-        place = np.full(n, -1, np.int64)
-        place[unknown] = np.arange(unknown.size)
-
-        C = circuit.C.tocsc()
-        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
-        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first
-        """Branches in live islands."""
-        self.branch_island = self.label[first[self.branches]]
-
-        G = circuit.terminals.T.ravel()  # all A, then all B, then all C
-        y_diagonal = np.zeros(n, complex)
-        np.add.at(y_diagonal, G, np.tile(np.where(self.online, y_f, 0.0), 3))
-        Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
-        C = C[:, self.branches]
+        super().__init__(circuit, y_f, forming, online)
+        unknown, place, G, Y, C, held = self.unknown, self.place, self.terminals, self.Y, self.C, self.held
         C_U = C.tocsr()[unknown].toarray()
         C_S = C.tocsr()[circuit.sources].toarray()
         E_G = np.zeros((unknown.size, G.size))
-        free = np.flatnonzero((place[G] >= 0) & np.tile(self.online, 3))
-        E_G[place[G[free]], free] = 1.0
+        E_G[place[G[self.feeding]], self.feeding] = 1.0
         Y_US = Y[unknown][:, circuit.sources].toarray()
 
         if unknown.size:
@@ -142,16 +104,38 @@ class Reduction:
             rows[seen] = of_unknown[place[G[seen]]]
             return rows
 
-        self._unknown, self._columns = unknown, (Z_G, Z_C, Z_S)
+        self._columns = (Z_G, Z_C, Z_S)
         self._T_bG, self.Z_bb, self._b_S = C_U.T @ Z_G, C_U.T @ Z_C, C_U.T @ Z_S + C_S.T
         self._Z_GG, self._Z_Gb, self._G_S = at_terminals(Z_G), at_terminals(Z_C), at_terminals(Z_S)
         for row, node in enumerate(G):
             if held[node]:
                 self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = 1.0
 
-    def __deepcopy__(self, memo: object) -> Reduction:
-        """Return itself: it is never written, so copies of a plant share it, like its circuit."""
-        return self
+    def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
+        """Return branch voltages (V) by Newton's method, and the islands that have no solution, which keep the guess.
+
+        Parameters
+        ----------
+        J
+            Injections (A), n_inv x 3, in the common frame.
+        source_voltage
+            Phasors of the ideal sources (V).
+        guess
+            Where to begin (V, live branches).
+        """
+        at_branches, at_terminals = self.without_load(J, source_voltage)
+        V_b, failed = guess.copy(), []
+        for k in np.flatnonzero(self.live).tolist():
+            own = np.flatnonzero(self.branch_island == k)
+            rows = self.branches[own]
+            loads, nominal = self.circuit.loads.of(rows), self.circuit.V_branch[rows]
+            island = DenseIsland(self.Z_bb[np.ix_(own, own)], loads, nominal, at_branches[own])
+            solution = solve_island(island, guess[own])
+            if solution is None or not np.isfinite(at_terminals[np.tile(self.inverter_island == k, 3)]).all():
+                failed.append(k)
+            else:
+                V_b[own] = solution
+        return V_b, tuple(failed)
 
     def without_load(self, J: Complex, source_voltage: Complex) -> tuple[Complex, Complex]:
         """Return voltages (V) of branches and terminals from injections J (n_inv x 3, A) and sources (V), no load."""
@@ -168,9 +152,7 @@ class Reduction:
         return self.all_voltages(J, self._branch_currents(V_b), source_voltage)
 
     def _branch_currents(self, V_b: Complex) -> Complex:
-        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
-        I_b: Complex = np.conj(S / V_b) + I0 * V_b / np.abs(V_b)
-        return I_b
+        return self.circuit.loads.of(self.branches).currents(V_b)
 
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
         """Return the voltages (V) that the ideal sources alone give at the branches and at the terminals."""
@@ -189,9 +171,9 @@ class Reduction:
         theta
             Angle of every inverter at that point (rad).
         """
-        S, I0 = self.circuit.S[self.branches], self.circuit.I0[self.branches]
-        A, B = tangent(S, I0, V_b)
-        i_c = np.conj(S / V_b) + I0 * V_b / np.abs(V_b) - A * V_b - B * np.conj(V_b)
+        loads = self.circuit.loads.of(self.branches)
+        A, B = loads.tangent(V_b)
+        i_c = loads.currents(V_b) - A * V_b - B * np.conj(V_b)
         s_b, s_G = self.source_parts(source_voltage)
         m = V_b.size
         M = np.eye(2 * m) + _linear(self.Z_bb * A) + _conjugate_linear(self.Z_bb * B)
@@ -203,8 +185,10 @@ class Reduction:
             GGT=np.ascontiguousarray(_linear(self._Z_GG).T),
             GBT=np.ascontiguousarray(_linear(self._Z_Gb).T),
             s_G=_stack(s_G),
-            S=S,
-            I0=I0,
+            S=loads.S,
+            I0=loads.I0,
+            limited_at=loads.limited_at,
+            law=loads.law,
             i_c=i_c,
             A=A,
             B=B,
@@ -219,15 +203,9 @@ class Reduction:
         """Return every node's voltage (V), 0 in dead islands, for injections J (n_inv x 3, A) and currents I_b (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         Z_G, Z_C, Z_S = self._columns
-        V[self._unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
+        V[self.unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
         V[self.circuit.sources] = source_voltage
         return V
-
-
-def tangent(S: Complex, I0: Complex, V: Complex) -> tuple[Complex, Complex]:
-    """Return the tangent of the load law at voltages V (V): the factors (S) of a change of V and of its conjugate."""
-    magnitude = np.abs(V)
-    return I0 / (2.0 * magnitude), -np.conj(S) / np.conj(V) ** 2 - I0 * V / (2.0 * magnitude * np.conj(V))
 
 
 def _linear(M: Complex) -> Real:

@@ -67,7 +67,6 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
         source_voltage=network.source_voltage,
         terminals=terminals,
         C=C,
-        S=on.S,
-        I0=on.I0,
+        loads=on.law,
         V_branch=on.V_nom * np.exp(1j * on.phi0),
     )

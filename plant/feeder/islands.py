@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.reduction import Reduction
+from plant.dynamics.switch_state import SwitchState
 from plant.network import Network
 from wire.messages import PlantEvent
 
@@ -29,7 +29,7 @@ class Islands:
         self._reported: dict[str, str] = {}
         """Last reported text of each island."""
 
-    def names(self, reduction: Reduction) -> tuple[list[str], list[bool]]:
+    def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
         """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
         label = reduction.inverter_island.tolist()
         fed = [bool(reduction.has_source[k]) for k in label]
@@ -38,7 +38,7 @@ class Islands:
             first.setdefault(k, GRID if sourced else name)
         return [first[k] for k in label], fed
 
-    def report(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
+    def report(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
         """Return the events at t (s) of changed islands and newly dead buses, with these switches closed."""
         names, _ = self.names(reduction)
         texts = {}
@@ -58,15 +58,15 @@ class Islands:
         self._reported = texts
         return events + self.report_dead(t, closed, reduction)
 
-    def report_dead(self, t: float, closed: frozenset[str], reduction: Reduction) -> list[PlantEvent]:
+    def report_dead(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
         """Return the event at t (s) of newly dead buses, with their inverters and loads."""
         before = set(self._dead)
         self._dead = self._dead_buses(closed, reduction.live[reduction.label])
         new = [bus for bus in self._dead if bus not in before]
         if not new:
             return []
-        network = self._network
-        lost = sum(load.S[p].real for load in network.feeder.loads if load.bus in new for p in range(3)) / 1e3
+        network, dead = self._network, set(new)
+        lost = sum(S.real for bus, _, S in network.feeder.demands() if bus in dead) / 1e3
         some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
         idle = [unit.name for unit in network.inverters if unit.bus in new]
         text = f"dead: {len(new)} buses ({some}) without substation or GFM, {lost:.0f} kW of load not served"

@@ -61,7 +61,7 @@ def trip_event(
         source = network.feeder.source
         buses |= {source.bus} if source else set()
     own = [island for island in network.islands(closed) if island & buses]
-    load = sum(row.S[p].real for row in network.feeder.loads for p in range(3) if any(row.bus in of for of in own))
+    load = sum(S.real for bus, _, S in network.feeder.demands() if any(bus in of for of in own))
     rating = sum(network.inverters[i].P_rated for i in trip.inverters)
     fed = network.feeder.source is not None and any(network.feeder.source.bus in of for of in own)
     culprit = next(

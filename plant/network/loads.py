@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from plant.dynamics.load_law import LoadLaw
 from plant.network.merging import Merge
 
 
@@ -14,26 +16,16 @@ from plant.network.merging import Merge
 class LoadBranches:
     r"""Load branches from a node to ground (wye) or to another node (delta), as parallel arrays.
 
-    With the voltage across the branch :math:`V = a_f V_{n_f} - a_t V_{n_t}` its current is
-
-    .. math:: I = (S / V)^* + I_0 \, V / |V|
-
-    so the constant-current part keeps magnitude and power factor at any angle. `Network.admittance` has the
-    constant-impedance loads.
-
-    References
-    ----------
-    `inverter-models.md` section 6.2 (GridLAB-D's load model).
+    The voltage across a branch is :math:`V = a_f V_{n_f} - a_t V_{n_t}`; the current that it draws then is given by
+    `law`. Constant-impedance loads are not here, but in `Network.admittance`.
     """
 
     n_from: NDArray[np.int64]
     """Node at the beginning."""
     n_to: NDArray[np.int64]
     """Node at the end, -1: ground."""
-    S: NDArray[np.complex128]
-    """Constant power (VA)."""
-    I0: NDArray[np.complex128]
-    """Constant current (A) with the voltage's angle taken out: conj(S_I) / V_nom."""
+    law: LoadLaw
+    """What they draw from the voltage across them."""
     V_nom: NDArray[np.float64]
     """Nominal voltage across the branch (V)."""
     phi0: NDArray[np.float64]
@@ -46,31 +38,46 @@ class LoadBranches:
     def __len__(self) -> int:
         return len(self.n_from)
 
+    def __add__(self, others: LoadBranches) -> LoadBranches:
+        """Return these branches and then the others."""
+        pairs = {name: (getattr(self, name), getattr(others, name)) for name in self.__dataclass_fields__}
+        laws = pairs.pop("law")
+        return LoadBranches(law=laws[0] + laws[1], **{name: np.concatenate(pair) for name, pair in pairs.items()})
+
     def on(self, merge: Merge) -> LoadBranches:
         """Return the same loads, connected to the representatives of their nodes."""
         return LoadBranches(
             n_from=merge.representative[self.n_from],
             n_to=np.where(self.n_to < 0, -1, merge.representative[self.n_to]),
-            S=self.S,
-            I0=self.I0,
+            law=self.law,
             V_nom=self.V_nom,
             phi0=self.phi0,
             a_from=self.a_from * merge.ratio[self.n_from],
             a_to=self.a_to * merge.ratio[self.n_to],
         )
 
+    def nominal_admittance(self, n: int) -> sp.csc_array:
+        """Admittances (S) that the loads with limits have at nominal voltage, between the n nodes."""
+        at, rows = self.law.limited_at, self.law.law
+        y = (rows[:, 0] - 1j * rows[:, 1]) / rows[:, 2] ** 2
+        first, to = self.n_from[at], self.n_to[at]
+        between = to >= 0
+        entries = [
+            (first, first, self.a_from[at] ** 2 * y),
+            (to[between], to[between], (self.a_to[at] ** 2 * y)[between]),
+            (first[between], to[between], -(self.a_from[at] * self.a_to[at] * y)[between]),
+            (to[between], first[between], -(self.a_from[at] * self.a_to[at] * y)[between]),
+        ]
+        row, column, value = (np.concatenate([entry[k] for entry in entries]) for k in range(3))
+        return sp.csc_array((value, (row, column)), shape=(n, n))
+
     def voltages(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the voltages across the branches (V) from the nodes' voltages (V, line-to-ground)."""
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
 
     def branch_currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return the currents through the branches (A). A branch without voltage, in a dead island, takes none."""
-        across = self.voltages(V)
-        magnitude = np.abs(across)
-        alive = magnitude > 0.0
-        divisor = np.where(alive, across, 1.0)
-        current = np.conj(self.S / divisor) + self.I0 * divisor / np.where(alive, magnitude, 1.0)
-        return np.asarray(np.where(alive, current, 0.0), dtype=np.complex128)
+        """Currents through the branches (A). A branch without voltage, in a dead island, takes none."""
+        return self.law.currents(self.voltages(V))
 
     def powers(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the powers taken by the branches (VA)."""

@@ -10,8 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 
+from plant.dynamics.load_law import LoadLaw
 from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
+from plant.imported_equipment import LoadPart
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
@@ -49,7 +52,8 @@ class Network:
     V_nom : float64[n]
         Nominal voltages (V, line-to-neutral).
     nominal : complex128[n]
-        Nominal phasors (V). No transformer of a feeder shifts phases, so they hold behind transformers too.
+        Nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers too; in
+        a feeder of `LinearElement`s they are the voltages without load.
     switches : dict of str to Switch
         By name ("13-152"); `switch_name` finds the name.
     closed0 : frozenset of str
@@ -72,7 +76,7 @@ class Network:
         self._index = {node: i for i, node in enumerate(self.nodes)}
         self.V_nom: NDArray[np.float64] = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
         self.nominal: NDArray[np.complex128] = np.array(
-            [cmath.rect(V, ANGLE[phase]) for V, (_, phase) in zip(self.V_nom, self.nodes, strict=True)],
+            [cmath.rect(V, ANGLE.get(phase, 0.0)) for V, (_, phase) in zip(self.V_nom, self.nodes, strict=True)],
             dtype=np.complex128,
         )
         self.switches = {switch.name: switch for switch in feeder.switches}
@@ -88,6 +92,8 @@ class Network:
         self.Y_capacitors = self._capacitors()
         self.Y_loads = self._impedance_loads()
         self._Y = self.Y_branches + self.Y_capacitors + self.Y_loads
+        if feeder.elements:
+            self.nominal = self._without_load()
         self._wanted = [int(node) for node in self.source_nodes] + [
             self.index(inverter.bus, phase) for inverter in self.inverters for phase in PHASES
         ]
@@ -139,8 +145,10 @@ class Network:
         return Y
 
     def loads(self) -> LoadBranches:
-        """Return the loads of constant power and current, at their own nodes (`LoadBranches.on` moves them)."""
-        return self._load_branches([load for load in self.feeder.loads if load.model != "Z"])
+        """Give the loads that are no impedances, at their own nodes (`LoadBranches.on` moves them)."""
+        own = self._load_branches([load for load in self.feeder.loads if load.model != "Z"])
+        parts = [part for part in self.feeder.load_parts if not part.is_impedance]
+        return own + self._load_part_branches(parts) if parts else own
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
         """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
@@ -148,6 +156,11 @@ class Network:
         ends = [(line.from_bus, line.to_bus) for line in feeder.lines]
         ends += [(transformer.from_bus, transformer.to_bus) for transformer in feeder.transformers]
         ends += [(regulator.from_bus, regulator.to_bus) for regulator in feeder.regulators]
+        ends += [
+            (element.nodes[0][0], bus)
+            for element in feeder.elements
+            for bus in dict.fromkeys(b for b, _ in element.nodes)
+        ]
         ends += [(switch.from_bus, switch.to_bus) for switch in self._closed_switches(closed)]
         number = {bus.name: i for i, bus in enumerate(feeder.buses)}
         rows, columns = ([number[end[side]] for end in ends] for side in (0, 1))
@@ -157,6 +170,19 @@ class Network:
         for bus, of in zip(number, label, strict=True):
             members.setdefault(int(of), []).append(bus)
         return tuple(frozenset(buses) for buses in members.values())
+
+    def _without_load(self) -> NDArray[np.complex128]:
+        """Phasors (V) with all switches closed and no load: what transformers of any connection make of the source."""
+        merge = merge_nodes(self._node_names(), self._ties(frozenset(self.switches)), self.source_nodes.tolist())
+        T = merge.matrix()
+        Y = sp.csc_matrix(T.T @ self.Y_branches @ T)
+        used = np.flatnonzero(np.diff(Y.indptr) > 0)
+        unknown = np.setdiff1d(used, self.source_nodes)
+        V = np.zeros(len(self.nodes), np.complex128)
+        V[self.source_nodes] = self.source_voltage
+        right = -Y[unknown][:, self.source_nodes] @ self.source_voltage
+        V[unknown] = splu(sp.csc_matrix(Y[unknown][:, unknown])).solve(right)
+        return np.where(np.isfinite(merge.expand(V)), merge.expand(V), self.nominal)
 
     def _node_names(self) -> list[str]:
         return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]
@@ -202,6 +228,8 @@ class Network:
             ends = (transformer.from_bus, transformer.to_bus)
             nodes = [self.index(bus, phase) for bus in ends for phase in PHASES]
             parts.append((nodes, transformer_admittance(transformer, voltage[ends[0]], voltage[ends[1]])))
+        for element in self.feeder.elements:
+            parts.append(([self.index(*node) for node in element.nodes], np.array(element.Y, dtype=np.complex128)))
         return self._assemble(parts)
 
     def _capacitors(self) -> sp.csc_array:
@@ -216,14 +244,48 @@ class Network:
     def _impedance_loads(self) -> sp.csc_array:
         branches = self._load_branches([load for load in self.feeder.loads if load.model == "Z"])
         parts = []
-        # _load_branches returns a Z load with its nominal power in S, like a constant-power load.
-        for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.S, branches.V_nom, strict=True):
+        # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
+        for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.law.S, branches.V_nom, strict=True):
             y = S.conjugate() / V**2
             if n_to < 0:
                 parts.append(([int(n_from)], np.array([[y]])))
             else:
                 parts.append(([int(n_from), int(n_to)], np.array([[y, -y], [-y, y]])))
+        for part in self.feeder.load_parts:
+            if part.is_impedance:
+                nodes = [self.index(part.bus, phase) for phase in part.ends if phase]
+                y = part.S.conjugate() / part.V_nom**2
+                parts.append((nodes, np.array([[y, -y], [-y, y]])[: len(nodes), : len(nodes)]))
         return self._assemble(parts)
+
+    def _load_part_branches(self, parts: list[LoadPart]) -> LoadBranches:
+        first = np.array([self.index(part.bus, part.ends[0]) for part in parts], np.int64)
+        to = np.array([self.index(part.bus, part.ends[1]) if part.ends[1] else -1 for part in parts], np.int64)
+        across = self.nominal[first] - np.where(to < 0, 0.0, self.nominal[to])
+        rows = [
+            (
+                part.S.real,
+                part.S.imag,
+                part.V_nom,
+                *part.exponents,
+                part.V_low * part.V_nom,
+                part.V_min * part.V_nom,
+                part.V_max * part.V_nom,
+                part.edge,
+                part.V_off * part.V_nom,
+            )
+            for part in parts
+        ]
+        none = np.zeros(len(parts), np.complex128)
+        return LoadBranches(
+            n_from=first,
+            n_to=to,
+            law=LoadLaw(S=none, I0=none, limited_at=np.arange(len(parts)), law=np.array(rows)),
+            V_nom=np.array([part.V_nom for part in parts]),
+            phi0=np.angle(across),
+            a_from=np.ones(len(parts)),
+            a_to=np.where(to < 0, 0.0, 1.0),
+        )
 
     def _load_branches(self, loads: list[Load]) -> LoadBranches:
         n_from, n_to, power, current, V_nom, phi0 = [], [], [], [], [], []
@@ -244,8 +306,7 @@ class Network:
         return LoadBranches(
             n_from=np.array(n_from, dtype=np.int64),
             n_to=to,
-            S=np.array(power, dtype=np.complex128),
-            I0=np.array(current, dtype=np.complex128),
+            law=LoadLaw(S=np.array(power, dtype=np.complex128), I0=np.array(current, dtype=np.complex128)),
             V_nom=np.array(V_nom, dtype=np.float64),
             phi0=np.array(phi0, dtype=np.float64),
             a_from=np.ones(len(n_from)),

@@ -20,6 +20,12 @@ Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
 MOST_ITERATIONS = 200
 """Most iterations: a feeder that can carry its loads takes about 10, one that cannot diverges long before."""
 
+NOISE = 1e-8
+"""Change (pu) that may be rounding: the nodes behind a delta winding have next to nothing to ground."""
+
+STALL = 8
+"""Iterations without a smaller change after which it is rounding."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PowerFlow:
@@ -86,36 +92,48 @@ def solve_power_flow(
     if shunt is not None:
         Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
     own = loads if loads is not None else network.loads()
-    unknown = _reached(Y, network.source_nodes)
+    linear = own.nominal_admittance(len(network.nodes))
+    if linear.nnz:  # without the loads' linear part the fixed point diverges where a phase is missing
+        T = merge.matrix()
+        Y = sp.csc_array(Y + T.T @ linear @ T)
+    unknown = _reached(Y, network.source_nodes, own.on(merge))
     solve = factorized(sp.csc_matrix(Y[unknown][:, unknown]))
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
 
     V_rep = np.zeros(len(network.nodes), dtype=np.complex128)
     V_rep[unknown] = network.nominal[unknown]
     V_rep[network.source_nodes] = network.source_voltage
+    smallest, since = np.inf, 0
     for iteration in range(1, MOST_ITERATIONS + 1):
         V = merge.expand(V_rep)
-        net = -own.currents(V)
+        net = linear @ V - own.currents(V) if linear.nnz else -own.currents(V)
         if injection is not None:
             net = net + injection(V)
         V_new = solve(merge.gather(net)[unknown] - from_source)
         change = np.abs(V_new - V_rep[unknown]) / network.V_nom[unknown]
         V_rep[unknown] = V_new
         worst = int(np.argmax(change)) if len(change) else 0
-        if not len(change) or change[worst] < tolerance:
+        largest = float(change[worst]) if len(change) else 0.0
+        if largest < smallest:
+            smallest, since = largest, iteration
+        stalled = largest < NOISE and iteration - since >= STALL
+        if largest < tolerance or stalled:
             return _balance(network, merge.expand(V_rep), own, injection, shunt, iteration)
-        if not np.isfinite(change[worst]):
+        if not np.isfinite(largest):
             break
     bus, phase = network.nodes[unknown[worst]]
     raise ArithmeticError(
         f"power flow did not converge: after {iteration} iterations bus {bus} phase {phase} still changes by "
-        f"{change[worst]:.3g} pu; the load may be more than the feeder can carry"
+        f"{largest:.3g} pu; the load may be more than the feeder can carry"
     )
 
 
-def _reached(Y: sp.csc_array, source: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the nodes connected to the source through the matrix, without the source's own."""
-    _, label = connected_components(sp.csr_array(abs(Y)), directed=False)
+def _reached(Y: sp.csc_array, source: NDArray[np.int64], loads: LoadBranches) -> NDArray[np.int64]:
+    """Nodes connected to the source through the matrix or through loads (a neutral), without the source's own."""
+    between = np.flatnonzero(loads.n_to >= 0)
+    ends = (loads.n_from[between], loads.n_to[between])
+    through_loads = sp.csr_array((np.ones(between.size), ends), shape=Y.shape)
+    _, label = connected_components(sp.csr_array(abs(Y)) + through_loads, directed=False)
     reached = np.isin(label, label[source])
     reached[source] = False
     return np.flatnonzero(reached).astype(np.int64)

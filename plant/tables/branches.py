@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
-from plant.tables.buses import BusTable
+from plant.tables.buses import BusTable, is_imported
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import (
     MUTUAL,
@@ -33,7 +33,7 @@ def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig
     last_row: dict[str, CsvRow[LineConfigColumns]] = {}
     mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element's place is unknown, so none can be called missing
-    table = CsvTable(folder, "line_configs.csv", LineConfigColumns, problems, required=True)
+    table = CsvTable(folder, "line_configs.csv", LineConfigColumns, problems, required=not is_imported(folder))
     for row in table:
         it, misplaced = row.columns, not row.wrong.isdisjoint(("config", "phase_1", "phase_2"))
         name, first, second = it.config, it.phase_1, it.phase_2
@@ -77,7 +77,7 @@ def read_lines(
 ) -> tuple[Line, ...]:
     """Read lines.csv; lengths in m."""
     lines: dict[str, Line] = {}
-    for row in CsvTable(folder, "lines.csv", LineColumns, problems, required=True):
+    for row in CsvTable(folder, "lines.csv", LineColumns, problems, required=not is_imported(folder)):
         name, config, phases = row.columns.line, row.columns.config, row.columns.phases
         ends = buses.find_ends(row, phases)
         if configs is None or not config:

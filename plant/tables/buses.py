@@ -10,11 +10,16 @@ from typing import Any
 from plant.connectivity import Connectivity, Node
 from plant.equipment import PHASES, Bus, Feeder
 from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.feeder_columns import BusColumns
+from plant.tables.feeder_columns import BusColumns, ImportedBusColumns
 from wire.schema.suggestion import suggestion
 
 _SHOWN = 24
 """So many buses that are cut off are named."""
+
+
+def is_imported(folder: Path) -> bool:
+    """Return whether a feeder comes from another program: it then needs no lines of our own."""
+    return (folder / "elements.csv").is_file()
 
 
 class BusTable:
@@ -29,7 +34,8 @@ class BusTable:
     def __init__(self, folder: Path, problems: list[str]) -> None:
         self._by_name: dict[str, Bus] = {}
         self._row_of: dict[str, CsvRow[BusColumns]] = {}
-        table = CsvTable(folder, "buses.csv", BusColumns, problems, required=True)
+        columns = ImportedBusColumns if is_imported(folder) else BusColumns
+        table = CsvTable(folder, "buses.csv", columns, problems, required=True)
         self._readable = table.readable and len(table) > 0
         if table.readable and not len(table):
             problems.append("buses.csv: has no rows; a feeder needs at least one bus")
@@ -47,7 +53,10 @@ class BusTable:
 
     def find(self, row: CsvRow[Any], column: str = "bus") -> Bus | None:
         """Read a reference to a bus; None, and a problem noted, if there is no such bus."""
-        name = getattr(row.columns, column)
+        return self.named(row, column, getattr(row.columns, column))
+
+    def named(self, row: CsvRow[Any], column: str, name: str) -> Bus | None:
+        """Return the bus of a name that stands in a column; None, and a problem noted, if there is no such bus."""
         bus = self._by_name.get(name)
         if name and bus is None and self._readable:
             row.problem(f'{column} "{name}": no such bus; {suggestion(name, self._by_name, "buses")}')

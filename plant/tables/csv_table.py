@@ -11,7 +11,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from plant.equipment import PHASES
+from plant.equipment import NODES, PHASES
 from wire.schema.plausible import Plausible
 from wire.schema.suggestion import suggestion
 from wire.schema.table_schema import Field, Label, fields_of, named
@@ -26,6 +26,8 @@ class PhaseLetters:
 
     stand_in: str = ""
     """Phases in place of wrong ones; no later check asks anything of no phase."""
+    others: bool = False
+    """Whether letters of further nodes may stand behind them (`plant.equipment.NODES`)."""
 
 
 class CsvRow(Generic[C]):
@@ -77,7 +79,7 @@ class CsvRow(Generic[C]):
 def _converted(field: Field, cell: str) -> tuple[Any, str]:
     """Return the value of a cell and "", or a stand-in and the end of a sentence on the cell."""
     if letters := field.mark(PhaseLetters):
-        ordered = "".join(phase for phase in PHASES if phase in cell)
+        ordered = "".join(phase for phase in (NODES if letters.others else PHASES) if phase in cell)
         if cell and sorted(cell) == sorted(ordered):
             return ordered, ""
         return letters.stand_in, f' must be letters out of A, B, C, each once (as "ABC" or "B"), got "{cell}"'

@@ -36,7 +36,8 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
     if changes.load_factor != 1.0:
         k = changes.load_factor
         loads = tuple(replace(load, S=(k * load.S[0], k * load.S[1], k * load.S[2])) for load in feeder.loads)
-        feeder = replace(feeder, loads=loads)
+        parts = tuple(replace(part, S=k * part.S) for part in feeder.load_parts)
+        feeder = replace(feeder, loads=loads, load_parts=parts)
     return replace(
         feeder,
         inverters=tuple(_inverter(row, changes) for row in feeder.inverters),

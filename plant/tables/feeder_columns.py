@@ -36,6 +36,8 @@ Phases = Annotated[str, PhaseLetters()]
 OhmPerKm = Annotated[float, Unit("ohm/km")]
 LoadW = Annotated[float, Unit("kW"), "Real power at nominal voltage."]
 LoadVar = Annotated[float, Unit("kvar"), "Reactive power at nominal voltage."]
+Exponent = Annotated[float, Plausible("a power of the voltage", -5.0, 10.0)]
+LimitOfV = Annotated[float, Unit("pu"), Plausible("a limit of the voltage", 0.0, 5.0)]
 BankVar = Annotated[float, Unit("kvar"), Range(low=0.0), "Reactive power at V_rated_kV_LN."]
 
 
@@ -46,7 +48,7 @@ class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Name."""
     phases: Annotated[str, PhaseLetters(stand_in="ABC")]
     """Phases that it has."""
-    V_nom_kV_LL: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.1, 150.0, above_zero=True)]
+    V_nom_kV_LL: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.1, 800.0, above_zero=True)]
     """Nominal voltage, line-to-line."""
     zone: str = ""
     """Part of the feeder."""
@@ -54,6 +56,13 @@ class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Place in a drawing (any unit)."""
     y: float = 0.0
     """Place in a drawing (any unit)."""
+
+
+class ImportedBusColumns(BusColumns, frozen=True, kw_only=True):
+    """buses.csv of a feeder with elements.csv: neutrals and the like are further letters of `phases`, 4, 5, ...."""
+
+    phases: Annotated[str, PhaseLetters(stand_in="ABC", others=True)]
+    """Phases and further nodes that it has."""
 
 
 class LineColumns(msgspec.Struct, frozen=True, kw_only=True):
@@ -204,6 +213,48 @@ class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Angle of phase A."""
 
 
+class ElementColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """elements.csv: linear elements of a feeder that comes from another program, by their admittances."""
+
+    element: str
+    """Name, as in that program: "transformer.sub"."""
+    nodes: str
+    """Its nodes, bus.phase, with spaces between them."""
+    Y_S: str
+    """Its primitive admittance matrix (S), row by row, with spaces between the numbers: 1.5-2.5j."""
+
+
+class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """load_parts_SET.csv: loads of such a feeder, each phase by itself; its power goes with powers of the voltage."""
+
+    load: str
+    """Name, as in that program."""
+    bus: str
+    """Its bus."""
+    from_phase: str
+    """One end."""
+    to_phase: str = ""
+    """The other end; empty for ground."""
+    P_kW: LoadW
+    Q_kvar: LoadVar
+    V_nom_kV: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.01, 150.0, above_zero=True)]
+    """Nominal voltage across it."""
+    n_P: Exponent = 0.0
+    """Power of the voltage with which P goes: 0 constant power, 1 constant current, 2 constant impedance."""
+    n_Q: Exponent = 0.0
+    """The same for Q."""
+    V_low_pu: LimitOfV = 0.0
+    """Voltage below which it is its nominal impedance."""
+    V_min_pu: LimitOfV = 0.0
+    """Voltage below which it turns into that impedance; 0: nowhere."""
+    V_max_pu: LimitOfV = 0.0
+    """Voltage above which it is an impedance; 0: nowhere."""
+    edge: Exponent = 0.0
+    """Exponent by which its current meets these limits."""
+    V_off_pu: LimitOfV = 0.0
+    """Voltage around which it drops out; 0: nowhere."""
+
+
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):
     """feeder.toml, which may be missing: what holds for the feeder as a whole."""
 
@@ -221,6 +272,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "capacitors.csv": CapacitorColumns,
     "inverters.csv": InverterColumns,
     "source.csv": SourceColumns,
+    "elements.csv": ElementColumns,
 }
 """Tables of a feeder by their files, beside its load sets."""
 

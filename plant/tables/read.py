@@ -9,12 +9,16 @@ from plant.tables.branches import read_line_configs, read_lines, read_regulators
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.csv_table import required_columns
 from plant.tables.feeder_columns import TABLES, LoadColumns
+from plant.tables.imported import read_elements, read_load_parts
 from plant.tables.manifest import read_f_nom
 from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
 from wire.schema.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""
+
+LOAD_SETS = ("loads_", "load_parts_")
+"""How the files of a load set begin."""
 
 
 class FeederError(ValueError):
@@ -45,7 +49,7 @@ def feeders() -> tuple[str, ...]:
 
 def load_sets(folder: Path) -> tuple[str, ...]:
     """Names of the load sets in a feeder's folder: "main" for loads_main.csv."""
-    return tuple(sorted(path.stem.removeprefix("loads_") for path in folder.glob("loads_*.csv")))
+    return tuple(sorted({path.stem.removeprefix(kind) for kind in LOAD_SETS for path in folder.glob(f"{kind}*.csv")}))
 
 
 def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
@@ -85,7 +89,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     transformers = read_transformers(folder, buses, problems)
     sets = load_sets(folder)
     if load_set in sets:
-        loads = read_loads(folder, f"loads_{load_set}.csv", buses, problems)
+        needed = not (folder / f"load_parts_{load_set}.csv").is_file()
+        loads = read_loads(folder, f"loads_{load_set}.csv", buses, problems, required=needed)
     else:
         loads, columns = (), ", ".join(required_columns(LoadColumns))
         problems.append(
@@ -93,6 +98,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
             if sets
             else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {columns}"
         )
+    elements = read_elements(folder, buses, problems)
+    load_parts = read_load_parts(folder, f"load_parts_{load_set}.csv", buses, problems)
     capacitors = read_capacitors(folder, buses, problems)
     inverters = read_inverters(folder, buses, loads, problems)
     source = read_source(folder, buses, problems)
@@ -112,6 +119,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         spares=tuple(row for row in inverters if row.spare),
         source=source,
         f_nom=f_nom,
+        elements=elements,
+        load_parts=load_parts,
     )
     if not problems and found.buses:
         # After other problems this would only repeat them: a misnamed end leaves the right bus unconnected.
@@ -143,5 +152,5 @@ def _folder(feeder: str) -> Path:
 
 def _report_strange_files(folder: Path, problems: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
-        if path.name not in TABLES and not path.name.startswith("loads_"):
+        if path.name not in TABLES and not path.name.startswith(LOAD_SETS):
             problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, TABLES, 'tables')}")

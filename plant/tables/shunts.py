@@ -35,10 +35,12 @@ TAKEN = {
 _POWERS = ("P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")
 
 
-def read_loads(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[Load, ...]:
+def read_loads(
+    folder: Path, file: str, buses: BusTable, problems: list[str], *, required: bool = True
+) -> tuple[Load, ...]:
     """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
-    for row in CsvTable(folder, file, LoadColumns, problems, required=True):
+    for row in CsvTable(folder, file, LoadColumns, problems, required=required):
         it, bus = row.columns, buses.find(row)
         if bus is None:
             continue

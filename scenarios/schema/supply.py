@@ -90,13 +90,7 @@ def _states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_State]:
 
 def _load(nodes: Collection[Node], feeder: Feeder) -> float:
     """Real power (W) of the loads at some nodes; of a delta load every branch that has one of its ends there."""
-    pairs = ("AB", "BC", "CA")
-    return sum(
-        power.real
-        for load in feeder.loads
-        for branch, power in zip(("A", "B", "C") if load.connection == "Y" else pairs, load.S, strict=True)
-        if any((load.bus, phase) in nodes for phase in branch)
-    )
+    return sum(S.real for bus, ends, S in feeder.demands() if any((bus, phase) in nodes for phase in ends))
 
 
 def _what(nodes: frozenset[Node], inverters: frozenset[str], feeder: Feeder) -> str:

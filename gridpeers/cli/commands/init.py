@@ -14,14 +14,58 @@ TEMPLATE = Path(__file__).parents[1] / "template"
 """Folder that is copied."""
 
 
+SCENARIO = """\
+# A first islanding of {feeder}, proposed by `gridpeers init`: edit it, and {folder}/inverters.csv.
+name = "islanding"
+title = "Islanding of {feeder} at {switch}"
+
+[plant]
+feeder = "{folder}"
+P_set0_pu = {P_set0}  # the substation gives the rest
+
+[time]
+end_s = 6.0
+
+[[event]]
+label = "islanding"
+t_s = 1.0
+open = ["{switch}"]
+
+[case.none]
+title = "droop alone"
+secondary = "none"
+graph = "none"
+
+[case.ring]
+title = "secondary control, agents in a ring"
+secondary = "all"
+graph = "ring"
+"""
+"""Scenario file of a feeder of one's own."""
+
+
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project, new or empty.")],
+    feeder: Annotated[
+        Path | None,
+        typer.Option("--feeder", metavar="FILE.dss", help="Island this feeder: inverters and a scenario are proposed."),
+    ] = None,
+    switch: Annotated[
+        list[str] | None,
+        typer.Option("--switch", metavar="LINE", help="With --feeder: a line to make a switch; repeat it."),
+    ] = None,
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option("--leave-out", metavar="ELEMENT", help="With --feeder: do without Class.name; repeat it."),
+    ] = None,
 ) -> None:
-    """Make a project of your own: a law, a scenario and a test.
+    """Make a project of your own, or an islanding of your feeder.
 
-    Exit code: 0 it was made, 2 the folder cannot be used.
+    Without --feeder it has a law, a scenario and a test; with it, the feeder's tables, inverters and a scenario.
 
-    Example:  gridpeers init my-study
+    Exit code: 0 it was made, 2 the folder or the feeder cannot be used.
+
+    Example:  gridpeers init my-study --feeder Master.dss
     """
     import shlex
 
@@ -31,9 +75,45 @@ def init(
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             kind = "the folder is not empty" if folder.is_dir() else "this is a file"
             fail([f"{folder}: {kind}; give a new or an empty folder"], BAD_INPUT)
-        shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+        if feeder is None:
+            if switch or leave_out:
+                fail(["--switch and --leave-out go with --feeder"], BAD_INPUT)
+            shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+            following = "gridpeers run mine.toml --driver inprocess && pytest"
+        else:
+            _propose(folder, feeder, switch or [], leave_out or [])
+            following = "gridpeers run islanding.toml --driver inprocess"
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)
     for file in sorted(path.name for path in folder.iterdir()):
         typer.echo(f"{shown(folder / file)}")
-    typer.echo(f"Next:  cd {shlex.quote(str(folder))} && gridpeers run mine.toml --driver inprocess && pytest")
+    typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")
+
+
+def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str]) -> None:
+    """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
+    import msgspec
+
+    from gridpeers.cli.commands.feeder_commands import read_script
+    from scenarios.feeder_proposal import NoProposalError, NoSwitchError, propose
+
+    feeder = read_script(str(script), switches, leave_out)
+    try:
+        try:
+            proposal = propose(feeder)
+        except NoSwitchError as error:
+            if not error.lines:
+                raise
+            typer.echo(f"NOTE  no switch cuts half of the load off the substation; {error.lines[0]} is made one")
+            feeder = read_script(str(script), [*switches, error.lines[0]], leave_out)
+            proposal = propose(feeder)
+    except NoProposalError as error:
+        fail([f"{script}: {error}"], BAD_INPUT)
+    msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / feeder.name)
+    text = SCENARIO.format(feeder=feeder.name, folder=feeder.name, switch=proposal.switch, P_set0=proposal.P_set0)
+    (folder / "islanding.toml").write_text(text, encoding="utf-8")
+    rated = sum(row.P_rated for row in proposal.inverters) / 1e3
+    typer.echo(
+        f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "
+        f"{len(proposal.inverters)} inverters of {rated:.0f} kW proposed"
+    )

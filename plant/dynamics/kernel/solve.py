@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.arithmetic import multiply_add
 from plant.dynamics.kernel.compiled import compiled
+from plant.dynamics.kernel.limited_load import limited_currents
+from plant.dynamics.kernel.sparse import branch_voltages, draw, solve_factored
 
 MAX_ITERATIONS = 60
 
@@ -25,6 +27,64 @@ def load_currents(
         V = complex(re, im)
         # (S/V)* = S* V / |V|^2
         I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
+
+
+@compiled
+def remainder(net: Any, b: int, x: NDArray[np.float64], I_b: NDArray[np.complex128]) -> complex:
+    """Return what a branch draws (A) beyond the tangent of its load at x = [Re V_b; Im V_b]."""
+    V_b = complex(x[b], x[net.S.size + b])
+    drawn: complex = I_b[b] - net.i_c[b] - net.A[b] * V_b - net.B[b] * V_b.conjugate()
+    return drawn
+
+
+@compiled
+def solve_sparse(
+    net: Any,
+    J: NDArray[np.complex128],
+    rotation: NDArray[np.complex128],
+    x: NDArray[np.float64],
+    I_b: NDArray[np.complex128],
+    V: NDArray[np.complex128],
+    tolerance: float,
+) -> int:
+    """Solve as `solve_network` does, with the factors of a sparse matrix."""
+    maps = net.sparse
+    n, m, u = J.shape[0], net.S.size, maps.constant.size
+    right, base, work = maps.scratch[:u], maps.scratch[u : 2 * u], maps.scratch[2 * u :]
+    base[:] = maps.constant
+    for i in range(n):
+        if maps.feeds[i]:
+            turn = rotation[net.inverter_island[i]]
+            for phase in range(3):
+                at = maps.terminals[i, phase]
+                if at >= 0:
+                    turned = J[i, phase] * turn
+                    base[2 * at] += turned.real
+                    base[2 * at + 1] += turned.imag
+    iterations = 0
+    while True:
+        iterations += 1
+        load_currents(net.S, net.I0, x, I_b)
+        limited_currents(net.limited_at, net.law, x, I_b)
+        right[:] = base
+        for b in range(m):
+            draw(maps, b, remainder(net, b, x, I_b), right)
+        solve_factored(maps.factored, right, work)
+        change = branch_voltages(maps, right, x)
+        if change <= tolerance:
+            break
+        if iterations >= MAX_ITERATIONS or not change < 1e12:
+            return -1
+    load_currents(net.S, net.I0, x, I_b)
+    limited_currents(net.limited_at, net.law, x, I_b)
+    size = 0.0
+    for i in range(n):
+        back = rotation[net.inverter_island[i]].conjugate()
+        for phase in range(3):
+            at = maps.terminals[i, phase]
+            V[i, phase] = complex(right[2 * at], right[2 * at + 1]) * back if at >= 0 else maps.fixed[i, phase]
+            size += abs(V[i, phase])
+    return iterations if np.isfinite(size) else -1
 
 
 @compiled
@@ -59,6 +119,8 @@ def solve_network(
     work
         Room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
     """
+    if net.sparse.constant.size:
+        return solve_sparse(net, J, rotation, x, I_b, V, tolerance)
     n = J.shape[0]
     m = net.S.size
     n3, m2 = 3 * n, 2 * m
@@ -81,6 +143,7 @@ def solve_network(
     while m > 0:
         iterations += 1
         load_currents(net.S, net.I0, x, I_b)
+        limited_currents(net.limited_at, net.law, x, I_b)
         for b in range(m):
             V_b = complex(x[b], x[m + b])
             N = I_b[b] - net.i_c[b] - net.A[b] * V_b - net.B[b] * V_b.conjugate()
@@ -100,6 +163,7 @@ def solve_network(
     multiply_add(net.GGT, j, 1.0, V_G)
     if m > 0:
         load_currents(net.S, net.I0, x, I_b)
+        limited_currents(net.limited_at, net.law, x, I_b)
         for b in range(m):
             rest[b], rest[m + b] = I_b[b].real, I_b[b].imag
         multiply_add(net.GBT, rest, -1.0, V_G)

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from plant.dynamics import Circuit, Dynamics, Inverter
+from plant.dynamics.load_law import LoadLaw
 from plant.plant_config import GflParameters, GfmParameters
 
 S_B = 200e3
@@ -52,8 +53,7 @@ def circuit(
         source_voltage=NONE if source is None else source,
         terminals=np.array(terminals, np.int64),
         C=sp.csc_array((n, 0)),
-        S=NONE,
-        I0=NONE,
+        loads=LoadLaw(S=NONE, I0=NONE),
         V_branch=NONE,
     )
 

@@ -1,16 +1,16 @@
 import numpy as np
 
-from plant.dynamics.reduction import Reduction
+from plant.dynamics.reduction import DenseReduction
 from plant.feeder.circuits import Circuits
 from plant.feeder.islands import Islands
 from plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, opened
 
 
-def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = ()) -> Reduction:
+def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = ()) -> DenseReduction:
     """The reduction of a switch state, with some inverters disconnected."""
     units = network.inverters
-    return Reduction(
+    return DenseReduction(
         Circuits(network).of(closed),
         np.full(len(units), 0.1 - 1.0j),
         np.array([unit.kind == "GFM" for unit in units]),

@@ -112,12 +112,12 @@ def test_constant_current_of_the_table() -> None:
     """I0 is conj(S) / V_nom, and phi0 are 0, -120, +120 degrees in wye, +30, -90, +150 in delta."""
     wye, delta = (one_bus(load("I", connection, S, S, S)).loads() for connection in "YD")
 
-    np.testing.assert_allclose(wye.I0, S.conjugate() / V_NOM)
-    np.testing.assert_allclose(delta.I0, S.conjugate() / (np.sqrt(3.0) * V_NOM))
+    np.testing.assert_allclose(wye.law.I0, S.conjugate() / V_NOM)
+    np.testing.assert_allclose(delta.law.I0, S.conjugate() / (np.sqrt(3.0) * V_NOM))
     np.testing.assert_allclose(np.degrees(wye.phi0), [0.0, -120.0, 120.0])
     np.testing.assert_allclose(np.degrees(delta.phi0), [30.0, -90.0, 150.0])
-    assert not wye.S.any()
-    assert not delta.S.any()
+    assert not wye.law.S.any()
+    assert not delta.law.S.any()
 
 
 def test_nominal_angles_are_those_of_the_nominal_voltages() -> None:

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics.newton import Island, solve_islands
-from plant.dynamics.reduction import Reduction
+from plant.dynamics.island_newton import DenseIsland, solve_island
+from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.reduction import DenseReduction
+from plant.dynamics.sparse_reduction import SparseReduction
+from plant.dynamics.switch_state import Complex
 from plant.feeder.circuits import Circuits
 from plant.network import Network, solve_power_flow
 from plant.tables import read_feeder
@@ -15,9 +18,11 @@ from plant.tables import read_feeder
 X, E = 0.5, 240.0
 
 
-def lone_load(P: float) -> Island:
-    """One load of constant power P (W) behind a reactance X (ohm)."""
-    return Island(np.array([[1j * X]]), np.array([P + 0j]), np.zeros(1, complex), np.array([E + 0j]))
+def voltage_of(P: float, E_0: complex, guess: complex) -> Complex | None:
+    """Voltage (V) of one load of constant power P (W) behind a reactance X (ohm) and a source E_0 (V)."""
+    load = LoadLaw(S=np.array([P + 0j]), I0=np.zeros(1, complex))
+    island = DenseIsland(np.array([[1j * X]]), load, np.array([E + 0j]), np.array([E_0]))
+    return solve_island(island, np.array([guess]))
 
 
 @pytest.mark.parametrize("part", [0.1, 0.9, 0.999])
@@ -26,7 +31,7 @@ def test_a_load_behind_a_reactance_has_the_textbook_voltage(part: float, guess: 
     """|V|^2 = E^2/2 + sqrt(E^4/4 - X^2 P^2), the higher of both solutions, also from a guess near the lower one."""
     P = part * E**2 / (2.0 * X)
 
-    V = lone_load(P).solve(np.array([E + 0j]), np.array([guess * E + 0j]))
+    V = voltage_of(P, E, guess * E)
 
     assert V is not None
     assert abs(V[0]) ** 2 == pytest.approx(E**2 / 2.0 + np.sqrt(E**4 / 4.0 - (X * P) ** 2), rel=1e-9)
@@ -35,16 +40,19 @@ def test_a_load_behind_a_reactance_has_the_textbook_voltage(part: float, guess: 
 @pytest.mark.parametrize("part", [1.001, 2.0, 100.0])
 def test_more_than_the_largest_load_has_no_solution(part: float) -> None:
     """Beyond E^2 / 2X nothing is found, rather than something that does not solve."""
-    assert lone_load(part * E**2 / (2.0 * X)).solve(np.array([E + 0j]), np.array([E + 0j])) is None
+    assert voltage_of(part * E**2 / (2.0 * X), E, E) is None
 
 
 def test_what_is_not_finite_has_no_solution() -> None:
     """Injections that are not numbers give no voltages."""
-    assert lone_load(1e3).solve(np.array([complex("nan")]), np.array([E + 0j])) is None
+    assert voltage_of(1e3, complex("nan"), E) is None
 
 
+@pytest.mark.parametrize("reduction", [DenseReduction, SparseReduction])
 @pytest.mark.parametrize("scale", [1.0, 1.3, 1.6])
-def test_the_feeder_has_the_voltages_of_the_plain_power_flow(scale: float) -> None:
+def test_the_feeder_has_the_voltages_of_the_plain_power_flow(
+    scale: float, reduction: type[DenseReduction | SparseReduction]
+) -> None:
     """From nominal voltages, and from wrong ones, the same as the fixed point of `solve_power_flow`: two methods."""
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(scale * S for S in load.S)) for load in feeder.loads)
@@ -52,11 +60,10 @@ def test_the_feeder_has_the_voltages_of_the_plain_power_flow(scale: float) -> No
     want = solve_power_flow(network, network.closed0).V
     circuit = Circuits(network).of(network.closed0)
     n = len(network.inverters)
-    reduction = Reduction(circuit, np.zeros(n, complex), np.zeros(n, bool), np.zeros(n, bool))
+    state = reduction(circuit, np.zeros(n, complex), np.zeros(n, bool), np.zeros(n, bool))
 
     for factor in (1.0, 0.6 + 0.3j):
-        V_b, failed = solve_islands(
-            reduction, np.zeros((n, 3), complex), circuit.source_voltage, factor * circuit.V_branch
-        )
+        J = np.zeros((n, 3), complex)
+        V_b, failed = state.solve_islands(J, circuit.source_voltage, factor * circuit.V_branch)
         assert failed == ()
         np.testing.assert_allclose(V_b, circuit.C.T @ want, rtol=1e-7)

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from plant.dynamics import Circuit, Dynamics
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.load_law import LoadLaw
 from tests.unit.plant.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, at_rest, loaded, lone, on_stiff_bus, pair
 
 OMEGA_0 = 2.0 * np.pi * 60.0
@@ -19,8 +20,7 @@ def constant_power(p: float) -> Circuit:
     return replace(
         loaded(0.05),
         C=sp.csc_array(np.eye(3)),
-        S=np.full(3, p * S_B / 3.0 + 0j),
-        I0=np.zeros(3, complex),
+        loads=LoadLaw(S=np.full(3, p * S_B / 3.0 + 0j), I0=np.zeros(3, complex)),
         V_branch=(V_B * BALANCED).astype(complex),
     )
 

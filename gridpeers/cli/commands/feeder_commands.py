@@ -1,0 +1,192 @@
+"""The commands `gridpeers feeder ...`: import a feeder, check it, solve it, draw it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, fail
+
+if TYPE_CHECKING:
+    from gridpeers.feeder import Feeder
+    from plant.tables import FeederError
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve and draw feeders.")
+
+FeederName = Annotated[
+    str,
+    typer.Argument(metavar="FEEDER", help="A feeder that comes with gridpeers, a folder of tables, or a .dss file."),
+]
+Switches = Annotated[
+    list[str] | None,
+    typer.Option("--switch", metavar="LINE", help="A line to make a switch, beside the script's own; repeat it."),
+]
+LeaveOut = Annotated[
+    list[str] | None,
+    typer.Option("--leave-out", metavar="ELEMENT", help='Do without Class.name, * for any: "PVSystem.*"; repeat it.'),
+]
+SHOWN = 12
+"""Notes that are shown."""
+
+
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE.dss", help="Script for OpenDSS, often Master.dss.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for its tables; else the circuit's name.")] = None,
+    switch: Switches = None,
+    leave_out: LeaveOut = None,
+) -> None:
+    """Read a feeder that was written for OpenDSS, and write it as tables that a scenario can name.
+
+    Exit code: 0 it was written, 2 something in it cannot be read or represented; every such element is named.
+
+    Example:  gridpeers feeder import Master.dss --out my-feeder
+    """
+    from scenarios.results.run_files import refusal, shown
+
+    feeder = read_script(str(file), switch or [], leave_out or [])
+    folder = out or Path(feeder.name)
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            fail([f"{folder}: is there already; name a new folder with --out"], BAD_INPUT)
+        feeder.save(folder)
+    except OSError as error:
+        fail([refusal(folder, error)], BAD_INPUT)
+    _describe(feeder)
+    for note in feeder.notes[:SHOWN]:
+        typer.echo(f"NOTE  {note}")
+    if len(feeder.notes) > SHOWN:
+        typer.echo(f"NOTE  and {len(feeder.notes) - SHOWN} more")
+    typer.echo(f"Tables: {shown(folder)}")
+
+
+@app.command()
+def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = None) -> None:
+    """Check a feeder; say what it has, and what opening each switch would cut off.
+
+    Exit code: 0 it is sound, 2 it has problems; all of them are named.
+
+    Example:  gridpeers feeder check microgrid123
+    """
+    from plant.network import Network
+
+    tables = _read(feeder, switch, leave_out)
+    _describe(tables)
+    network = Network(tables)
+    load: dict[str, float] = {}
+    for bus, _, S in tables.demands():
+        load[bus] = load.get(bus, 0.0) + S.real / 1e3
+    for each in tables.switches:
+        name = each.alias or each.name
+        if not each.closed:
+            typer.echo(f"switch {name}: open")
+            continue
+        behind = next(part for part in network.islands(network.closed0 - {each.name}) if each.to_bus in part)
+        if each.from_bus in behind:
+            typer.echo(f"switch {name}: closed; there is another way around it")
+            continue
+        inverters = [row.name for row in tables.inverters if row.bus in behind]
+        cut = f"{len(behind)} buses, {sum(load.get(bus, 0.0) for bus in behind):.0f} kW of load"
+        typer.echo(f"switch {name}: closed; open, it cuts off {cut}{', ' + ', '.join(inverters) if inverters else ''}")
+
+
+@app.command()
+def solve(
+    feeder: FeederName,
+    open_: Annotated[
+        list[str] | None, typer.Option("--open", metavar="SWITCH", help="Open it first; repeat it.")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="File for all voltages.")] = None,
+    switch: Switches = None,
+    leave_out: LeaveOut = None,
+) -> None:
+    """Solve the power flow from the substation, without inverters; show the lowest and highest voltages.
+
+    Exit code: 0 it is solved, 2 it cannot be.
+
+    Example:  gridpeers feeder solve microgrid123 --open 13-152
+    """
+    from scenarios.results.run_files import refusal, shown
+
+    try:
+        table = _read(feeder, switch, leave_out).solve(open_ or ())
+    except (ValueError, ArithmeticError) as error:
+        fail([f"{feeder}: {error}"], BAD_INPUT)
+    live = table[(table["V"] > 0.0) & table["phase"].isin(list("ABC"))].sort_values("V_pu")
+    typer.echo(f"{len(live)} nodes, {len(table) - len(live)} without voltage or no phase")
+    for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
+        typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
+    if csv is not None:
+        try:
+            table.to_csv(csv, index=False)
+        except OSError as error:
+            fail([refusal(csv, error)], BAD_INPUT)
+        typer.echo(f"Voltages: {shown(csv)}")
+
+
+@app.command()
+def plot(
+    feeder: FeederName,
+    out: Annotated[Path, typer.Option("--out", help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
+    voltages: Annotated[bool, typer.Option("--voltages", help="Colour by voltage instead of by microgrid.")] = False,
+    switch: Switches = None,
+    leave_out: LeaveOut = None,
+) -> None:
+    """Draw a feeder's one-line diagram, on its coordinates or as a tree.
+
+    Exit code: 0 it was drawn, 2 it cannot be.
+
+    Example:  gridpeers feeder plot microgrid123 --out map.svg
+    """
+    from scenarios.results.run_files import refusal, shown
+
+    tables = _read(feeder, switch, leave_out)
+    try:
+        tables.plot(voltages=voltages).savefig(out, dpi=130)
+    except (ValueError, ArithmeticError) as error:
+        fail([f"{feeder}: {error}"], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(out, error)], BAD_INPUT)
+    typer.echo(f"Figure: {shown(out)}")
+
+
+def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
+    """Read a feeder that was written for OpenDSS, or end with every problem in it."""
+    from gridpeers.feeder import Feeder
+    from plant.tables import FeederError
+
+    try:
+        return Feeder.from_opendss(name, switches=switches, leave_out=leave_out)
+    except FeederError as error:
+        _refuse(error)
+
+
+def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
+    """Read a feeder of tables or a script, or end with every problem in it."""
+    from gridpeers.feeder import Feeder
+    from plant.tables import FeederError
+
+    if name.lower().endswith(".dss"):
+        return read_script(name, switch or [], leave_out or [])
+    if switch or leave_out:
+        fail(["--switch and --leave-out are for .dss files; a folder's tables can be edited"], BAD_INPUT)
+    try:
+        return Feeder.read(name)
+    except FeederError as error:
+        _refuse(error)
+
+
+def _refuse(error: FeederError) -> NoReturn:
+    count = len(error.problems)
+    fail([*([f"{count} problems:"] if count > 1 else []), *error.problems], BAD_INPUT)
+
+
+def _describe(feeder: Feeder) -> None:
+    load = sum(S.real for _, _, S in feeder.demands()) / 1e3
+    nodes = sum(len(bus.phases) for bus in feeder.buses)
+    typer.echo(
+        f"{feeder.name}: {len(feeder.buses)} buses, {nodes} nodes, {load:.0f} kW of load, "
+        f"{len(feeder.switches)} switches, {len(feeder.inverters)} inverters, {feeder.f_nom:g} Hz"
+    )

@@ -1,0 +1,184 @@
+"""Feeders in Python: of our own tables, or written for OpenDSS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import msgspec
+
+from plant.equipment import Feeder as Tables
+from plant.equipment import InverterRow
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+class Feeder(Tables, frozen=True, kw_only=True):
+    """A feeder: its buses, branches, switches, loads and inverters. It never changes; methods return another one.
+
+    Examples
+    --------
+    >>> feeder = Feeder.read("microgrid123")
+    >>> feeder = feeder.add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
+    >>> len(feeder.inverters), round(float(feeder.solve()["V_pu"].min()), 3)
+    (10, 0.898)
+    """
+
+    @classmethod
+    def read(cls, name: str | Path, load_set: str = "main") -> Feeder:
+        """Return a feeder that comes with gridpeers, by its name, or that of a folder of tables, by its path.
+
+        Raises
+        ------
+        plant.tables.FeederError
+            With every problem of its tables.
+        """
+        from plant.tables import read_feeder
+
+        return cls._of(read_feeder(str(name), load_set))
+
+    @classmethod
+    def from_opendss(
+        cls,
+        path: str | Path,
+        f_nom: float | None = None,
+        *,
+        leave_out: Sequence[str] = (),
+        switches: Sequence[str] = (),
+    ) -> Feeder:
+        """Return the feeder of a script for OpenDSS; needs the extra `opendss`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The script, often Master.dss.
+        f_nom : float, optional
+            Nominal frequency (Hz); the script's if left out.
+        leave_out : sequence of str, optional
+            Elements to do without, as `Class.name`, with `*` for any: "PVSystem.*".
+        switches : sequence of str, optional
+            Lines that can be opened, beside those that the script calls switches.
+
+        Raises
+        ------
+        plant.tables.FeederError
+            With everything that the engine refuses, and everything that cannot be represented.
+        """
+        from plant.opendss import read_opendss
+
+        return cls._of(read_opendss(path, f_nom, leave_out=leave_out, switches=switches))
+
+    @classmethod
+    def _of(cls, tables: Tables) -> Feeder:
+        return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
+
+    def add_inverter(
+        self,
+        name: str,
+        bus: str,
+        kind: Literal["GFM", "GFL"],
+        P_rated: float,
+        *,
+        microgrid: str = "MG1",
+        m_p: float = 0.01,
+        m_q: float = 0.05,
+    ) -> Feeder:
+        """Return the feeder with one inverter more.
+
+        Parameters
+        ----------
+        name : str
+            Its name, unique.
+        bus : str
+            A bus with phases A, B and C and no other inverter.
+        kind : {"GFM", "GFL"}
+            Grid-forming or grid-following.
+        P_rated : float
+            Rated power (W).
+        microgrid : str, optional
+            Microgrid it belongs to.
+        m_p, m_q : float, optional
+            Droops (pu frequency per pu power, pu voltage per pu reactive power).
+
+        Raises
+        ------
+        ValueError
+            If the name or the bus is taken, or the bus is not there or lacks a phase.
+        """
+        from wire.schema.suggestion import suggestion
+
+        found = {one.name: one for one in self.buses}.get(bus)
+        if found is None:
+            raise ValueError(f'bus "{bus}": no such bus; {suggestion(bus, [one.name for one in self.buses], "buses")}')
+        if not set("ABC") <= set(found.phases):
+            raise ValueError(f'bus "{bus}" has phases {found.phases}; an inverter needs A, B and C')
+        for row in self.inverters:
+            if name == row.name or bus == row.bus:
+                raise ValueError(
+                    f'inverter "{row.name}" at bus {row.bus} is there already; names and buses must differ'
+                )
+        row = InverterRow(
+            name=name, kind=kind, bus=bus, microgrid=microgrid, P_rated=P_rated, V_nom=found.V_nom, m_p=m_p, m_q=m_q
+        )
+        return msgspec.structs.replace(self, inverters=(*self.inverters, row))
+
+    def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:
+        """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg.
+
+        They are 0 where it does not reach.
+
+        Parameters
+        ----------
+        open_switches : sequence of str, optional
+            Switches to open first.
+
+        Raises
+        ------
+        ValueError
+            If there is no substation, or no such switch.
+        ArithmeticError
+            If the feeder cannot carry its loads.
+        """
+        import numpy as np
+        import pandas as pd
+
+        from plant.network import Network, solve_power_flow
+
+        network = Network(self)
+        closed = network.closed0 - {network.switch_name(name) for name in open_switches}
+        V = solve_power_flow(network, closed).V
+        return pd.DataFrame(
+            {
+                "bus": [bus for bus, _ in network.nodes],
+                "phase": [phase for _, phase in network.nodes],
+                "V": np.abs(V),
+                "V_pu": np.abs(V) / network.V_nom,
+                "angle_deg": np.degrees(np.angle(V)),
+            }
+        )
+
+    def plot(self, *, voltages: bool = False) -> Figure:
+        """Return a one-line diagram with microgrids, or coloured by the lowest phase's voltage at each bus."""
+        from scenarios.results.plots.feeder_diagram import feeder_diagram
+
+        V: Any = None
+        if voltages:
+            table = self.solve()
+            V = table[table["phase"].isin(list("ABC"))].groupby("bus")["V_pu"].min().to_dict()
+        return feeder_diagram(self, V)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the tables into a folder, which a scenario names as `plant.feeder`; return its path.
+
+        Raises
+        ------
+        ValueError
+            If the feeder is made of tables of our own, which are a folder already.
+        """
+        from plant.tables.write import write_feeder
+
+        write_feeder(self, Path(folder))
+        return Path(folder)

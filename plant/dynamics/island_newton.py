@@ -1,0 +1,138 @@
+r"""Voltages of one island by Newton's method, for where the frozen tangent of the inner loop does not lead.
+
+A fresh tangent is taken each iteration, and steps are shortened until the residual shrinks. Where that fails the load
+is raised from nothing to all of it (continuation): this follows the solution of high voltage up to the largest load
+that has one. So None means that the island has no solution that it could have come to, not that an iteration gave up.
+
+The Jacobian's determinant has one sign on that branch from no load on; the solutions of low voltage, at which no
+network can stand, have the other one.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from plant.dynamics.blas import one_thread
+from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.switch_state import Complex, Real
+
+ITERATIONS = 40
+"""Of Newton's method; it takes 4 to 10."""
+SHORTEST_STEP = 2.0**-10
+"""Smallest part of a Newton step, and of the load in the continuation."""
+TOLERANCE = 2e-12
+"""Largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here."""
+NOISE = 1e-12
+"""Residual (pu) below which it need not shrink: it is rounding."""
+
+
+class IslandEquations(Protocol):
+    """The equations of one island, F(V) = 0."""
+
+    without_load: Complex
+    """Voltages (V) without load, where the continuation begins."""
+    V_nom: Real
+    """Nominal magnitudes (V)."""
+
+    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
+        """Return F and its size (pu) with this part of the load."""
+
+    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
+        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
+
+
+class DenseIsland:
+    r"""An island by the impedances between its load branches, :math:`F(V) = V - E + Z I_b(V)`.
+
+    Parameters
+    ----------
+    Z
+        Impedance between its branches (ohm), with the inverters' filters.
+    loads
+        What they draw.
+    nominal
+        Nominal phasor of each (V).
+    E
+        Their voltages without load (V).
+    """
+
+    def __init__(self, Z: Complex, loads: LoadLaw, nominal: Complex, E: Complex) -> None:
+        self._Z, self._loads, self.V_nom, self.without_load = Z, loads, np.abs(nominal), E
+
+    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
+        """Return F (V) and its size (pu) with this part of the load."""
+        F = V - self.without_load + part * (self._Z @ self._loads.currents(V))
+        return F, float(np.max(np.abs(F) / self.V_nom, initial=0.0))
+
+    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
+        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
+        A, B = self._loads.tangent(V)
+        ZA, ZB = part * self._Z * A, part * self._Z * B
+        real: Real = np.block([[(ZA + ZB).real, (ZB - ZA).imag], [(ZA + ZB).imag, (ZA - ZB).real]])
+        jacobian = np.eye(2 * V.size) + real
+        try:
+            dV = np.linalg.solve(jacobian, -np.concatenate([F.real, F.imag]))
+        except np.linalg.LinAlgError:
+            return None
+        step = dV[: V.size] + 1j * dV[V.size :]
+        ended = float(np.max(np.abs(step) / self.V_nom, initial=0.0)) <= TOLERANCE
+        return step, not ended or bool(np.linalg.slogdet(jacobian)[0] > 0)
+
+
+@one_thread()
+def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
+    """Return the voltages (V) of an island, or None if there are none.
+
+    Parameters
+    ----------
+    island
+        Its equations.
+    guess
+        Where to begin (V), e.g. the last voltages.
+    """
+    if not np.isfinite(island.without_load).all():
+        return None
+    with np.errstate(all="ignore"):  # a trial beyond all bounds is not finite, and is not taken
+        solution = _newton(island, guess, 1.0)
+        return _raise_load(island) if solution is None else solution
+
+
+def _raise_load(island: IslandEquations) -> Complex | None:
+    """Continuation in the load, by steps that are halved where they fail."""
+    V, part, step = island.without_load, 0.0, 0.25
+    while part < 1.0:
+        solution = _newton(island, V, min(1.0, part + step))
+        if solution is None:
+            step /= 2.0
+            if step < SHORTEST_STEP:
+                return None
+        else:
+            V, part = solution, min(1.0, part + step)
+            step *= 2.0
+    return V
+
+
+def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | None:
+    """Solution with this part of the load, on the branch of high voltage; None if none is found."""
+    V = guess
+    F, size = island.residual(V, part)
+    for _ in range(ITERATIONS):
+        if not np.isfinite(size):
+            return None
+        taken = island.step(V, F, part)
+        if taken is None:
+            return None
+        dV, high = taken
+        if float(np.max(np.abs(dV) / island.V_nom, initial=0.0)) <= TOLERANCE:
+            return V + dV if high else None
+        length = 1.0
+        F_next, size_next = island.residual(V + dV, part)
+        while not size_next < (1.0 - 1e-4 * length) * size and size > NOISE:
+            length /= 2.0
+            if length < SHORTEST_STEP:
+                return None
+            F_next, size_next = island.residual(V + length * dV, part)
+        V, F, size = V + length * dV, F_next, size_next
+    return None

@@ -1,0 +1,245 @@
+"""A switch state of a large network: its admittances stay sparse, and are factored with the loads' tangent."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU, splu
+
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.elimination import eliminated
+from plant.dynamics.island_newton import TOLERANCE, solve_island
+from plant.dynamics.kernel.sparse import SparseMaps, factorise, factors
+from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.reduction import Reduced
+from plant.dynamics.switch_state import Complex, Real, SwitchState
+
+
+class SparseReduction(SwitchState):
+    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers.
+
+    Parameters
+    ----------
+    circuit, y_f, forming, online
+        As for `SwitchState`.
+    """
+
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+        super().__init__(circuit, y_f, forming, online)
+        rows, by_node = self.Y[self.unknown], self.C.tocsr()
+        self._whole, Y_S, C = rows[:, self.unknown], rows[:, circuit.sources], by_node[self.unknown]
+        needed = (np.diff(C.indptr) > 0) | (np.diff(Y_S.indptr) > 0)
+        at = self.place[circuit.terminals]
+        needed[at[at >= 0]] = True
+        kept, self._Y = eliminated(self._whole, needed)
+        self._label = self.label[self.unknown[kept]]
+        self._Y_S, self._C, self._C_S = Y_S[kept].tocsc(), C[kept].tocsc(), by_node[circuit.sources].tocsc()
+        self._Y_S_whole, self._C_whole = Y_S, C
+        self._loads = circuit.loads.of(self.branches)
+        self._lu: SuperLU | None = None
+        place = np.full(circuit.Y.shape[0], -1, np.int64)
+        place[self.unknown[kept]] = np.arange(kept.size)
+        self._at = place[circuit.terminals]
+        self._feeds = np.zeros(len(circuit.terminals), bool)
+        self._feeds[self.feeding % max(self._feeds.size, 1)] = True
+
+    def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
+        """Return the inner loop's arrays; see `DenseReduction.linearise`."""
+        A, B = self._loads.tangent(V_b)
+        i_c = self._loads.currents(V_b) - A * V_b - B * np.conj(V_b)
+        from_sources = self._C_S.T @ source_voltage
+        drawn = i_c + A * from_sources + B * np.conj(from_sources)
+        constant = -(self._Y_S @ source_voltage) - self._C @ drawn
+        first, second, a_first, a_second = _ends(self._C)
+        empty = np.zeros((0, 0))
+        u = 2 * self._Y.shape[0]
+        return Reduced(
+            PT=empty,
+            QT=empty,
+            x_c=np.zeros(0),
+            GGT=empty,
+            GBT=empty,
+            s_G=np.zeros(0),
+            S=self._loads.S,
+            I0=self._loads.I0,
+            limited_at=self._loads.limited_at,
+            law=self._loads.law,
+            i_c=i_c,
+            A=A,
+            B=B,
+            branch_island=self.branch_island,
+            inverter_island=self.inverter_island,
+            leader=self.leader,
+            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
+            sparse=SparseMaps(
+                factored=factors(factorise(self._real(A, B))),
+                constant=_interleaved(constant),
+                first=first,
+                second=second,
+                a_first=a_first,
+                a_second=a_second,
+                from_sources=from_sources,
+                terminals=self._at,
+                fixed=self._held_voltages(source_voltage),
+                feeds=self._feeds,
+                scratch=np.empty(3 * u),
+            ),
+        )
+
+    def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
+        """Return branch voltages by Newton's method; see `DenseReduction.solve_islands`."""
+        V_b, failed = guess.copy(), []
+        from_sources = self._C_S.T @ source_voltage
+        right = self._injected(J, self._at, self._Y.shape[0]) - self._Y_S @ source_voltage
+        nominal = self.node_guess(guess, from_sources)
+        for k in np.flatnonzero(self.live).tolist():
+            nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
+            island = SparseIsland(
+                self._Y[nodes][:, nodes].tocsc(),
+                self._C[nodes][:, own].tocsc(),
+                self._loads.of(own),
+                from_sources[own],
+                right[nodes],
+            )
+            solution = solve_island(island, nominal[nodes]) if nodes.size else np.zeros(0, complex)
+            if solution is None:
+                failed.append(k)
+            else:
+                V_b[own] = self._C[nodes][:, own].T @ solution + from_sources[own]
+        return V_b, tuple(failed)
+
+    def node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
+        """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
+        A, B = self._loads.tangent(V_b)
+        del B
+        Y = (self._Y + self._C @ sp.diags_array(A) @ self._C.T).tocsc()
+        constant = -self._C @ (self._loads.currents(V_b) - A * V_b + A * from_sources)
+        return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
+
+    def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
+        return self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
+
+    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Return the voltage of every node (V); 0 in dead islands."""
+        return self.all_voltages(J, self._loads.currents(V_b), source_voltage)
+
+    def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
+        """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
+        V = np.zeros(self.circuit.Y.shape[0], complex)
+        if self.unknown.size:
+            if self._lu is None:
+                self._lu = splu(sp.csc_matrix(self._whole))
+            right = self._injected(J, self.place[self.circuit.terminals], self.unknown.size)
+            V[self.unknown] = self._lu.solve(right - self._Y_S_whole @ source_voltage - self._C_whole @ I_b)
+        V[self.circuit.sources] = source_voltage
+        return V
+
+    def _injected(self, J: Complex, at: NDArray[np.int64], size: int) -> Complex:
+        """Currents (A) that the inverters inject at these positions into so many nodes."""
+        right = np.zeros(size, complex)
+        feeding = (at >= 0) & self._feeds[:, None]
+        np.add.at(right, at[feeding], J[feeding])
+        return right
+
+    def _held_voltages(self, source_voltage: Complex) -> Complex:
+        """Voltages (V) of the terminals that a source holds; 0 elsewhere."""
+        V = np.zeros(self.circuit.Y.shape[0], complex)
+        V[self.circuit.sources] = source_voltage
+        return np.asarray(V[self.circuit.terminals].reshape(-1, 3))
+
+    def _real(self, A: Complex, B: Complex) -> sp.csc_array:
+        return real_form(self._Y, self._C, A, B)
+
+
+class SparseIsland:
+    r"""An island by its node voltages, :math:`F(V) = Y V + C I_b(C^T V + c) - J`.
+
+    Parameters
+    ----------
+    Y
+        Admittances between its unknown nodes (S).
+    C
+        Incidence of its load branches.
+    loads
+        What they draw.
+    from_sources
+        What sources contribute to the branches' voltages, c (V).
+    right
+        Currents (A) into the nodes, J: of inverters, and from sources.
+    """
+
+    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
+        self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
+        self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
+        self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
+        self._scale = np.abs(Y.diagonal()) * self.V_nom
+
+    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
+        """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
+        drawn = self._loads.currents(self._C.T @ V + self._c)
+        F = self._Y @ V + part * (self._C @ drawn) - self._right
+        return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
+
+    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
+        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
+        A, B = self._loads.tangent(self._C.T @ V + self._c)
+        try:
+            lu = factorise(real_form(self._Y, self._C, part * A, part * B))
+        except RuntimeError:  # it is singular
+            return None
+        dV = lu.solve(-_interleaved(F)).view(complex)
+        ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
+        return dV, not ended or _positive(lu) == _positive(factorise(real_form(self._Y, self._C, 0.0 * A, 0.0 * B)))
+
+
+def real_form(Y: sp.csc_array, C: sp.csc_array, A: Complex, B: Complex) -> sp.csc_array:
+    """Return V -> (Y + C A C') V + C B C' V^* on [Re V_1, Im V_1, Re V_2, ...]."""
+    linear = (Y + C @ sp.diags_array(A) @ C.T).tocoo()
+    conjugate = (C @ sp.diags_array(B) @ C.T).tocoo()
+    rows, columns, values = [], [], []
+    for M, signs in ((linear, ((1, -1), (1, 1))), (conjugate, ((1, 1), (1, -1)))):
+        parts = ((M.data.real, M.data.imag), (M.data.imag, M.data.real))
+        for i in range(2):
+            for j in range(2):
+                rows.append(2 * M.row + i)
+                columns.append(2 * M.col + j)
+                values.append(signs[i][j] * parts[i][j])
+    size = 2 * Y.shape[0]
+    where = (np.concatenate(rows), np.concatenate(columns))
+    return sp.csc_array((np.concatenate(values), where), shape=(size, size))
+
+
+def _interleaved(V: Complex) -> Real:
+    return np.ascontiguousarray(V, complex).view(float)
+
+
+def _ends(C: sp.csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Real, Real]:
+    """Nodes of each branch and the ratios with which they count; -1 for none."""
+    m = C.shape[1]
+    nodes, ratios = np.full((2, m), -1, np.int64), np.zeros((2, m))
+    for b in range(m):
+        span = slice(C.indptr[b], C.indptr[b + 1])
+        for k, (node, ratio) in enumerate(zip(C.indices[span], C.data[span], strict=True)):
+            nodes[k, b], ratios[k, b] = node, ratio
+    return nodes[0], nodes[1], ratios[0], ratios[1]
+
+
+def _positive(lu: SuperLU) -> bool:
+    """Whether the determinant of a factored matrix is positive."""
+    negative = int((lu.U.diagonal() < 0.0).sum()) + _odd(lu.perm_r) + _odd(lu.perm_c)
+    return negative % 2 == 0
+
+
+def _odd(order: NDArray[np.int32]) -> int:
+    """1 if a permutation is odd, else 0."""
+    seen = np.zeros(order.size, bool)
+    swaps = 0
+    for start in range(order.size):
+        at = start
+        while not seen[at]:
+            seen[at] = True
+            at = int(order[at])
+            swaps += at != start
+    return swaps % 2

@@ -1,0 +1,88 @@
+"""One switch state of a network: its islands, what feeds them, and what of it is unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from plant.dynamics.circuit import Circuit
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class SwitchState:
+    """The island structure of a circuit, and its admittances with the inverters' filters.
+
+    Parameters
+    ----------
+    circuit
+        The network.
+    y_f
+        Filter admittance of each inverter (S per phase); 0 for a current source.
+    forming
+        Which inverters are GFM.
+    online
+        Which inverters are connected; the others neither inject nor load the network.
+
+    Attributes
+    ----------
+    unknown : int64[u]
+        Nodes whose voltage is unknown: in live islands, of any admittance, not held by a source.
+    place : int64[n]
+        Position of each node among them, or -1.
+    Y : csr_array, complex, n x n
+        Admittances with the connected inverters' filters (S).
+    C : csc_array, n x m
+        Incidence of the live branches.
+    terminals : int64[3 n_inv]
+        Nodes of the terminals: all A, then all B, then all C.
+    """
+
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+        self.circuit = circuit
+        n_inv = circuit.terminals.shape[0]
+        n = circuit.Y.shape[0]
+        self.count, self.label = circuit.components()
+        self.inverter_island = self.label[circuit.terminals[:, 0]] if n_inv else np.zeros(0, np.int64)
+
+        fed = np.zeros(self.count, bool)
+        fed[self.label[circuit.sources]] = True
+        self.has_source = fed.copy()
+        fed[self.inverter_island[forming & online]] = True
+        self.live = fed
+        """Whether each island has a source or a GFM."""
+        self.online = online & fed[self.inverter_island]
+        """Inverters that are connected and in a live island."""
+        self.leader = np.full(self.count, -1, np.int64)
+        for i in reversed(range(n_inv)):
+            if forming[i] and self.online[i] and not self.has_source[self.inverter_island[i]]:
+                self.leader[self.inverter_island[i]] = i
+
+        used = np.diff(circuit.Y.indptr) > 0
+        used[circuit.terminals[self.online].ravel()] = True  # a lone inverter without load has only its filter
+        held = np.zeros(n, bool)
+        held[circuit.sources] = True
+        self.held = held
+        self.unknown = np.flatnonzero(fed[self.label] & ~held & used)
+        self.place = np.full(n, -1, np.int64)
+        self.place[self.unknown] = np.arange(self.unknown.size)
+
+        C = circuit.C.tocsc()
+        first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
+        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first
+        """Branches in live islands."""
+        self.branch_island = self.label[first[self.branches]]
+
+        self.terminals = G = circuit.terminals.T.ravel()
+        y_diagonal = np.zeros(n, complex)
+        np.add.at(y_diagonal, G, np.tile(np.where(self.online, y_f, 0.0), 3))
+        self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
+        self.C = C[:, self.branches]
+        self.feeding = np.flatnonzero((self.place[G] >= 0) & np.tile(self.online, 3))
+        """Rows of `terminals` at which an inverter injects."""
+
+    def __deepcopy__(self, memo: object) -> SwitchState:
+        """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
+        return self

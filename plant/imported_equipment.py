@@ -1,0 +1,58 @@
+"""Equipment of feeders that were written for another program: elements by their admittance, loads by their law."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class LinearElement(msgspec.Struct, frozen=True, kw_only=True):
+    """Anything linear between nodes, by its primitive admittance matrix: a line, a transformer, a capacitor."""
+
+    name: str
+    """Name, unique: "transformer.sub"."""
+    nodes: tuple[tuple[str, str], ...]
+    """The nodes (bus, phase) of its rows and columns; whatever leads to ground has no row."""
+    Y: tuple[tuple[complex, ...], ...]
+    """Admittance (S); it need not be symmetric."""
+
+
+class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
+    """A load between two nodes of a bus, or a node and ground, whose power goes with a power of the voltage.
+
+    Beyond its limits it is no such load any more: above `V_max` it is the impedance that takes the same power there;
+    below `V_min` its current falls in proportion to the voltage, to the nominal impedance at `V_low` and below.
+    """
+
+    name: str
+    """Name of the load it is a part of."""
+    bus: str
+    """Where it is connected."""
+    ends: tuple[str, str]
+    """Its two phases; the second is empty for ground."""
+    S: complex
+    """Power at nominal voltage (VA)."""
+    V_nom: float
+    """Nominal voltage across it (V)."""
+    exponents: tuple[float, float]
+    """Powers of the voltage with which P and Q go: 0 constant power, 1 constant current, 2 constant impedance."""
+    V_low: float = 0.0
+    """Voltage (pu) below which it is its nominal impedance."""
+    V_min: float = 0.0
+    """Voltage (pu) below which it is limited; 0: nowhere."""
+    V_max: float = 0.0
+    """Voltage (pu) above which it is limited; 0: nowhere."""
+    edge: float = 0.0
+    """Exponent that sets its current at the limits: 0 as of constant power, 1 as of current, 2 as of impedance."""
+    V_off: float = 0.0
+    """Voltage (pu) at which it switches off, half of it off at that voltage, all of it 0.01 pu below; 0: nowhere."""
+
+    @property
+    def is_impedance(self) -> bool:
+        """Whether it is a constant impedance at any voltage.
+
+        Examples
+        --------
+        >>> LoadPart(name="l", bus="1", ends=("A", ""), S=1e3, V_nom=240.0, exponents=(2.0, 2.0)).is_impedance
+        True
+        """
+        return self.exponents == (2.0, 2.0) and self.V_off == 0.0

@@ -1,0 +1,233 @@
+"""Run a script of OpenDSS command by command, so that every command that fails is known, with its file and line.
+
+The engine itself stops at the first error. What only shows or writes results is not run.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from wire.printable import printable
+
+Execute = Callable[[str], str]
+"""Runs one command in the engine; returns its message if it fails, else an empty text."""
+
+RESULTS = frozenset(
+    [
+        "show",
+        "plot",
+        "visualize",
+        "export",
+        "dump",
+        "fileedit",
+        "helpform",
+        "quit",
+        "panel",
+        "di_plot",
+        "comparecases",
+        "yearlycurves",
+        "doscmd",
+        "save",
+        "uuids",
+        "vdiff",
+    ]
+)
+"""Commands that show or write results, or leave the engine."""
+
+INCLUDING = frozenset({"redirect", "compile"})
+"""Commands that run another script; `compile` also makes its folder the working folder."""
+
+COORDINATES = frozenset({"buscoords", "latlongcoords"})
+"""Commands that name a file without saying so."""
+
+CLOSING = {'"': '"', "'": "'", "(": ")", "[": "]", "{": "}"}
+"""What ends a quoted name, by what begins it."""
+
+FILE = re.compile(r"""(\b\w*file\s*=\s*)("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
+"""A file that a property names."""
+
+NOT_SHORT = frozenset({"set", "help", "sel", "select", "reset"})
+"""Commands that are no abbreviation of others."""
+
+KNOWN = (*sorted(INCLUDING | RESULTS | COORDINATES), "solve")
+
+SHORTEST = 3
+"""Letters that an abbreviated command has at least: "redir"."""
+
+ENCODINGS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+"""Encodings of files that begin with a mark of theirs; others are UTF-8, or of Windows."""
+
+DEEPEST = 40
+"""Scripts within scripts; more is a script that includes itself."""
+
+
+class DssScript:
+    """A script of OpenDSS and all that it includes.
+
+    Parameters
+    ----------
+    execute : Execute
+        Runs one command in the engine.
+    may_solve : Callable[[], bool]
+        Whether a bare `solve` would solve one moment, and not a day or a year.
+
+    Attributes
+    ----------
+    problems : list of str
+        Every command that failed: file, line, the engine's message.
+    not_run : dict of str to str
+        First place of each kind of command that was not run.
+    """
+
+    def __init__(self, execute: Execute, may_solve: Callable[[], bool]) -> None:
+        self._execute, self._may_solve = execute, may_solve
+        self.problems: list[str] = []
+        self.not_run: dict[str, str] = {}
+        self._folder = Path()
+
+    def run(self, path: Path) -> None:
+        """Run a script; what it includes is sought beside the script that includes it."""
+        self._folder = path.parent
+        self._run(path, path.name, depth=0)
+
+    def _run(self, path: Path, where: str, depth: int) -> None:
+        if depth > DEEPEST:
+            self.problems.append(f"{where}: includes itself, directly or through others")
+            return
+        try:
+            text = decoded(path.read_bytes())
+        except OSError as error:
+            self.problems.append(f"{where}: {path.name} cannot be read: {error.strerror}")
+            return
+        before, self._folder = self._folder, path.parent
+        for number, command in commands_of(text):
+            self._one(command, f"{path.name}:{number}", depth)
+        self._folder = before
+
+    def _one(self, command: str, where: str, depth: int) -> None:
+        first, _, rest = command.replace("\t", " ").partition(" ")
+        verb = _full_name(first.lower())
+        if verb in INCLUDING:
+            self._include(rest, where, depth)
+        elif verb in RESULTS or (verb == "solve" and (rest.strip() or not self._may_solve())):
+            self.not_run.setdefault(verb, where)
+        elif re.match(r"set\s+datapath\s*=", command, re.IGNORECASE):
+            self.not_run.setdefault("set datapath", where)
+        else:
+            if verb in COORDINATES:
+                command = f'{verb} "{self._whole_path(_bare(rest))}"'
+            else:
+                command = FILE.sub(lambda match: f'{match[1]}"{self._whole_path(_bare(match[2]))}"', command)
+            if message := self._execute(command):
+                self.problems.append(f"{where}: {printable(message)}")
+
+    def _include(self, rest: str, where: str, depth: int) -> None:
+        name = _bare(rest)
+        path = _found(self._folder / name)
+        if path is None:
+            self.problems.append(f"{where}: {name} is included, and there is no such file in {self._folder}")
+        else:
+            self._run(path, where, depth + 1)
+
+    def _whole_path(self, name: str) -> str:
+        """Return a file's whole path, as the engine stays in one working folder; the name if there is no such file."""
+        path = _found(self._folder / name)
+        return name if path is None else str(path.resolve())
+
+
+def commands_of(text: str) -> Iterator[tuple[int, str]]:
+    r"""Yield the commands of a script with the numbers of their lines.
+
+    Examples
+    --------
+    >>> list(commands_of("clear ! begin\n/* not\nthis */\n\n  new circuit.x // that\n~ basekv=4.16"))
+    [(1, 'clear'), (5, 'new circuit.x'), (6, '~ basekv=4.16')]
+    """
+    commented = False
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.lstrip().startswith("/*"):
+            commented = True
+        if commented:
+            commented = "*/" not in line
+            continue
+        command = _without_comment(line).strip()
+        if command:
+            yield number, command
+
+
+def decoded(data: bytes) -> str:
+    """Return the text of a script in whatever encoding it is.
+
+    Examples
+    --------
+    >>> decoded("bus São".encode("latin-1")), decoded("bus São".encode("utf-16"))
+    ('bus São', 'bus São')
+    """
+    for mark, encoding in ENCODINGS:
+        if data.startswith(mark):
+            return data.decode(encoding, errors="replace")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def _full_name(verb: str) -> str:
+    """Return the command that an abbreviation stands for, if it is one that matters here."""
+    if len(verb) >= SHORTEST and verb not in NOT_SHORT:
+        return next((name for name in KNOWN if name.startswith(verb)), verb)
+    return verb
+
+
+def _bare(name: str) -> str:
+    """Return a file's name without the quotes or brackets around it, its folders parted as on this system."""
+    text = re.sub(r"^file\s*=\s*", "", name.strip(), flags=re.IGNORECASE).strip()
+    close = CLOSING.get(text[:1])
+    text = text[1:].partition(close)[0] if close else text
+    return text.strip().replace("\\", "/")
+
+
+def _without_comment(line: str) -> str:
+    """Return a line up to its comment; the marks of one count as text within quotes."""
+    quote = ""
+    for i, char in enumerate(line):
+        if quote:
+            quote = "" if char == quote else quote
+        elif char in "\"'":
+            quote = char
+        elif char == "!" or line.startswith("//", i):
+            return line[:i]
+    return line
+
+
+def _found(path: Path) -> Path | None:
+    """Return a file, its name in any case of letters, as scripts are written on systems that do not mind; or None."""
+    if path.is_file():
+        return path
+    here = Path(path.anchor) if path.is_absolute() else Path()
+    for part in path.relative_to(here).parts if path.is_absolute() else path.parts:
+        if part == "..":
+            here = here / part
+            continue
+        if (here / part).exists():
+            here = here / part
+            continue
+        same = [each for each in _children(here) if each.name.lower() == part.lower()]
+        if not same:
+            return None
+        here = same[0]
+    return here if here.is_file() else None
+
+
+def _children(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []

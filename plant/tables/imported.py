@@ -1,0 +1,80 @@
+"""Tables of a feeder that comes from another program: elements by their admittances, loads by parts."""
+
+from __future__ import annotations
+
+from cmath import isfinite
+from pathlib import Path
+from typing import Any
+
+from plant.equipment import Bus
+from plant.imported_equipment import LinearElement, LoadPart
+from plant.tables.buses import BusTable
+from plant.tables.csv_table import CsvRow, CsvTable
+from plant.tables.feeder_columns import ElementColumns, LoadPartColumns
+
+Matrix = tuple[tuple[complex, ...], ...]
+
+
+def read_elements(folder: Path, buses: BusTable, problems: list[str]) -> tuple[LinearElement, ...]:
+    """Read elements.csv: names, nodes and admittance matrices."""
+    elements: dict[str, LinearElement] = {}
+    for row in CsvTable(folder, "elements.csv", ElementColumns, problems):
+        it = row.columns
+        nodes = [_node(row, text, buses) for text in it.nodes.split()]
+        Y = _matrix(row, it.Y_S, len(nodes))
+        if it.element in elements:
+            row.problem(f'element "{it.element}": there is one of this name already; names must differ')
+        elif Y is not None and all(nodes):
+            elements[it.element] = LinearElement(name=it.element, nodes=tuple(filter(None, nodes)), Y=Y)
+    return tuple(elements.values())
+
+
+def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[LoadPart, ...]:
+    """Read load_parts_SET.csv: the parts of loads, between two phases of a bus, or a phase and ground."""
+    parts: list[LoadPart] = []
+    for row in CsvTable(folder, file, LoadPartColumns, problems):
+        it, bus = row.columns, buses.find(row)
+        if bus is None or not buses.require_phases(row, bus, it.from_phase + it.to_phase):
+            continue
+        if it.from_phase == it.to_phase:
+            row.problem(f"both ends are phase {it.from_phase}; a load is between two phases, or a phase and ground")
+        if it.V_min_pu and not it.V_low_pu < it.V_min_pu:
+            row.problem(f"V_min_pu: {it.V_min_pu:g} pu must be above V_low_pu, {it.V_low_pu:g} pu")
+        parts.append(
+            LoadPart(
+                name=it.load,
+                bus=bus.name,
+                ends=(it.from_phase, it.to_phase),
+                S=1e3 * complex(it.P_kW, it.Q_kvar),
+                V_nom=1e3 * it.V_nom_kV,
+                exponents=(it.n_P, it.n_Q),
+                V_low=it.V_low_pu,
+                V_min=it.V_min_pu,
+                V_max=it.V_max_pu,
+                edge=it.edge,
+                V_off=it.V_off_pu,
+            )
+        )
+    return tuple(parts)
+
+
+def _node(row: CsvRow[Any], text: str, buses: BusTable) -> tuple[str, str] | None:
+    """Return the node that "650.A" names; None, and a problem noted, if there is none."""
+    name, _, phase = text.rpartition(".")
+    bus: Bus | None = buses.named(row, "nodes", name)
+    if bus is None or not buses.require_phases(row, bus, phase):
+        return None
+    return bus.name, phase
+
+
+def _matrix(row: CsvRow[Any], text: str, n: int) -> Matrix | None:
+    """Return a square matrix of n rows; None, and a problem noted, if the text is none."""
+    try:
+        values = [complex(value) for value in text.split()]
+    except ValueError as error:
+        row.problem(f"Y_S: {error}; numbers are written as 1.5-2.5j")
+        return None
+    if len(values) != n * n or not all(map(isfinite, values)):
+        row.problem(f"Y_S: has {len(values)} numbers; {n} nodes need {n} times {n}, all finite")
+        return None
+    return tuple(tuple(values[i * n : (i + 1) * n]) for i in range(n))

@@ -1,0 +1,204 @@
+"""One-line diagram of a feeder: its branches, switches, inverters and islands, or its voltages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from plant.connectivity import Connectivity
+from plant.equipment import Feeder, Switch
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""
+
+BESIDE = "#8a8a8a"
+"""The zone of the substation, and buses of no zone."""
+
+WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}
+"""Width of a branch (pt) by its number of phases."""
+
+HALO: Any = [withStroke(linewidth=2.0, foreground="white")]
+"""Around labels, so that they can be read on branches."""
+
+MANY = 400
+"""Buses beyond which loads are not marked and branches are half as wide."""
+
+Places = Mapping[str, tuple[float, float]]
+
+
+def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figure:
+    """Draw a feeder on its coordinates, or as a tree where it has none.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        Its tables.
+    V : Mapping[str, float], optional
+        Voltage (pu) of each bus, by which branches are coloured; else they have their zone's colour.
+    """
+    picture = Figure(figsize=(10.5, 7.2), layout="constrained")
+    at = places(feeder)
+    axes = picture.add_subplot(aspect="equal" if _has_coordinates(feeder) else "auto")
+    _draw_branches(feeder, at, V, axes, picture)
+    few = len(feeder.buses) <= MANY
+    zones = _zones(feeder)
+    colours = _colours(feeder, zones)
+    if few:
+        for bus in dict.fromkeys(bus for bus, _, _ in feeder.demands()):
+            axes.plot(*at[bus], ".", color="black" if V else colours.get(zones[bus], BESIDE), ms=3.5, zorder=2)
+    for switch in feeder.switches:
+        _draw_switch(switch, at, axes, named=few)
+    for row in (*feeder.inverters, *feeder.spares):
+        GFM = row.kind == "GFM"
+        face = "white" if row.spare else colours.get(row.microgrid, BESIDE)
+        axes.plot(*at[row.bus], marker="s" if GFM else "o", ms=10 if GFM else 8, mfc=face, mec="black", zorder=4)
+        text = f"{row.name}{' (spare)' if row.spare else ''}"
+        axes.annotate(text, at[row.bus], (6, 6), textcoords="offset points", weight="bold", zorder=5, path_effects=HALO)
+    if feeder.source is not None:
+        axes.plot(*at[feeder.source.bus], marker="D", ms=10, color="black", zorder=4)
+        axes.annotate("substation", at[feeder.source.bus], (0, -16), textcoords="offset points", ha="center")
+    _legend(feeder, zones, colours if V is None else {}, axes, picture)
+    axes.set_axis_off()
+    return picture
+
+
+def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
+    """Return where each bus is drawn: its coordinates, else beside a neighbour; a tree if the feeder has none."""
+    if not _has_coordinates(feeder):
+        return _tree(feeder)
+    known = {bus.name: (bus.x, bus.y) for bus in feeder.buses if (bus.x, bus.y) != (0.0, 0.0)}
+    neighbours = _neighbours(feeder)
+    waiting = list(known)
+    for bus in waiting:  # it grows while buses without coordinates take those of a neighbour
+        for other in neighbours[bus]:
+            if other not in known:
+                known[other] = known[bus]
+                waiting.append(other)
+    return {bus.name: known.get(bus.name, (bus.x, bus.y)) for bus in feeder.buses}
+
+
+def branches(feeder: Feeder) -> Iterator[tuple[str, str, int]]:
+    """Yield the ends of every branch, switches left out, and its number of phases."""
+    yield from ((line.from_bus, line.to_bus, len(line.phases)) for line in feeder.lines)
+    yield from ((row.from_bus, row.to_bus, 3) for row in feeder.transformers)
+    yield from ((row.from_bus, row.to_bus, len(row.phases)) for row in feeder.regulators)
+    for element in feeder.elements:
+        buses = list(dict.fromkeys(bus for bus, _ in element.nodes))
+        phases = sum(bus == buses[0] for bus, _ in element.nodes) if buses else 0
+        yield from ((buses[0], other, min(max(phases, 1), 3)) for other in buses[1:])
+
+
+def _has_coordinates(feeder: Feeder) -> bool:
+    return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
+
+
+def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
+    ends = [(a, b) for a, b, _ in branches(feeder)]
+    for a, b in (*ends, *((switch.from_bus, switch.to_bus) for switch in feeder.switches)):
+        found[a].append(b)
+        found[b].append(a)
+    return found
+
+
+def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
+    """Place each bus by its distance from the substation, and among its like by its first leaf."""
+    neighbours = _neighbours(feeder)
+    root = feeder.source.bus if feeder.source else feeder.buses[0].name
+    children: dict[str, list[str]] = {bus: [] for bus in neighbours}
+    depth, order = {root: 0}, [root]
+    rest = iter(list(neighbours))
+    while len(order) < len(neighbours):
+        for bus in order:
+            for other in neighbours[bus]:
+                if other not in depth:
+                    depth[other] = depth[bus] + 1
+                    children[bus].append(other)
+                    order.append(other)
+        if len(order) < len(neighbours):  # a section that nothing connects
+            other = next(bus for bus in rest if bus not in depth)
+            depth[other] = 0
+            order.append(other)
+    height: dict[str, float] = {}
+    leaves = 0
+    for bus in reversed(order):
+        below = [height[child] for child in children[bus]]
+        if not below:
+            leaves += 1
+        height[bus] = float(np.mean(below)) if below else float(leaves)
+    return {bus: (float(depth[bus]), height[bus]) for bus in order}
+
+
+def _zones(feeder: Feeder) -> dict[str, str]:
+    """Return the zone of each bus: as its table says, else the microgrid whose inverters its section has."""
+    if any(bus.zone for bus in feeder.buses):
+        return {bus.name: bus.zone for bus in feeder.buses}
+    found = {bus.name: "" for bus in feeder.buses}
+    for part in Connectivity(feeder).parts(closed=()):
+        buses = {bus for bus, _ in part}
+        if feeder.source and feeder.source.bus in buses:
+            continue
+        microgrid = next((row.microgrid for row in feeder.inverters if row.bus in buses), "")
+        found.update(dict.fromkeys(buses, microgrid))
+    return found
+
+
+def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
+    """Return the colour of each zone."""
+    beside = {"", zones[feeder.source.bus] if feeder.source is not None else ""}
+    first = [row.microgrid for row in feeder.inverters]
+    named = [zone for zone in dict.fromkeys((*first, *zones.values())) if zone not in beside]
+    return dict(zip(named, COLOURS, strict=False)) | dict.fromkeys(beside, BESIDE)
+
+
+def _draw_branches(feeder: Feeder, at: Places, V: Mapping[str, float] | None, axes: Axes, picture: Figure) -> None:
+    thin = 0.5 if len(feeder.buses) > MANY else 1.0
+    rows = list(branches(feeder))
+    lines = LineCollection([(at[a], at[b]) for a, b, _ in rows], zorder=1, capstyle="round")
+    lines.set_linewidth([thin * WIDTH[phases] for _, _, phases in rows])
+    if V is None:
+        zones = _zones(feeder)
+        colours = _colours(feeder, zones)
+        lines.set_color([colours.get(zones[a], BESIDE) for a, _, _ in rows])
+    else:
+        lines.set_array(np.array([(V[a] + V[b]) / 2.0 for a, b, _ in rows]))
+        lines.set(cmap="viridis", clim=(0.9, 1.1))
+        picture.colorbar(lines, ax=axes, label="V (pu, lowest phase)", shrink=0.6)
+    axes.add_collection(lines)
+    axes.autoscale_view()
+
+
+def _draw_switch(switch: Switch, at: Places, axes: Axes, *, named: bool) -> None:
+    """Draw a switch: black when closed, white when open; its name if its sides stand apart or it has another one."""
+    a, b = at[switch.from_bus], at[switch.to_bus]
+    middle = (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
+    axes.plot((a[0], b[0]), (a[1], b[1]), color="black", lw=1.0, ls="-" if switch.closed else ":", zorder=1)
+    axes.plot(*middle, marker="s", ms=5, mfc="black" if switch.closed else "white", mec="black", zorder=3)
+    if named:
+        text = switch.alias or switch.name
+        axes.annotate(text, middle, (5, -9), textcoords="offset points", size=7.5, zorder=5, path_effects=HALO)
+
+
+def _legend(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str], axes: Axes, picture: Figure) -> None:
+    """Say what the marks are, and how much load each zone has."""
+    load: dict[str, float] = {}
+    for bus, _, S in feeder.demands():
+        load[zones[bus]] = load.get(zones[bus], 0.0) + S.real / 1e3
+    for zone, colour in colours.items():
+        rated = sum(row.P_rated for row in feeder.inverters if row.microgrid == zone) / 1e3
+        text = f"{zone or 'no zone'}: {load.get(zone, 0.0):.0f} kW of load" + (
+            f", {rated:.0f} kW of inverters" if rated else ""
+        )
+        if zone in zones.values():
+            axes.plot([], [], color=colour, lw=3, label=text)
+    for marker, face, text in (("s", BESIDE, "GFM inverter"), ("o", BESIDE, "GFL inverter"), ("o", "white", "spare")):
+        axes.plot([], [], marker=marker, ms=8, mfc=face, mec="black", ls="", label=text)
+    axes.plot([], [], marker="s", ms=5, mfc="black", mec="black", ls="", label="switch, closed")
+    axes.plot([], [], marker="s", ms=5, mfc="white", mec="black", ls="", label="switch, open")
+    picture.legend(loc="outside lower center", frameon=False, ncols=2)

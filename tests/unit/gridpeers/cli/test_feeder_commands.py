@@ -1,0 +1,64 @@
+"""`gridpeers feeder ...` and `gridpeers init --feeder`, on a feeder written for OpenDSS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from plant.tables import read_feeder
+from tests.command_line import invoke
+
+pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
+IEEE13 = str(Path(__file__).parents[3] / "feeders" / "ieee13.dss")
+
+
+def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path) -> None:
+    """After `init --feeder` and `run` the island of the whole feeder is back at 60 Hz, and shares."""
+    code, made = invoke("init", "mine", "--feeder", IEEE13)
+    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--out", "out")
+
+    assert code == 0, made
+    assert "inverters of" in made
+    assert end == 0, ran
+    line = next(line for line in ran.splitlines() if line.startswith("ring"))
+    assert " 0.000 " in line
+    assert float(line.split()[-2]) < 2.0
+
+
+def test_an_imported_feeder_is_checked_solved_and_drawn(elsewhere: Path) -> None:
+    """The tables that `import` writes are read again, and give the voltages of the script."""
+    for words in (
+        ("import", IEEE13, "--out", "mine"),
+        ("check", "mine"),
+        ("solve", "mine", "--csv", "tables.csv"),
+        ("solve", IEEE13, "--csv", "script.csv"),
+        ("plot", "mine", "--out", "map.svg"),
+        ("plot", "mine", "--voltages", "--out", "voltages.png"),
+    ):
+        code, printed = invoke("feeder", *words)
+        assert code == 0, printed
+
+    assert len(read_feeder("mine").elements) > 10
+    assert Path("tables.csv").read_text()[:2000] == Path("script.csv").read_text()[:2000]
+    assert Path("map.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(("words", "text"), [
+    (("import", "nothere.dss"), "there is no such file"),
+    (("check", "nothere"), "no such feeder and no such folder"),
+    (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
+    (("plot", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss files"),
+    (("import", "bad.dss"), "3 problems"),
+])  # fmt: skip
+def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: tuple[str, ...], text: str) -> None:
+    """Exit code 2, every problem with its file and line, nothing written."""
+    Path("bad.dss").write_text(
+        "clear\nnew circuit.x basekv=4.16\nredirect missing.dss\nnew line.l1 lenth=3\nnew foo.l\n"
+    )
+
+    code, printed = invoke("feeder", *words)
+
+    assert code == 2
+    assert text in printed
+    assert [path.name for path in Path().iterdir()] == ["bad.dss"]

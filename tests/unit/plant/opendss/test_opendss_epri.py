@@ -1,0 +1,69 @@
+"""The import against EPRI's own engine (in C++), beside that of dss-python (in Pascal)."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from plant.tables import read_feeder
+from tests.unit.plant.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
+from tests.unit.plant.opendss.test_opendss_elements import ELEMENTS, LINES, LOADS, TRANSFORMERS
+from tests.unit.plant.opendss.test_opendss_loads import CONNECTIONS, MODELS, RANGES
+from tests.unit.plant.opendss.write_opendss import write_opendss
+
+pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+if importlib.util.find_spec("py_dss_interface") is None:
+    pytest.skip("EPRI's engine comes with the extra validation (py-dss-interface)", allow_module_level=True)
+
+FEEDERS = Path(__file__).parents[3] / "feeders"
+
+FEEDER_NAMES = ("ieee13", "ieee34", "standard123")
+
+LOAD = "New Load.l bus1=c phases=3 conn=wye kv=0.48 kw=150 kvar=60"
+
+SCRIPTS: dict[str, tuple[str, ...]] = {
+    **{f"transformer, {name}": (TRANSFORMERS[name],) for name in TRANSFORMERS},
+    **{f"line, {name}": (STEP_DOWN, LOADS, LINES[name]) for name in LINES},
+    **{name: (STEP_DOWN, LOADS, ELEMENTS[name]) for name in ELEMENTS},
+    **{
+        f"load model {model}, {name}": (STEP_DOWN, f"{LOAD} {MODELS[model]} {RANGES[name]}")
+        for model in MODELS
+        for name in RANGES
+        if not (model in (6, 7) and name.startswith("far"))
+    },
+    **{name: (STEP_DOWN, f"New Load.l {CONNECTIONS[name]} kw=90 kvar=30 vminpu=0.8") for name in CONNECTIONS},
+}
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict[str, complex]]]:
+    """Each circuit's script, and its voltages by EPRI's engine, all from one process of it."""
+    folder = tmp_path_factory.mktemp("epri")
+    paths = {name: FEEDERS / f"{name}.dss" for name in FEEDER_NAMES}
+    paths["standard123"] = folder / "standard123.dss"
+    paths["standard123"].write_text(write_opendss(read_feeder("standard123")))
+    for number, (name, parts) in enumerate(SCRIPTS.items()):
+        (folder / str(number)).mkdir()
+        paths[name] = write(folder / str(number), LINE, *parts)
+    out = folder / "out.json"
+    script = Path(__file__).with_name("epri_engine.py")
+    command = [sys.executable, str(script), str(out), *map(str, paths.values())]
+    subprocess.run(command, check=True, cwd=folder, capture_output=True, timeout=100)
+    voltages = json.loads(out.read_text())
+    return {
+        name: (path, {node: complex(*pair) for node, pair in voltages[str(path)].items()})
+        for name, path in paths.items()
+    }
+
+
+@pytest.mark.parametrize("name", [*FEEDER_NAMES, *SCRIPTS])
+def test_the_import_has_the_voltages_of_epris_engine(
+    solved: dict[str, tuple[Path, dict[str, complex]]], name: str
+) -> None:
+    """Feeders, transformers, lines, capacitors and loads of all kinds have the voltages of EPRI's engine, too."""
+    path, theirs = solved[name]
+
+    assert largest_difference(path, theirs) < TOLERANCE
