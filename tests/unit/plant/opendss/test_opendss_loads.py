@@ -39,12 +39,13 @@ RANGES = {
 }
 
 
-@pytest.mark.parametrize("limits", RANGES)
-@pytest.mark.parametrize("model", MODELS)
+SAME = [(model, limits) for model in MODELS for limits in RANGES if model not in (6, 7) or not limits.startswith("far")]
+"""Models 6 and 7 jump at vlowpu in the engine, and do not here, as docs/feeders.md says."""
+
+
+@pytest.mark.parametrize(("model", "limits"), SAME)
 def test_a_load_draws_what_the_engine_says(tmp_path: Path, model: int, limits: str) -> None:
     """A load of each model agrees with the engine within its voltage limits, above them, and below them."""
-    if model in (6, 7) and limits.startswith("far"):
-        pytest.skip("models 6 and 7 jump at vlowpu; the import documents that they do not here")
     load = f"New Load.l bus1=c phases=3 conn=wye kv=0.48 kw=150 kvar=60 {MODELS[model]} {RANGES[limits]}"
 
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
