@@ -92,12 +92,14 @@ def propose(feeder: Feeder) -> Proposal:
         own = sum(load[bus] for bus in section)
         rating = RATING * total * (own / carried if carried > 1.0 else 1.0 / len(chosen))
         places = _spread(_places(feeder, section, phases), 1 + FOLLOWERS)
-        shares = [LEADER] + [(1.0 - LEADER) / max(len(places) - 1, 1)] * (len(places) - 1)
-        for k, (bus, share) in enumerate(zip(places, shares, strict=True)):
+        middle = len(places) // 2  # a leader at one end of a long line does not hold the other
+        follower = (1.0 - LEADER) / max(len(places) - 1, 1)
+        for k, bus in enumerate(places):
+            share = LEADER if k == middle else follower
             inverters.append(
                 InverterRow(
                     name=f"inv{len(inverters) + 1}",
-                    kind="GFM" if k == 0 else "GFL",
+                    kind="GFM" if k == middle else "GFL",
                     bus=bus,
                     microgrid=f"MG{number}",
                     P_rated=max(round(rating * share, -4), 10e3),

@@ -10,12 +10,14 @@ from plant.tables import read_feeder
 from tests.command_line import invoke
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
-IEEE13 = str(Path(__file__).parents[3] / "feeders" / "ieee13.dss")
+FEEDERS = Path(__file__).parents[3] / "feeders"
+IEEE13 = str(FEEDERS / "ieee13.dss")
 
 
-def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path) -> None:
+@pytest.mark.parametrize("feeder", ["ieee13", "ieee34"])
+def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path, feeder: str) -> None:
     """After `init --feeder` and `run` the island of the whole feeder is back at 60 Hz, and shares."""
-    code, made = invoke("init", "mine", "--feeder", IEEE13)
+    code, made = invoke("init", "mine", "--feeder", str(FEEDERS / f"{feeder}.dss"))
     end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--out", "out")
 
     assert code == 0, made
