@@ -18,8 +18,7 @@ from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.phasors import PHASES, aligned_sum
 from plant.dynamics.reduce_network import reduce_network
-from plant.dynamics.reduction import Reduced
-from plant.dynamics.switch_state import Complex, Real
+from plant.dynamics.reduced import Complex, Real, Reduced
 
 
 @dataclass(frozen=True, kw_only=True)

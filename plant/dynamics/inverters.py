@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
-from plant.dynamics.switch_state import Real
+from plant.dynamics.reduced import Real
 from plant.equipment import F_NOM
 from plant.plant_config import GflParameters, GfmParameters
 

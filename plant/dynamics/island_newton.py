@@ -16,7 +16,7 @@ import numpy as np
 
 from plant.dynamics.blas import one_thread
 from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.switch_state import Complex, Real
+from plant.dynamics.reduced import Complex, Real
 
 ITERATIONS = 40
 """Of Newton's method; it takes 4 to 10."""

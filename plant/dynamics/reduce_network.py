@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.dynamics.circuit import Circuit
+from plant.dynamics.reduced import Complex
 from plant.dynamics.reduction import DenseReduction
 from plant.dynamics.sparse_reduction import SparseReduction
-from plant.dynamics.switch_state import Complex
 
 Reduction = DenseReduction | SparseReduction
 

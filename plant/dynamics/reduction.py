@@ -17,8 +17,6 @@ each such island is solved in a frame that rotates with its first GFM, and the t
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
@@ -26,49 +24,8 @@ from scipy.sparse.linalg import splu
 from plant.dynamics.blas import one_thread
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.island_newton import DenseIsland, solve_island
-from plant.dynamics.kernel.sparse import NO_MAPS, SparseMaps
-from plant.dynamics.switch_state import Complex, Real, SwitchState
-
-
-class Reduced(NamedTuple):
-    """Arrays of the inner loop. Real matrices act on [Re; Im] and are stored transposed, rows contiguous."""
-
-    PT: Real
-    """J to x, (6 n_inv) x (2 m)."""
-    QT: Real
-    """N to x, (2 m) x (2 m)."""
-    x_c: Real
-    """Constant part of x, 2 m (V)."""
-    GGT: Real
-    """J to V_G, (6 n_inv) x (6 n_inv)."""
-    GBT: Real
-    """I_b to V_G, (2 m) x (6 n_inv)."""
-    s_G: Real
-    """Constant part of V_G, 6 n_inv (V)."""
-    S: Complex
-    """Constant power of the live branches (VA)."""
-    I0: Complex
-    """Constant current of the live branches (A)."""
-    limited_at: NDArray[np.int64]
-    """Live branches with the law of a `LoadPart`."""
-    law: Real
-    """Their rows of `plant.dynamics.kernel.limited_load.COLUMNS`."""
-    i_c: Complex
-    """Tangent of the load law, constant part (A)."""
-    A: Complex
-    """Tangent, factor of V_b (S)."""
-    B: Complex
-    """Tangent, factor of V_b^* (S)."""
-    branch_island: NDArray[np.int64]
-    """Island of each live branch."""
-    inverter_island: NDArray[np.int64]
-    """Island of each inverter."""
-    leader: NDArray[np.int64]
-    """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
-    theta_lin: Real
-    """That inverter's angle at the point of linearisation (rad)."""
-    sparse: SparseMaps = NO_MAPS
-    """In place of the dense matrices, for a large network."""
+from plant.dynamics.reduced import Complex, Real, Reduced
+from plant.dynamics.switch_state import SwitchState
 
 
 class DenseReduction(SwitchState):
@@ -144,15 +101,8 @@ class DenseReduction(SwitchState):
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
         """Return the terminal voltages (V), n_inv x 3, from injections J (A), branch and source voltages (V)."""
-        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ self._branch_currents(V_b)
+        V_G: Complex = self.without_load(J, source_voltage)[1] - self._Z_Gb @ self.loads.currents(V_b)
         return V_G.reshape(3, -1).T
-
-    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Return the voltage of every node (V) from the same; 0 in dead islands."""
-        return self.all_voltages(J, self._branch_currents(V_b), source_voltage)
-
-    def _branch_currents(self, V_b: Complex) -> Complex:
-        return self.circuit.loads.of(self.branches).currents(V_b)
 
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
         """Return the voltages (V) that the ideal sources alone give at the branches and at the terminals."""
@@ -171,31 +121,18 @@ class DenseReduction(SwitchState):
         theta
             Angle of every inverter at that point (rad).
         """
-        loads = self.circuit.loads.of(self.branches)
-        A, B = loads.tangent(V_b)
-        i_c = loads.currents(V_b) - A * V_b - B * np.conj(V_b)
+        net = self.at_tangent(V_b, theta)
         s_b, s_G = self.source_parts(source_voltage)
         m = V_b.size
-        M = np.eye(2 * m) + _linear(self.Z_bb * A) + _conjugate_linear(self.Z_bb * B)
+        M = np.eye(2 * m) + _linear(self.Z_bb * net.A) + _conjugate_linear(self.Z_bb * net.B)
         M_inverse = np.linalg.inv(M)
-        return Reduced(
+        return net._replace(
             PT=np.ascontiguousarray((M_inverse @ _linear(self._T_bG)).T),
             QT=np.ascontiguousarray((M_inverse @ _linear(self.Z_bb)).T),
-            x_c=M_inverse @ _stack(s_b - self.Z_bb @ i_c),
+            x_c=M_inverse @ _stack(s_b - self.Z_bb @ net.i_c),
             GGT=np.ascontiguousarray(_linear(self._Z_GG).T),
             GBT=np.ascontiguousarray(_linear(self._Z_Gb).T),
             s_G=_stack(s_G),
-            S=loads.S,
-            I0=loads.I0,
-            limited_at=loads.limited_at,
-            law=loads.law,
-            i_c=i_c,
-            A=A,
-            B=B,
-            branch_island=self.branch_island,
-            inverter_island=self.inverter_island,
-            leader=self.leader,
-            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
         )
 
     @one_thread()

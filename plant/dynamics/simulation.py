@@ -14,7 +14,7 @@ from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.step import FAILURES, READING, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
-from plant.dynamics.switch_state import Complex, Real
+from plant.dynamics.reduced import Complex, Real
 
 
 class Dynamics:

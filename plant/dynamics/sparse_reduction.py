@@ -12,8 +12,8 @@ from plant.dynamics.elimination import eliminated
 from plant.dynamics.island_newton import TOLERANCE, solve_island
 from plant.dynamics.kernel.sparse import SparseMaps, factorise, factors
 from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction import Reduced
-from plant.dynamics.switch_state import Complex, Real, SwitchState
+from plant.dynamics.reduced import Complex, Real, Reduced
+from plant.dynamics.switch_state import SwitchState
 
 
 class SparseReduction(SwitchState):
@@ -36,7 +36,7 @@ class SparseReduction(SwitchState):
         self._label = self.label[self.unknown[kept]]
         self._Y_S, self._C, self._C_S = Y_S[kept].tocsc(), C[kept].tocsc(), by_node[circuit.sources].tocsc()
         self._Y_S_whole, self._C_whole = Y_S, C
-        self._loads = circuit.loads.of(self.branches)
+        self._ends = _ends(self._C)
         self._lu: SuperLU | None = None
         place = np.full(circuit.Y.shape[0], -1, np.int64)
         place[self.unknown[kept]] = np.arange(kept.size)
@@ -46,34 +46,14 @@ class SparseReduction(SwitchState):
 
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Return the inner loop's arrays; see `DenseReduction.linearise`."""
-        A, B = self._loads.tangent(V_b)
-        i_c = self._loads.currents(V_b) - A * V_b - B * np.conj(V_b)
+        net = self.at_tangent(V_b, theta)
         from_sources = self._C_S.T @ source_voltage
-        drawn = i_c + A * from_sources + B * np.conj(from_sources)
+        drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
         constant = -(self._Y_S @ source_voltage) - self._C @ drawn
-        first, second, a_first, a_second = _ends(self._C)
-        empty = np.zeros((0, 0))
-        u = 2 * self._Y.shape[0]
-        return Reduced(
-            PT=empty,
-            QT=empty,
-            x_c=np.zeros(0),
-            GGT=empty,
-            GBT=empty,
-            s_G=np.zeros(0),
-            S=self._loads.S,
-            I0=self._loads.I0,
-            limited_at=self._loads.limited_at,
-            law=self._loads.law,
-            i_c=i_c,
-            A=A,
-            B=B,
-            branch_island=self.branch_island,
-            inverter_island=self.inverter_island,
-            leader=self.leader,
-            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
+        first, second, a_first, a_second = self._ends
+        return net._replace(
             sparse=SparseMaps(
-                factored=factors(factorise(self._real(A, B))),
+                factored=factors(factorise(real_form(self._Y, self._C, net.A, net.B))),
                 constant=_interleaved(constant),
                 first=first,
                 second=second,
@@ -83,7 +63,7 @@ class SparseReduction(SwitchState):
                 terminals=self._at,
                 fixed=self._held_voltages(source_voltage),
                 feeds=self._feeds,
-                scratch=np.empty(3 * u),
+                scratch=np.empty(6 * constant.size),
             ),
         )
 
@@ -92,13 +72,13 @@ class SparseReduction(SwitchState):
         V_b, failed = guess.copy(), []
         from_sources = self._C_S.T @ source_voltage
         right = self._injected(J, self._at, self._Y.shape[0]) - self._Y_S @ source_voltage
-        nominal = self.node_guess(guess, from_sources)
+        nominal = self._node_guess(guess, from_sources)
         for k in np.flatnonzero(self.live).tolist():
             nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
             island = SparseIsland(
                 self._Y[nodes][:, nodes].tocsc(),
                 self._C[nodes][:, own].tocsc(),
-                self._loads.of(own),
+                self.loads.of(own),
                 from_sources[own],
                 right[nodes],
             )
@@ -109,21 +89,16 @@ class SparseReduction(SwitchState):
                 V_b[own] = self._C[nodes][:, own].T @ solution + from_sources[own]
         return V_b, tuple(failed)
 
-    def node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
+    def _node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
         """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
-        A, B = self._loads.tangent(V_b)
-        del B
+        A, _ = self.loads.tangent(V_b)
         Y = (self._Y + self._C @ sp.diags_array(A) @ self._C.T).tocsc()
-        constant = -self._C @ (self._loads.currents(V_b) - A * V_b + A * from_sources)
+        constant = -self._C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
         """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
         return self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
-
-    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Return the voltage of every node (V); 0 in dead islands."""
-        return self.all_voltages(J, self._loads.currents(V_b), source_voltage)
 
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
@@ -148,9 +123,6 @@ class SparseReduction(SwitchState):
         V = np.zeros(self.circuit.Y.shape[0], complex)
         V[self.circuit.sources] = source_voltage
         return np.asarray(V[self.circuit.terminals].reshape(-1, 3))
-
-    def _real(self, A: Complex, B: Complex) -> sp.csc_array:
-        return real_form(self._Y, self._C, A, B)
 
 
 class SparseIsland:
@@ -191,7 +163,8 @@ class SparseIsland:
             return None
         dV = lu.solve(-_interleaved(F)).view(complex)
         ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
-        return dV, not ended or _positive(lu) == _positive(factorise(real_form(self._Y, self._C, 0.0 * A, 0.0 * B)))
+        # without load the determinant is that of a complex matrix, squared in magnitude: positive
+        return dV, not ended or _positive(lu)
 
 
 def real_form(Y: sp.csc_array, C: sp.csc_array, A: Complex, B: Complex) -> sp.csc_array:

@@ -7,9 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from plant.dynamics.circuit import Circuit
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from plant.dynamics.reduced import Complex, Real, Reduced
 
 
 class SwitchState:
@@ -74,6 +72,8 @@ class SwitchState:
         self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first
         """Branches in live islands."""
         self.branch_island = self.label[first[self.branches]]
+        self.loads = circuit.loads.of(self.branches)
+        """Law of the live branches."""
 
         self.terminals = G = circuit.terminals.T.ravel()
         y_diagonal = np.zeros(n, complex)
@@ -86,3 +86,36 @@ class SwitchState:
     def __deepcopy__(self, memo: object) -> SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
         return self
+
+    def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:
+        """Return the inner loop's arrays but those of the network: the loads' tangent, the islands' frames.
+
+        Parameters
+        ----------
+        V_b
+            Voltages of the live branches at the point of linearisation (V).
+        theta
+            Angle of every inverter there (rad).
+        """
+        A, B = self.loads.tangent(V_b)
+        return Reduced(
+            S=self.loads.S,
+            I0=self.loads.I0,
+            limited_at=self.loads.limited_at,
+            law=self.loads.law,
+            i_c=self.loads.currents(V_b) - A * V_b - B * np.conj(V_b),
+            A=A,
+            B=B,
+            branch_island=self.branch_island,
+            inverter_island=self.inverter_island,
+            leader=self.leader,
+            theta_lin=np.array([theta[k] if k >= 0 else 0.0 for k in self.leader]),
+        )
+
+    def node_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Return every node's voltage (V), 0 in dead islands, from injections (A), branch and source voltages (V)."""
+        return self.all_voltages(J, self.loads.currents(V_b), source_voltage)
+
+    def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
+        """Return every node's voltage (V), 0 in dead islands, from injections and branch currents (A)."""
+        raise NotImplementedError

@@ -17,9 +17,14 @@ MAX_ITERATIONS = 60
 
 @compiled
 def load_currents(
-    S: NDArray[np.complex128], I0: NDArray[np.complex128], x: NDArray[np.float64], I_b: NDArray[np.complex128]
+    S: NDArray[np.complex128],
+    I0: NDArray[np.complex128],
+    limited_at: NDArray[np.int64],
+    law: NDArray[np.float64],
+    x: NDArray[np.float64],
+    I_b: NDArray[np.complex128],
 ) -> None:
-    """Branch currents (A) of constant-power and constant-current loads at x = [Re V_b; Im V_b]."""
+    """Write the branch currents (A) of all loads at x = [Re V_b; Im V_b]."""
     m = S.size
     for b in range(m):
         re, im = x[b], x[m + b]
@@ -27,14 +32,13 @@ def load_currents(
         V = complex(re, im)
         # (S/V)* = S* V / |V|^2
         I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
+    limited_currents(limited_at, law, x, I_b)
 
 
 @compiled
-def remainder(net: Any, b: int, x: NDArray[np.float64], I_b: NDArray[np.complex128]) -> complex:
-    """Return what a branch draws (A) beyond the tangent of its load at x = [Re V_b; Im V_b]."""
-    V_b = complex(x[b], x[net.S.size + b])
-    drawn: complex = I_b[b] - net.i_c[b] - net.A[b] * V_b - net.B[b] * V_b.conjugate()
-    return drawn
+def remainder(current: complex, V_b: complex, i_c: complex, A: complex, B: complex) -> complex:
+    """Return what a branch draws (A) beyond the tangent of its load at the voltage V_b (V)."""
+    return current - i_c - A * V_b - B * V_b.conjugate()
 
 
 @compiled
@@ -64,19 +68,17 @@ def solve_sparse(
     iterations = 0
     while True:
         iterations += 1
-        load_currents(net.S, net.I0, x, I_b)
-        limited_currents(net.limited_at, net.law, x, I_b)
+        load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
         right[:] = base
         for b in range(m):
-            draw(maps, b, remainder(net, b, x, I_b), right)
+            draw(maps, b, remainder(I_b[b], complex(x[b], x[m + b]), net.i_c[b], net.A[b], net.B[b]), right)
         solve_factored(maps.factored, right, work)
         change = branch_voltages(maps, right, x)
         if change <= tolerance:
             break
         if iterations >= MAX_ITERATIONS or not change < 1e12:
             return -1
-    load_currents(net.S, net.I0, x, I_b)
-    limited_currents(net.limited_at, net.law, x, I_b)
+    load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
     size = 0.0
     for i in range(n):
         back = rotation[net.inverter_island[i]].conjugate()
@@ -103,7 +105,7 @@ def solve_network(
     Parameters
     ----------
     net
-        A `plant.dynamics.reduction.Reduced`.
+        A `plant.dynamics.reduced.Reduced`.
     J
         Injections, n_inv x 3 (A).
     rotation
@@ -142,11 +144,9 @@ def solve_network(
     iterations = 0
     while m > 0:
         iterations += 1
-        load_currents(net.S, net.I0, x, I_b)
-        limited_currents(net.limited_at, net.law, x, I_b)
+        load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
         for b in range(m):
-            V_b = complex(x[b], x[m + b])
-            N = I_b[b] - net.i_c[b] - net.A[b] * V_b - net.B[b] * V_b.conjugate()
+            N = remainder(I_b[b], complex(x[b], x[m + b]), net.i_c[b], net.A[b], net.B[b])
             rest[b], rest[m + b] = N.real, N.imag
         trial[:] = base
         multiply_add(net.QT, rest, -1.0, trial)
@@ -162,8 +162,7 @@ def solve_network(
     V_G[:] = net.s_G
     multiply_add(net.GGT, j, 1.0, V_G)
     if m > 0:
-        load_currents(net.S, net.I0, x, I_b)
-        limited_currents(net.limited_at, net.law, x, I_b)
+        load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
         for b in range(m):
             rest[b], rest[m + b] = I_b[b].real, I_b[b].imag
         multiply_add(net.GBT, rest, -1.0, V_G)

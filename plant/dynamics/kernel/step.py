@@ -87,7 +87,7 @@ def run_steps(
     tolerance
         Of the network solution (V).
     net
-        A `plant.dynamics.reduction.Reduced`.
+        A `plant.dynamics.reduced.Reduced`.
     gfm, gfm_at, gfm_state
         Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
     gfm_0, gfm_d

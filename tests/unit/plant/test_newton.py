@@ -8,9 +8,9 @@ from msgspec.structs import replace
 
 from plant.dynamics.island_newton import DenseIsland, solve_island
 from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.reduced import Complex
 from plant.dynamics.reduction import DenseReduction
 from plant.dynamics.sparse_reduction import SparseReduction
-from plant.dynamics.switch_state import Complex
 from plant.feeder.circuits import Circuits
 from plant.network import Network, solve_power_flow
 from plant.tables import read_feeder
