@@ -9,9 +9,17 @@ from pathlib import Path
 import pytest
 
 from plant.tables import read_feeder
+from tests.unit.plant.opendss.opendss_scripts import (
+    CONNECTIONS,
+    ELEMENTS,
+    LINES,
+    LOAD_CASES,
+    LOADS,
+    MODELS,
+    RANGES,
+    TRANSFORMERS,
+)
 from tests.unit.plant.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
-from tests.unit.plant.opendss.test_opendss_elements import ELEMENTS, LINES, LOADS, TRANSFORMERS
-from tests.unit.plant.opendss.test_opendss_loads import CONNECTIONS, MODELS, RANGES
 from tests.unit.plant.opendss.write_opendss import write_opendss
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
@@ -30,9 +38,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {
     **{name: (STEP_DOWN, LOADS, ELEMENTS[name]) for name in ELEMENTS},
     **{
         f"load model {model}, {name}": (STEP_DOWN, f"{LOAD} {MODELS[model]} {RANGES[name]}")
-        for model in MODELS
-        for name in RANGES
-        if not (model in (6, 7) and name.startswith("far"))
+        for model, name in LOAD_CASES
     },
     **{name: (STEP_DOWN, f"New Load.l {CONNECTIONS[name]} kw=90 kvar=30 vminpu=0.8") for name in CONNECTIONS},
 }

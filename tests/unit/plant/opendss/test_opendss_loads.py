@@ -4,46 +4,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.plant.opendss.opendss_scripts import CONNECTIONS, LOAD_CASES, MODELS, RANGES
 from tests.unit.plant.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
-MODELS = {
-    1: "model=1",
-    2: "model=2",
-    3: "model=3",
-    4: "model=4 cvrwatts=0.8 cvrvars=3",
-    5: "model=5",
-    6: "model=6",
-    7: "model=7",
-    8: "model=8 zipv=(0.3 0.5 0.2 0.1 0.6 0.3 0)",
-}
-"""Every load model, with what it needs beside its number."""
 
-CONNECTIONS = {
-    "three phases, wye": "bus1=c phases=3 conn=wye kv=0.48",
-    "three phases, delta": "bus1=c phases=3 conn=delta kv=0.48",
-    "two phases, wye": "bus1=c.2.3 phases=2 conn=wye kv=0.48",
-    "two phases, open delta": "bus1=c.1.2.3 phases=2 conn=delta kv=0.48",
-    "one phase to ground": "bus1=c.2 phases=1 conn=wye kv=0.277",
-    "between two phases": "bus1=c.3.1 phases=1 conn=delta kv=0.48",
-    "between two phases, called wye": "bus1=c.1.2 phases=1 conn=wye kv=0.48",
-    "phases in another order": "bus1=c.3.1.2 phases=3 conn=wye kv=0.48",
-}
-
-RANGES = {
-    "within its limits": "vminpu=0.8 vmaxpu=1.2",
-    "above its limit": "vminpu=0.5 vmaxpu=0.75",
-    "below its limit": "vminpu=1.2 vmaxpu=1.4",
-    "far below its limit": "vminpu=1.4 vmaxpu=1.5 vlowpu=1.3",
-}
-
-
-SAME = [(model, limits) for model in MODELS for limits in RANGES if model not in (6, 7) or not limits.startswith("far")]
-"""Models 6 and 7 jump at vlowpu in the engine, and do not here, as docs/feeders.md says."""
-
-
-@pytest.mark.parametrize(("model", "limits"), SAME)
+@pytest.mark.parametrize(("model", "limits"), LOAD_CASES)
 def test_a_load_draws_what_the_engine_says(tmp_path: Path, model: int, limits: str) -> None:
     """A load of each model agrees with the engine within its voltage limits, above them, and below them."""
     load = f"New Load.l bus1=c phases=3 conn=wye kv=0.48 kw=150 kvar=60 {MODELS[model]} {RANGES[limits]}"
