@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from plant.equipment import PHASES, Feeder, Line, Regulator
+from plant.equipment import PHASES, Feeder, Line, Regulator, Switch
 
 Node = tuple[str, str]
 """A bus and one of its phases."""
@@ -45,7 +45,12 @@ class Connectivity:
         """Return the switches that are closed at the start."""
         return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
 
-    def parts(self, closed: Collection[str] | None = None, whole: Iterable[str] = ()) -> tuple[frozenset[Node], ...]:
+    def parts(
+        self,
+        closed: Collection[str] | None = None,
+        whole: Iterable[str] = (),
+        tied: Iterable[tuple[Node, Node]] = (),
+    ) -> tuple[frozenset[Node], ...]:
         """Return the sets of connected nodes, in the order of their first buses.
 
         Parameters
@@ -54,6 +59,8 @@ class Connectivity:
             Names of the closed switches; by default all.
         whole : Iterable[str], optional
             Buses whose three phases count as one, because their source feeds all of them.
+        tied : Iterable[tuple[Node, Node]], optional
+            Further pairs of nodes that count as connected.
         """
         above = {node: node for node in self.nodes}
 
@@ -63,7 +70,7 @@ class Connectivity:
                 node = above[node]
             return node
 
-        joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES)]
+        joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES), *tied]
         for switch in self._feeder.switches:
             if closed is None or switch.name in closed:
                 joined += [((switch.from_bus, p), (switch.to_bus, p)) for p in switch.phases]
@@ -90,3 +97,24 @@ class Connectivity:
         alive = {(bus, "A") for bus in feeding}
         parts = self.parts(closed, feeding)
         return tuple(part for part in parts if part & alive), tuple(part for part in parts if not part & alive)
+
+    def cut_off(self, switch: Switch) -> frozenset[str]:
+        """Return the buses that the substation does not reach with one of the closed switches open.
+
+        In a feeder without a substation they are those that the switch's first bus does not reach.
+        """
+        source = self._feeder.source
+        parts = self.parts(self.closed_at_start() - {switch.name}, [source.bus] if source else ())
+        first = source.bus if source else switch.from_bus
+        reached = {bus for part in parts if any(bus == first for bus, _ in part) for bus, _ in part}
+        return frozenset(bus.name for bus in self._feeder.buses if bus.name not in reached)
+
+
+def by_bus(parts: Iterable[frozenset[Node]]) -> list[frozenset[Node]]:
+    """Join the parts that are phases of the same buses: what cuts off one phase cuts off the others."""
+    joined: list[frozenset[Node]] = []
+    for part in parts:
+        buses = {bus for bus, _ in part}
+        same = [other for other in joined if buses & {bus for bus, _ in other}]
+        joined = [*(other for other in joined if other not in same), part.union(*same)]
+    return joined

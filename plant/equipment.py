@@ -212,7 +212,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     load_parts: tuple[LoadPart, ...] = ()
     """Loads of such feeders."""
     notes: tuple[str, ...] = ()
-    """What was done in place of what such a feeder's files say."""
+    """Notes of the import of such a feeder: commands that were not run, protection that was left out."""
     spares: tuple[InverterRow, ...] = ()
     """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""
 
@@ -222,3 +222,20 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
             branches = ("A", "B", "C") if load.connection == "Y" else ("AB", "BC", "CA")
             yield from ((load.bus, branch, S) for branch, S in zip(branches, load.S, strict=True) if S)
         yield from ((part.bus, "".join(part.ends), part.S) for part in self.load_parts)
+
+    def load_by_bus(self) -> dict[str, float]:
+        """Return the real power (W) of the loads at each bus that has any, at nominal voltage."""
+        load: dict[str, float] = {}
+        for bus, _, S in self.demands():
+            load[bus] = load.get(bus, 0.0) + S.real
+        return load
+
+    def branches(self) -> Iterator[tuple[str, str, int]]:
+        """Yield the two buses of every branch, switches left out, and its number of phases."""
+        yield from ((line.from_bus, line.to_bus, len(line.phases)) for line in self.lines)
+        yield from ((row.from_bus, row.to_bus, 3) for row in self.transformers)
+        yield from ((row.from_bus, row.to_bus, len(row.phases)) for row in self.regulators)
+        for element in self.elements:
+            buses = [bus for bus, _ in element.nodes]
+            others = [bus for bus in dict.fromkeys(buses) if bus != buses[0]]
+            yield from ((buses[0], other, min(buses.count(buses[0]), 3)) for other in others)

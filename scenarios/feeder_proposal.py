@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from plant.connectivity import Connectivity
+from plant.connectivity import Connectivity, by_bus
 from plant.equipment import Feeder, InverterRow
 
 RATING = 1.3
@@ -27,7 +27,7 @@ MOST_SECTIONS = 12
 
 
 class Proposal(NamedTuple):
-    """What to try first on a feeder."""
+    """A first islanding of a feeder: the switch, the inverters, their set-points."""
 
     switch: str
     """The switch to island at, by its alias or name."""
@@ -69,18 +69,15 @@ def propose(feeder: Feeder) -> Proposal:
         If no switch cuts off half of the load, or no section beyond it has a three-phase bus for each inverter.
     """
     switch, beyond = _islanding_switch(feeder)
-    load = {bus: 0.0 for bus in beyond}
-    for bus, _, S in feeder.demands():
-        if bus in load:
-            load[bus] += S.real
+    everywhere = feeder.load_by_bus()
+    load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
     total = sum(load.values())
     phases = {bus.name: bus.phases for bus in feeder.buses}
     sections = [
         section
-        for part in Connectivity(feeder).parts(closed=())
+        for part in by_bus(Connectivity(feeder).parts(closed=()))
         if (section := {bus for bus, _ in part} & beyond) and _places(feeder, section, phases)
     ]
-    sections = _merged(feeder, sections)
     sections.sort(key=lambda section: -sum(load[bus] for bus in section))
     chosen = [s for s in sections if sum(load[bus] for bus in s) >= SMALLEST][:MOST_SECTIONS] or sections[:1]
     if not chosen:
@@ -112,28 +109,20 @@ def propose(feeder: Feeder) -> Proposal:
     return Proposal(switch, tuple(inverters), round((1.0 - IMPORTED) * total / rated, 3), total)
 
 
-def _islanding_switch(feeder: Feeder) -> tuple[str, set[str]]:
+def _islanding_switch(feeder: Feeder) -> tuple[str, frozenset[str]]:
     """Return the closed switch that cuts most load off the substation, and the buses beyond it."""
     if feeder.source is None:
         raise NoProposalError("the feeder has no substation to island from")
-    graph = Connectivity(feeder)
-    closed = graph.closed_at_start()
-    load: dict[str, float] = {}
-    for bus, _, S in feeder.demands():
-        load[bus] = load.get(bus, 0.0) + S.real
-    best: tuple[float, int, str, set[str]] | None = None
+    graph, load = Connectivity(feeder), feeder.load_by_bus()
+    best, beyond, most = "", frozenset[str](), (0.0, 0)
     for switch in feeder.switches:
-        if not switch.closed:
-            continue
-        fed, _ = graph.fed(closed - {switch.name}, ())
-        reached = {bus for part in fed for bus, _ in part}
-        beyond = {bus.name for bus in feeder.buses} - reached
-        weight = sum(load.get(bus, 0.0) for bus in beyond)
-        if beyond and (best is None or (weight, len(beyond)) > best[:2]):
-            best = weight, len(beyond), switch.alias or switch.name, beyond
-    if best is None or best[0] < ENOUGH * sum(load.values()) or best[0] <= 0.0:
+        buses = graph.cut_off(switch) if switch.closed else frozenset()
+        weight = sum(load.get(bus, 0.0) for bus in buses), len(buses)
+        if weight > most:
+            best, beyond, most = switch.alias or switch.name, buses, weight
+    if most[0] < ENOUGH * sum(load.values()) or most[0] <= 0.0:
         raise NoSwitchError(heads(feeder))
-    return best[2], best[3]
+    return best, beyond
 
 
 def heads(feeder: Feeder, count: int = 3) -> list[str]:
@@ -172,12 +161,3 @@ def _spread(places: list[str], count: int) -> list[str]:
     """Return so many places, evenly spread over a section in the order of its buses."""
     count = min(count, len(places))
     return [places[(2 * k + 1) * len(places) // (2 * count)] for k in range(count)]
-
-
-def _merged(feeder: Feeder, sections: list[set[str]]) -> list[set[str]]:
-    """Join the sections that are parts of the same buses, of which each phase hangs by itself."""
-    found: list[set[str]] = []
-    for section in sections:
-        same = [other for other in found if other & section]
-        found = [*(other for other in found if other not in same), section.union(*same)]
-    return found

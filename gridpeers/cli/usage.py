@@ -10,6 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from plant.equipment import Feeder
+    from plant.tables import FeederError
     from scenarios.schema import ScenarioError, ScenarioModel
 
 ScenarioName = Annotated[
@@ -35,7 +36,7 @@ def load(name: str) -> tuple[ScenarioModel, Feeder]:
         refuse(error)
 
 
-def refuse(error: ScenarioError) -> NoReturn:
+def refuse(error: ScenarioError | FeederError) -> NoReturn:
     """End with every problem in a file."""
     count = len(error.problems)
     head = [] if count == 1 else [f"{count} problems:"]

@@ -1,1 +1,1 @@
-"""What a scenario file says about links and nodes: entries, patterns, profiles, and all of their problems at once."""
+"""Links and nodes in a scenario file: entries, patterns, profiles, and all their problems at once."""

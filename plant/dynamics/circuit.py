@@ -35,7 +35,7 @@ class Circuit:
     """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
     I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
     loads: LoadLaw
-    """What the branches draw."""
+    """Law of the currents that the branches draw."""
     V_branch: NDArray[np.complex128]
     """Nominal phasor of each branch (V): where the first solution starts."""
 

@@ -25,7 +25,7 @@ class LoadBranches:
     n_to: NDArray[np.int64]
     """Node at the end, -1: ground."""
     law: LoadLaw
-    """What they draw from the voltage across them."""
+    """Law of their currents."""
     V_nom: NDArray[np.float64]
     """Nominal voltage across the branch (V)."""
     phi0: NDArray[np.float64]

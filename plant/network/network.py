@@ -153,14 +153,7 @@ class Network:
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
         """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
         feeder = self.feeder
-        ends = [(line.from_bus, line.to_bus) for line in feeder.lines]
-        ends += [(transformer.from_bus, transformer.to_bus) for transformer in feeder.transformers]
-        ends += [(regulator.from_bus, regulator.to_bus) for regulator in feeder.regulators]
-        ends += [
-            (element.nodes[0][0], bus)
-            for element in feeder.elements
-            for bus in dict.fromkeys(b for b, _ in element.nodes)
-        ]
+        ends = [(one, other) for one, other, _ in feeder.branches()]
         ends += [(switch.from_bus, switch.to_bus) for switch in self._closed_switches(closed)]
         number = {bus.name: i for i, bus in enumerate(feeder.buses)}
         rows, columns = ([number[end[side]] for end in ends] for side in (0, 1))
@@ -182,7 +175,8 @@ class Network:
         V[self.source_nodes] = self.source_voltage
         right = -Y[unknown][:, self.source_nodes] @ self.source_voltage
         V[unknown] = splu(sp.csc_matrix(Y[unknown][:, unknown])).solve(right)
-        return np.where(np.isfinite(merge.expand(V)), merge.expand(V), self.nominal)
+        V = merge.expand(V)
+        return np.where(np.isfinite(V), V, self.nominal)
 
     def _node_names(self) -> list[str]:
         return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]

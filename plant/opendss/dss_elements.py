@@ -24,8 +24,8 @@ class DssElements:
         The circuit, solved.
     wanted_switches : set of str
         Lines (`Line.name`) that can be opened, beside those that the script calls switches.
-    problems, notes : list of str
-        Take what cannot be represented, and what was done in its place.
+    problems : list of str
+        Takes whatever cannot be represented.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ class DssElements:
         Those of `wanted_switches` that were met.
     """
 
-    def __init__(self, engine: DssEngine, wanted_switches: set[str], problems: list[str], notes: list[str]) -> None:
-        self._engine, self._problems, self._notes = engine, problems, notes
+    def __init__(self, engine: DssEngine, wanted_switches: set[str], problems: list[str]) -> None:
+        self._engine, self._problems = engine, problems
         self._wanted = {name.lower(): name for name in wanted_switches}
         self.rows: list[LinearElement] = []
         self.switches: list[Switch] = []

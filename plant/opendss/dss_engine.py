@@ -15,7 +15,7 @@ EXACT = ("set controlmode=off", "set tolerance=1e-11", "solve")
 """Solves once more, with all that is controlled left where it stands."""
 
 NO_INVERSE = "Matrix Inversion Error"
-"""What the engine says of an element whose impedance is zero."""
+"""In the engine's message on an element without impedance."""
 
 MOST = 50
 """How many problems are told."""

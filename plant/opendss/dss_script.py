@@ -44,7 +44,7 @@ COORDINATES = frozenset({"buscoords", "latlongcoords"})
 """Commands that name a file without saying so."""
 
 CLOSING = {'"': '"', "'": "'", "(": ")", "[": "]", "{": "}"}
-"""What ends a quoted name, by what begins it."""
+"""Closing mark of a quoted name, by its opening mark."""
 
 FILE = re.compile(r"""(\b\w*file\s*=\s*)("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
 """A file that a property names."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from plant.equipment import NODES, Feeder, Source
+from plant.equipment import NODES, Feeder
 from plant.opendss.dss_connections import report_unconnected, report_undetermined
 from plant.opendss.dss_elements import DssElements
 from plant.opendss.dss_engine import DssEngine
@@ -25,10 +25,10 @@ CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""
 
 WATCHING = frozenset({"energymeter", "monitor", "sensor"})
-"""What measures and has no part in the network."""
+"""Classes that measure: they have no part in the network."""
 
 PROTECTION = frozenset({"fuse", "recloser", "relay", "swtcontrol"})
-"""What operates lines by itself; the lines come over, what opens them does not."""
+"""Classes that open lines by themselves: the lines are imported and stay as they are."""
 
 LINEAR = frozenset({"line", "transformer", "autotrans", "reactor", "capacitor", "fault", "gictransformer"})
 """Classes that a primitive admittance matrix describes."""
@@ -40,28 +40,14 @@ GENERATION = frozenset({"generator", "pvsystem", "storage", "windgen", "indmach0
 def read_opendss(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
 ) -> Feeder:
-    """Read a feeder from a script of OpenDSS.
+    """Return the feeder of a script for OpenDSS; `gridpeers.feeder.Feeder.from_opendss` explains the parameters.
 
-    Parameters
-    ----------
-    path : str or Path
-        The script, often Master.dss.
-    f_nom : float, optional
-        Nominal frequency (Hz); the script's if left out.
-    leave_out : sequence of str, optional
-        Elements to do without, as `Class.name`, with `*` for any: "PVSystem.*".
-    switches : sequence of str, optional
-        Lines that can be opened, beside those that the script calls switches.
-
-    Returns
-    -------
-    Feeder
-        Its tables; `notes` tell what was done instead of what the script says.
+    Its `notes` list what was done instead of what the script says.
 
     Raises
     ------
     FeederError
-        With everything that the engine refuses and everything that we cannot represent.
+        With everything that the engine refuses and everything that cannot be represented.
     """
     path = Path(path).absolute()
     # the engine goes back to the folder in which it was loaded, whatever the present one is
@@ -71,25 +57,21 @@ def read_opendss(
 
 def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[str], switches: Sequence[str]) -> Feeder:
     engine = DssEngine()
-    problems = engine.read(path, scratch)
-    if problems:
-        raise FeederError(path.name, tuple(problems))
+    _refuse_if(path, engine.read(path, scratch))
     circuit = engine.circuit
-    if problems := _too_many_nodes(circuit):
-        raise FeederError(path.name, tuple(problems))
-    notes = engine.notes
-    problems = []
-    left_out = _left_out(circuit, leave_out, problems)
-    own = f_nom if f_nom is not None else float(circuit.Solution.Frequency)
-    if f_nom is not None and f_nom != circuit.Solution.Frequency:
+    _refuse_if(path, _too_many_nodes(circuit))
+    notes, problems = engine.notes, list[str]()
+    everything = _elements(circuit)
+    left_out = _left_out([name for name, _ in everything], leave_out, problems)
+    frequency = float(circuit.Solution.Frequency)
+    if f_nom is not None and f_nom != frequency:
         problems.append(
-            f"f_nom: the script's circuit is solved at {circuit.Solution.Frequency:g} Hz, got {f_nom:g}; its "
+            f"f_nom: the script's circuit is solved at {frequency:g} Hz, got {f_nom:g}; its "
             f'reactances hold there alone; write "set frequency={f_nom:g}" in the script, or leave f_nom out'
         )
-    elements = DssElements(engine, set(switches), problems, notes)
-    for name, kind in _elements(circuit):
-        if name in left_out:
-            continue
+    elements = DssElements(engine, set(switches), problems)
+    there = [(name, kind) for name, kind in everything if name not in left_out]
+    for name, kind in there:
         if kind in LINEAR:
             elements.add(name, kind)
         elif kind == "vsource":
@@ -98,22 +80,17 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             problems.append(
                 f'{name}: class {kind} is not taken over; leave it out (leave_out=["{name}"]) or put an inverter there'
             )
-        elif kind in CONTROLS | WATCHING | {"load"}:
-            continue
         elif kind in PROTECTION:
             notes.append(f"{name}: what it controls stays as it is")
-        else:
+        elif kind not in CONTROLS | WATCHING | {"load"}:
             problems.append(f'{name}: elements of class {kind} are not supported; leave it out (leave_out=["{name}"])')
     load_parts = read_loads(engine, left_out, problems)
     for name in set(switches) - elements.used_switches:
         problems.append(f'switches: there is no line "{name}"')
-    if not any(kind == "vsource" and name not in left_out for name, kind in _elements(circuit)):
+    if all(kind != "vsource" for _, kind in there):
         problems.append("no Vsource: a circuit has one, its substation")
-    elif elements.source:
-        report_unconnected(elements.rows, elements.switches, load_parts, elements.source[0], problems)
-    if problems:
-        raise FeederError(path.name, tuple(problems))
-    source: Source = elements.source[0]
+    if not elements.source:
+        _refuse_if(path, problems)
     feeder = Feeder(
         name=str(circuit.Name),
         load_set="main",
@@ -126,16 +103,22 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         regulators=(),
         transformers=(),
         inverters=(),
-        source=source,
-        f_nom=own,
+        source=elements.source[0],
+        f_nom=frequency,
         elements=tuple(elements.rows),
         load_parts=tuple(load_parts),
         notes=tuple(notes),
     )
+    report_unconnected(feeder, problems)
+    _refuse_if(path, problems)
     report_undetermined(feeder, problems)
+    _refuse_if(path, problems)
+    return feeder
+
+
+def _refuse_if(path: Path, problems: list[str]) -> None:
     if problems:
         raise FeederError(path.name, tuple(problems))
-    return feeder
 
 
 def _elements(circuit: Any) -> list[tuple[str, str]]:
@@ -156,12 +139,12 @@ def _too_many_nodes(circuit: Any) -> list[str]:
     return [f"bus {bus}: nodes above {len(NODES)} are not supported; give its nodes lower numbers" for bus in buses]
 
 
-def _left_out(circuit: Any, patterns: Sequence[str], problems: list[str]) -> set[str]:
-    names = [name for name, _ in _elements(circuit)]
-    found: set[str] = set()
+def _left_out(names: list[str], patterns: Sequence[str], problems: list[str]) -> set[str]:
+    """Return the elements that patterns match; note a problem for each pattern that matches none."""
+    left_out: set[str] = set()
     for pattern in patterns:
         matching = fnmatch.filter(names, pattern.lower())
         if not matching:
             problems.append(f'leave_out: "{pattern}" matches no element; write Class.name, e.g. "PVSystem.pv1"')
-        found.update(matching)
-    return found
+        left_out.update(matching)
+    return left_out

@@ -7,7 +7,7 @@ from math import sqrt
 from pathlib import Path
 from typing import Any
 
-from plant.connectivity import Connectivity, Node
+from plant.connectivity import Connectivity, Node, by_bus
 from plant.equipment import PHASES, Bus, Feeder
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import BusColumns, ImportedBusColumns
@@ -116,7 +116,7 @@ def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> 
     parts = Connectivity(feeder).parts(whole=whole)
     main = next((part for part in parts if whole and (whole[0], "A") in part), max(parts, key=len))
     order = {bus.name: bus.phases for bus in feeder.buses}
-    for part in _by_bus(part for part in parts if part is not main):
+    for part in by_bus(part for part in parts if part is not main):
         names = [name for name in order if any((name, phase) in part for phase in PHASES)]
         shown = [_named(name, order[name], part) for name in names]
         if len(names) == 1:
@@ -135,16 +135,6 @@ def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> 
             + "; "
             "a line, switch, regulator or transformer is missing, or lacks a phase"
         )
-
-
-def _by_bus(parts: Iterable[frozenset[Node]]) -> list[frozenset[Node]]:
-    """Parts, those together that are phases of the same buses: what cuts off one phase cut off the others."""
-    found: list[frozenset[Node]] = []
-    for part in parts:
-        buses = {bus for bus, _ in part}
-        same = [other for other in found if buses & {bus for bus, _ in other}]
-        found = [*(other for other in found if other not in same), part.union(*same)]
-    return found
 
 
 def _named(bus: str, phases: str, part: frozenset[Node]) -> str:

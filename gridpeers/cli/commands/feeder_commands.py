@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail
+from gridpeers.cli.usage import BAD_INPUT, fail, refuse
 
 if TYPE_CHECKING:
     from gridpeers.feeder import Feeder
-    from plant.tables import FeederError
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve and draw feeders.")
 
@@ -70,25 +69,22 @@ def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = Non
 
     Example:  gridpeers feeder check microgrid123
     """
-    from plant.network import Network
+    from plant.connectivity import Connectivity
 
     tables = _read(feeder, switch, leave_out)
     _describe(tables)
-    network = Network(tables)
-    load: dict[str, float] = {}
-    for bus, _, S in tables.demands():
-        load[bus] = load.get(bus, 0.0) + S.real / 1e3
+    graph, load = Connectivity(tables), tables.load_by_bus()
     for each in tables.switches:
         name = each.alias or each.name
         if not each.closed:
             typer.echo(f"switch {name}: open")
             continue
-        behind = next(part for part in network.islands(network.closed0 - {each.name}) if each.to_bus in part)
-        if each.from_bus in behind:
+        behind = graph.cut_off(each)
+        if not behind:
             typer.echo(f"switch {name}: closed; there is another way around it")
             continue
         inverters = [row.name for row in tables.inverters if row.bus in behind]
-        cut = f"{len(behind)} buses, {sum(load.get(bus, 0.0) for bus in behind):.0f} kW of load"
+        cut = f"{len(behind)} buses, {sum(load.get(bus, 0.0) for bus in behind) / 1e3:.0f} kW of load"
         typer.echo(f"switch {name}: closed; open, it cuts off {cut}{', ' + ', '.join(inverters) if inverters else ''}")
 
 
@@ -160,7 +156,7 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     try:
         return Feeder.from_opendss(name, switches=switches, leave_out=leave_out)
     except FeederError as error:
-        _refuse(error)
+        refuse(error)
 
 
 def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
@@ -175,16 +171,11 @@ def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> F
     try:
         return Feeder.read(name)
     except FeederError as error:
-        _refuse(error)
-
-
-def _refuse(error: FeederError) -> NoReturn:
-    count = len(error.problems)
-    fail([*([f"{count} problems:"] if count > 1 else []), *error.problems], BAD_INPUT)
+        refuse(error)
 
 
 def _describe(feeder: Feeder) -> None:
-    load = sum(S.real for _, _, S in feeder.demands()) / 1e3
+    load = sum(feeder.load_by_bus().values()) / 1e3
     nodes = sum(len(bus.phases) for bus in feeder.buses)
     typer.echo(
         f"{feeder.name}: {len(feeder.buses)} buses, {nodes} nodes, {load:.0f} kW of load, "

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel.compiled import compiled
 
 COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off")
-"""What a row of `law` holds: W, var, V, two exponents, three voltages (V), an exponent, a voltage (V)."""
+"""Columns of `law`: P (W), Q (var), voltages (V), and the exponents n_p, n_q and edge; see `LoadPart`."""
 
 
 STEEPNESS = 500.0

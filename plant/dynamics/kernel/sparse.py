@@ -111,7 +111,7 @@ class SparseMaps(NamedTuple):
     a_second: Real
     """The same for the second."""
     from_sources: NDArray[np.complex128]
-    """What sources contribute to each branch's voltage (V)."""
+    """Part of each branch's voltage that the ideal sources give (V)."""
     terminals: NDArray[np.int64]
     """Positions of the inverters' terminals, n_inv x 3, or -1."""
     fixed: NDArray[np.complex128]

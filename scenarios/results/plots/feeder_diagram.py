@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -45,12 +45,18 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
     picture = Figure(figsize=(10.5, 7.2), layout="constrained")
     at = places(feeder)
     axes = picture.add_subplot(aspect="equal" if _has_coordinates(feeder) else "auto")
-    _draw_branches(feeder, at, V, axes, picture)
     few = len(feeder.buses) <= MANY
     zones = _zones(feeder)
     colours = _colours(feeder, zones)
+    lines = _draw_branches(feeder, at, axes)
+    if V is None:
+        lines.set_color([colours.get(zones[a], BESIDE) for a, _, _ in feeder.branches()])
+    else:
+        lines.set_array(np.array([(V[a] + V[b]) / 2.0 for a, b, _ in feeder.branches()]))
+        lines.set(cmap="viridis", clim=(0.9, 1.1))
+        picture.colorbar(lines, ax=axes, label="V (pu, lowest phase)", shrink=0.6)
     if few:
-        for bus in dict.fromkeys(bus for bus, _, _ in feeder.demands()):
+        for bus in feeder.load_by_bus():
             axes.plot(*at[bus], ".", color="black" if V else colours.get(zones[bus], BESIDE), ms=3.5, zorder=2)
     for switch in feeder.switches:
         _draw_switch(switch, at, axes, named=few)
@@ -83,24 +89,13 @@ def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
     return {bus.name: known.get(bus.name, (bus.x, bus.y)) for bus in feeder.buses}
 
 
-def branches(feeder: Feeder) -> Iterator[tuple[str, str, int]]:
-    """Yield the ends of every branch, switches left out, and its number of phases."""
-    yield from ((line.from_bus, line.to_bus, len(line.phases)) for line in feeder.lines)
-    yield from ((row.from_bus, row.to_bus, 3) for row in feeder.transformers)
-    yield from ((row.from_bus, row.to_bus, len(row.phases)) for row in feeder.regulators)
-    for element in feeder.elements:
-        buses = list(dict.fromkeys(bus for bus, _ in element.nodes))
-        phases = sum(bus == buses[0] for bus, _ in element.nodes) if buses else 0
-        yield from ((buses[0], other, min(max(phases, 1), 3)) for other in buses[1:])
-
-
 def _has_coordinates(feeder: Feeder) -> bool:
     return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
 
 
 def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
-    ends = [(a, b) for a, b, _ in branches(feeder)]
+    ends = [(a, b) for a, b, _ in feeder.branches()]
     for a, b in (*ends, *((switch.from_bus, switch.to_bus) for switch in feeder.switches)):
         found[a].append(b)
         found[b].append(a)
@@ -157,21 +152,14 @@ def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
     return dict(zip(named, COLOURS, strict=False)) | dict.fromkeys(beside, BESIDE)
 
 
-def _draw_branches(feeder: Feeder, at: Places, V: Mapping[str, float] | None, axes: Axes, picture: Figure) -> None:
+def _draw_branches(feeder: Feeder, at: Places, axes: Axes) -> LineCollection:
     thin = 0.5 if len(feeder.buses) > MANY else 1.0
-    rows = list(branches(feeder))
+    rows = list(feeder.branches())
     lines = LineCollection([(at[a], at[b]) for a, b, _ in rows], zorder=1, capstyle="round")
     lines.set_linewidth([thin * WIDTH[phases] for _, _, phases in rows])
-    if V is None:
-        zones = _zones(feeder)
-        colours = _colours(feeder, zones)
-        lines.set_color([colours.get(zones[a], BESIDE) for a, _, _ in rows])
-    else:
-        lines.set_array(np.array([(V[a] + V[b]) / 2.0 for a, b, _ in rows]))
-        lines.set(cmap="viridis", clim=(0.9, 1.1))
-        picture.colorbar(lines, ax=axes, label="V (pu, lowest phase)", shrink=0.6)
     axes.add_collection(lines)
     axes.autoscale_view()
+    return lines
 
 
 def _draw_switch(switch: Switch, at: Places, axes: Axes, *, named: bool) -> None:
@@ -187,15 +175,15 @@ def _draw_switch(switch: Switch, at: Places, axes: Axes, *, named: bool) -> None
 
 def _legend(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str], axes: Axes, picture: Figure) -> None:
     """Say what the marks are, and how much load each zone has."""
-    load: dict[str, float] = {}
-    for bus, _, S in feeder.demands():
-        load[zones[bus]] = load.get(zones[bus], 0.0) + S.real / 1e3
+    load = dict.fromkeys(zones.values(), 0.0)
+    for bus, P in feeder.load_by_bus().items():
+        load[zones[bus]] += P / 1e3
     for zone, colour in colours.items():
         rated = sum(row.P_rated for row in feeder.inverters if row.microgrid == zone) / 1e3
         text = f"{zone or 'no zone'}: {load.get(zone, 0.0):.0f} kW of load" + (
             f", {rated:.0f} kW of inverters" if rated else ""
         )
-        if zone in zones.values():
+        if zone in load:
             axes.plot([], [], color=colour, lw=3, label=text)
     for marker, face, text in (("s", BESIDE, "GFM inverter"), ("o", BESIDE, "GFL inverter"), ("o", "white", "spare")):
         axes.plot([], [], marker=marker, ms=8, mfc=face, mec="black", ls="", label=text)
