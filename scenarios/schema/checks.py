@@ -26,7 +26,7 @@ _LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max"
 """Parameters by kind of inverter that limit a set-point of P; the first broken one is noted."""
 
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
-"""What a run folder holds beside the folders of the cases."""
+"""Files and folders of a run folder beside the folders of its cases."""
 
 
 def check_names(scenario: ScenarioModel, problems: Problems) -> None:

@@ -1,1 +1,1 @@
-"""What users plug in: registries, references, the shape of a plug-in, what foreign code may raise."""
+"""Plug-ins of users: registries, references, required shapes, errors of foreign code."""

@@ -1,1 +1,1 @@
-"""What a table of a file, or a plug-in with parameters, declares of its fields, and the one reader of both. Pure."""
+"""Fields of a table of a file, or of a plug-in with parameters, and the one reader of both. Pure."""

@@ -67,7 +67,7 @@ class Plausible:
     """Numbers that make sense, bounds included."""
 
     what: str
-    """What the number is, with its article: the subject of the sentence."""
+    """Name of the quantity, with its article: the subject of the sentence."""
     low: float
     """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
     high: float
@@ -128,7 +128,7 @@ class Probability:
     """A probability from 0 to 1."""
 
     what: str
-    """What has the probability."""
+    """Name of the event."""
     above_zero: bool = False
     """Whether 0 is none, as the number is divided by."""
 

@@ -1,4 +1,4 @@
-"""What the fields of a class say about a table of a file: annotations, keys with units, and ranges. Pure.
+"""Declarations of a table of a file on the fields of a class: annotations, keys with units, and ranges. Pure.
 
 A table is a `msgspec.Struct`, or any class with parameters, such as a law. Its fields carry annotations:
 
@@ -32,7 +32,7 @@ class Problem(NamedTuple):
     path: str
     """Which key, e.g. `link[2].loss.p`; relative to the table where the table finds it."""
     text: str
-    """What is wrong, with the value and its unit, and what would be right."""
+    """The error, with the value, its unit, and a right value."""
 
 
 @dataclass(frozen=True)

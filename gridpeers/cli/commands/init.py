@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail
+
+if TYPE_CHECKING:
+    from gridpeers.feeder import Feeder
+    from scenarios.feeder_proposal import Proposal
 
 TEMPLATE = Path(__file__).parents[1] / "template"
 """Folder that is copied."""
@@ -90,23 +94,31 @@ def init(
     typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")
 
 
+def _with_proposal(script: str, switches: list[str], leave_out: list[str]) -> tuple[Feeder, Proposal]:
+    """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
+    from gridpeers.cli.commands.feeder_commands import read_script
+    from scenarios.feeder_proposal import NoSwitchError, propose
+
+    feeder = read_script(script, switches, leave_out)
+    try:
+        return feeder, propose(feeder)
+    except NoSwitchError as error:
+        if not error.lines:
+            raise
+        line = error.lines[0]
+    typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
+    feeder = read_script(script, [*switches, line], leave_out)
+    return feeder, propose(feeder)
+
+
 def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str]) -> None:
     """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
     import msgspec
 
-    from gridpeers.cli.commands.feeder_commands import read_script
-    from scenarios.feeder_proposal import NoProposalError, NoSwitchError, propose
+    from scenarios.feeder_proposal import NoProposalError
 
-    feeder = read_script(str(script), switches, leave_out)
     try:
-        try:
-            proposal = propose(feeder)
-        except NoSwitchError as error:
-            if not error.lines:
-                raise
-            typer.echo(f"NOTE  no switch cuts half of the load off the substation; {error.lines[0]} is made one")
-            feeder = read_script(str(script), [*switches, error.lines[0]], leave_out)
-            proposal = propose(feeder)
+        feeder, proposal = _with_proposal(str(script), switches, leave_out)
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
     msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / feeder.name)

@@ -198,7 +198,7 @@ def now(desk: Desk) -> float:
 
 
 def test_live_links_from_set_to_replay(desk: Desk) -> None:
-    """What people type and read: set, cut, show, status, heal, problems; the record, and a scenario that can be run."""
+    """The commands set, cut, show, status and heal work, are recorded, and become a scenario that can be run."""
     listen = desk.options[-1]
     kept = ("--out", "here", "--record", "again.toml")
     agents = [desk.open("agent", name) for name in ("inv1", "inv4")]

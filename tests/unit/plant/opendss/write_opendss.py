@@ -14,7 +14,7 @@ LIMITS = "vminpu=0.01 vlowpu=0.005 vmaxpu=9"
 """Loads of our tables keep their law at any voltage."""
 
 IDEAL = "r1=1e-7 r0=1e-7 x1=0 x0=0 c1=0 c0=0 length=1"
-"""What stands for a switch (ohm)."""
+"""Impedance in place of a switch (ohm)."""
 
 
 def write_opendss(feeder: Feeder) -> str:
