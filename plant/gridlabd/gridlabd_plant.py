@@ -16,8 +16,8 @@ from wire.messages import PlantEvent
 
 from .glm import write_glm
 
-SIMULATE = Path(__file__).with_name("simulate.py")
-FEEDERS = Path(__file__).parents[2] / "plant" / "data"
+DELTA_MODE = Path(__file__).with_name("delta_mode.py")
+FEEDERS = Path(__file__).parents[1] / "data"
 
 REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
@@ -26,14 +26,14 @@ MISSING = """GridLAB-D is not there: {python} is no interpreter that has the pac
 Install the wheel (Linux, x86-64) into an environment of its own and name the interpreter of that one:
 
     python3 -m venv gld && gld/bin/pip install gridlabd==6.0.0
-    .venv/bin/python -m bench.gridlabd.compare_gridlabd --gridlabd gld/bin/python"""
+    .venv/bin/python -m bench.validation.compare_gridlabd --gridlabd gld/bin/python"""
 
 
 class GridlabdError(RuntimeError):
     """GridLAB-D is missing, or it ended."""
 
 
-class Twin:
+class GridlabdPlant:
     """A plant whose numbers are GridLAB-D's, to be controlled by the same agents (`plant.plant_interface.PlantLike`).
 
     Parameters
@@ -77,7 +77,7 @@ class Twin:
         with self._log.open("w") as log:
             try:
                 self._process = subprocess.Popen(
-                    [python, str(SIMULATE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
+                    [python, str(DELTA_MODE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
                 )
             except OSError:
                 raise GridlabdError(MISSING.format(python=python)) from None
@@ -96,7 +96,7 @@ class Twin:
         self._rows = [self._as_row(0, self._now)]
 
     def __enter__(self) -> Self:
-        """Give the twin; leaving the context ends GridLAB-D's process."""
+        """Give the plant; leaving the context ends GridLAB-D's process."""
         return self
 
     def __exit__(

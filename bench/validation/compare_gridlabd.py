@@ -1,10 +1,10 @@
 """Our plant against GridLAB-D, step by step: an independent check of network, inverters and time stepping.
 
-GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `glm.py` writes from the feeder's tables without the
-code of `plant.network`. Both plants start from their own equilibrium and go through the same run; f, P, Q, V and the
-set-points held of all inverters are compared after every step of 2 ms. Closed loop, each has agents of its own.
+GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.glm` writes from the feeder's tables
+without the code of `plant.network`. Both plants start from their own equilibrium and go through the same run; f, P, Q,
+V and the set-points held of all inverters are compared after every step of 2 ms. Closed loop, each has agents of its own.
 
-    .venv/bin/python -m bench.gridlabd.compare_gridlabd --gridlabd ENVIRONMENT/bin/python [run ...]
+    .venv/bin/python -m bench.validation.compare_gridlabd --gridlabd ENVIRONMENT/bin/python [run ...]
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from agents.agent_config import AgentConfig
 from plant.equipment import InverterRow
 from plant.feeder import Plant
+from plant.gridlabd.gridlabd_plant import GridlabdError, GridlabdPlant
 from plant.network import Network
 from plant.plant_config import GflParameters, PlantConfig, SwitchEvent
 from plant.plant_interface import PlantLike
@@ -33,7 +34,6 @@ from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 
 from .impedance import with_impedances
-from .twin import GridlabdError, Twin
 
 ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)
 """GridLAB-D has one rating for a GFL's reference and its apparent power (ours: 1 and 1.2 pu), and no bound of V_set."""
@@ -225,13 +225,13 @@ def compare(run: ComparedRun, python: str) -> tuple[str, dict[str, Largest]]:
     network = Network(with_impedances(feeder) if run.impedances else feeder)
     ours = Plant(network, settings, config.T_c, config.record_step)
     assert config.end is not None
-    with Twin(ours, settings, config.T_c, config.end, python) as twin:
-        first, second = (_rows(plant, run, config, agents) for plant in (ours, twin))
-        return twin.version, differences(first, second, network.inverters)
+    with GridlabdPlant(ours, settings, config.T_c, config.end, python) as theirs:
+        first, second = (_rows(plant, run, config, agents) for plant in (ours, theirs))
+        return theirs.version, differences(first, second, network.inverters)
 
 
 def _rows(
-    plant: Plant | Twin, run: ComparedRun, config: PlantConfig, agents: tuple[AgentConfig, ...]
+    plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig, agents: tuple[AgentConfig, ...]
 ) -> list[tuple[float, ...]]:
     """Return the rows of every step of a run."""
     return _closed_loop(plant, config, agents) if run.closed_loop else _open_loop(plant, run, config)
@@ -245,7 +245,7 @@ def _closed_loop(plant: PlantLike, config: PlantConfig, agents: tuple[AgentConfi
     return rows
 
 
-def _open_loop(plant: Plant | Twin, run: ComparedRun, config: PlantConfig) -> list[tuple[float, ...]]:
+def _open_loop(plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig) -> list[tuple[float, ...]]:
     assert config.end is not None
     units = {unit.name: unit for unit in load_scenario(run.scenario)[1].inverters}
     orders = {round(order.t / config.T_c): order for order in run.orders}

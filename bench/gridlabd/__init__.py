@@ -1,1 +1,0 @@
-"""Our plant against GridLAB-D; see `bench.gridlabd.compare_gridlabd`."""
