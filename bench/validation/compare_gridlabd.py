@@ -2,7 +2,7 @@
 
 GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.glm` writes from the feeder's tables
 without the code of `plant.network`. Both plants start from their own equilibrium and go through the same run; f, P, Q,
-V and the set-points held of all inverters are compared after every step of 2 ms. Closed loop, each has agents of its own.
+V and the held set-points of all inverters are compared after every step of 2 ms. Closed loop: each has its own agents.
 
     .venv/bin/python -m bench.validation.compare_gridlabd --gridlabd ENVIRONMENT/bin/python [run ...]
 """
