@@ -225,10 +225,18 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
 
     def load_by_bus(self) -> dict[str, float]:
         """Return the real power (W) of the loads at each bus that has any, at nominal voltage."""
-        load: dict[str, float] = {}
+        return self._by_bus(1.0)
+
+    def generation_by_bus(self) -> dict[str, float]:
+        """Return the real power (W) of constant generation at each bus that has any: loads of negative power."""
+        return self._by_bus(-1.0)
+
+    def _by_bus(self, sign: float) -> dict[str, float]:
+        power: dict[str, float] = {}
         for bus, _, S in self.demands():
-            load[bus] = load.get(bus, 0.0) + S.real
-        return load
+            if S.real * sign > 0.0:
+                power[bus] = power.get(bus, 0.0) + S.real * sign
+        return power
 
     def branches(self) -> Iterator[tuple[str, str, int]]:
         """Yield the two buses of every branch, switches left out, and its number of phases."""

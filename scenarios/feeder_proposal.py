@@ -106,7 +106,9 @@ def propose(feeder: Feeder) -> Proposal:
                 )
             )
     rated = sum(row.P_rated for row in inverters)
-    return Proposal(switch, tuple(inverters), round((1.0 - IMPORTED) * total / rated, 3), total)
+    generated = sum(P for bus, P in feeder.generation_by_bus().items() if bus in beyond)
+    P_set0 = max(round(((1.0 - IMPORTED) * total - generated) / rated, 3), 0.0)
+    return Proposal(switch, tuple(inverters), P_set0, total)
 
 
 def _islanding_switch(feeder: Feeder) -> tuple[str, frozenset[str]]:

@@ -15,9 +15,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from plant.equipment import NODES, Feeder
+from plant.imported_equipment import LoadPart
 from plant.opendss.dss_connections import report_unconnected, report_undetermined
 from plant.opendss.dss_elements import DssElements
 from plant.opendss.dss_engine import DssEngine
+from plant.opendss.dss_generation import GENERATION, read_generation
 from plant.opendss.dss_loads import read_loads
 from plant.tables.read import FeederError
 
@@ -33,8 +35,11 @@ PROTECTION = frozenset({"fuse", "recloser", "relay", "swtcontrol"})
 LINEAR = frozenset({"line", "transformer", "autotrans", "reactor", "capacitor", "fault", "gictransformer"})
 """Classes that a primitive admittance matrix describes."""
 
-GENERATION = frozenset({"generator", "pvsystem", "storage", "windgen", "indmach012", "isource"})
+MACHINES = frozenset({"windgen", "indmach012", "isource"})
 """Classes whose place an inverter of ours can take."""
+
+DISPATCH = frozenset({"invcontrol", "expcontrol", "storagecontroller"})
+"""Controls that change what generation delivers."""
 
 
 def read_opendss(
@@ -70,6 +75,7 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             f'reactances hold there alone; write "set frequency={f_nom:g}" in the script, or leave f_nom out'
         )
     elements = DssElements(engine, set(switches), problems)
+    generated: list[LoadPart] = []
     there = [(name, kind) for name, kind in everything if name not in left_out]
     for name, kind in there:
         if kind in LINEAR:
@@ -77,6 +83,13 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         elif kind == "vsource":
             elements.add_source(name)
         elif kind in GENERATION:
+            generated += read_generation(engine, name, notes, problems)
+        elif kind in DISPATCH:
+            problems.append(
+                f"{name}: class {kind} is not supported; leave it out "
+                f'(leave_out=["{name}"]): what it controls stays as in the snapshot'
+            )
+        elif kind in MACHINES:
             problems.append(
                 f'{name}: class {kind} is not taken over; leave it out (leave_out=["{name}"]) or put an inverter there'
             )
@@ -84,7 +97,7 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             notes.append(f"{name}: what it controls stays as it is")
         elif kind not in CONTROLS | WATCHING | {"load"}:
             problems.append(f'{name}: elements of class {kind} are not supported; leave it out (leave_out=["{name}"])')
-    load_parts = read_loads(engine, left_out, problems)
+    load_parts = [*read_loads(engine, left_out, problems), *generated]
     for name in set(switches) - elements.used_switches:
         problems.append(f'switches: there is no line "{name}"')
     if all(kind != "vsource" for _, kind in there):

@@ -175,9 +175,10 @@ def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> F
 
 
 def _describe(feeder: Feeder) -> None:
-    load = sum(feeder.load_by_bus().values()) / 1e3
+    load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
     nodes = sum(len(bus.phases) for bus in feeder.buses)
     typer.echo(
         f"{feeder.name}: {len(feeder.buses)} buses, {nodes} nodes, {load:.0f} kW of load, "
+        f"{f'{generation:.0f} kW of constant generation, ' if generation else ''}"
         f"{len(feeder.switches)} switches, {len(feeder.inverters)} inverters, {feeder.f_nom:g} Hz"
     )
