@@ -38,8 +38,8 @@ LINEAR = frozenset({"line", "transformer", "autotrans", "reactor", "capacitor", 
 MACHINES = frozenset({"windgen", "indmach012", "isource"})
 """Classes whose place an inverter of ours can take."""
 
-DISPATCH = frozenset({"invcontrol", "expcontrol", "storagecontroller"})
-"""Controls that change what generation delivers."""
+INVERTER_CONTROLS = frozenset({"invcontrol", "expcontrol"})
+"""Controls of inverters, which have acted likewise."""
 
 
 def read_opendss(
@@ -84,11 +84,8 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             elements.add_source(name)
         elif kind in GENERATION:
             generated += read_generation(engine, name, notes, problems)
-        elif kind in DISPATCH:
-            problems.append(
-                f"{name}: class {kind} is not supported; leave it out "
-                f'(leave_out=["{name}"]): what it controls stays as in the snapshot'
-            )
+        elif kind in INVERTER_CONTROLS:
+            notes.append(f"{name}: what it controls stays as in the snapshot")
         elif kind in MACHINES:
             problems.append(
                 f'{name}: class {kind} is not taken over; leave it out (leave_out=["{name}"]) or put an inverter there'

@@ -21,6 +21,11 @@ SCRIPTS = {
     "impedance": "New Generator.g bus1=c kv=0.48 kw=50 model=2",
     "voltage-controlled": "New Generator.g bus1=c kv=0.48 kw=50 model=3 maxkvar=40 minkvar=-40 vpu=1.0",
     "photovoltaic": "New PVSystem.p bus1=c.1.2 phases=1 kv=0.48 kva=50 pmpp=40 irradiance=0.8",
+    "volt-var": (
+        "New PVSystem.p bus1=c kv=0.48 kva=50 pmpp=40\n"
+        "New XYcurve.vv npts=4 Yarray=(1 1 -1 -1) XArray=(0.5 0.95 1.05 1.5)\n"
+        "New InvControl.i mode=voltvar voltage_curvex_ref=rated vvc_curve1=vv derlist=(pvsystem.p)"
+    ),
     "discharging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=discharging",
     "charging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=charging %stored=20",
 }

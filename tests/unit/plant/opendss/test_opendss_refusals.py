@@ -24,13 +24,9 @@ ONE_LINE = {
         "New PVSystem.p bus1=c kv=0.48 kva=50 pmpp=40 balanced=yes\nNew Load.l bus1=c.1 phases=1 kv=0.277 kw=60",
         "pvsystem.p: delivers no constant power, or not the same in each phase",
     ),
-    "a control of inverters": (
-        "New PVSystem.p bus1=c kv=0.48 kva=50 pmpp=40\nNew ExpControl.e PVSystemList=p",
-        "expcontrol.e: class expcontrol is not supported; leave it out",
-    ),
     "a control of storage": (
         "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100\nNew StorageController.k element=Line.head elementlist=s",
-        "storagecontroller.k: class storagecontroller is not supported; leave it out",
+        "storagecontroller.k: elements of class storagecontroller are not supported; leave it out",
     ),
     "IndMach012": ("New IndMach012.m bus1=c kv=0.48 kva=50", 'leave_out=["indmach012.m"]'),
     "UPFC": ("New UPFC.u bus1=c bus2=d refkv=0.277", "elements of class upfc are not supported"),
