@@ -1,13 +1,12 @@
 """The import against EPRI's own engine (in C++), beside that of dss-python (in Pascal)."""
 
 import importlib.util
-import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from bench.validation.opendss.opendss_engines import solve_scripts
+from bench.validation.opendss.write_opendss import write_opendss
 from plant.tables import read_feeder
 from tests.unit.plant.opendss.opendss_scripts import (
     CONNECTIONS,
@@ -20,7 +19,6 @@ from tests.unit.plant.opendss.opendss_scripts import (
     TRANSFORMERS,
 )
 from tests.unit.plant.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
-from tests.unit.plant.opendss.write_opendss import write_opendss
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 if importlib.util.find_spec("py_dss_interface") is None:
@@ -54,15 +52,8 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, di
     for number, (name, parts) in enumerate(SCRIPTS.items()):
         (folder / str(number)).mkdir()
         paths[name] = write(folder / str(number), LINE, *parts)
-    out = folder / "out.json"
-    script = Path(__file__).with_name("epri_engine.py")
-    command = [sys.executable, str(script), str(out), *map(str, paths.values())]
-    subprocess.run(command, check=True, cwd=folder, capture_output=True, timeout=100)
-    voltages = json.loads(out.read_text())
-    return {
-        name: (path, {node: complex(*pair) for node, pair in voltages[str(path)].items()})
-        for name, path in paths.items()
-    }
+    solved = solve_scripts("py-dss-interface", [(path, [()]) for path in paths.values()])
+    return {name: (path, each.state(0)) for (name, path), each in zip(paths.items(), solved, strict=True)}
 
 
 @pytest.mark.parametrize("name", [*FEEDER_NAMES, *SCRIPTS])

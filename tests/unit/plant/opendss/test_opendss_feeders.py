@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.validation.opendss.write_opendss import write_opendss
 from plant.network import Network, solve_power_flow
 from plant.opendss import read_opendss
 from plant.tables import read_feeder
 from tests.unit.plant.opendss.opendss_solutions import TOLERANCE, engine_voltages, largest_difference
-from tests.unit.plant.opendss.write_opendss import write_opendss
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 

@@ -13,7 +13,7 @@ MODEL = {"P": 1, "Z": 2, "I": 5}
 LIMITS = "vminpu=0.01 vlowpu=0.005 vmaxpu=9"
 """Loads of our tables keep their law at any voltage."""
 
-IDEAL = "r1=1e-7 r0=1e-7 x1=0 x0=0 c1=0 c0=0 length=1"
+IDEAL = "r1=1e-8 r0=1e-8 x1=0 x0=0 c1=0 c0=0 length=1"
 """Impedance in place of a switch (ohm)."""
 
 
@@ -28,7 +28,7 @@ def _commands(feeder: Feeder) -> Iterator[str]:
     yield f"Clear\nSet DefaultBaseFrequency={feeder.f_nom!r}"
     yield (
         f"New Circuit.{feeder.name} bus1={source.bus} basekv={kV[source.bus]!r} pu={source.V_pu!r} "
-        f"angle={source.angle * 180.0 / pi!r} r1=0 r0=0 x1=1e-6 x0=1e-6"
+        f"angle={source.angle * 180.0 / pi!r} r1=0 r0=0 x1=1e-7 x0=1e-7"
     )
     for config in feeder.line_configs:
         for phases in sorted({line.phases for line in feeder.lines if line.config == config.name}):
@@ -46,17 +46,17 @@ def _commands(feeder: Feeder) -> Iterator[str]:
         for phase in regulator.phases:
             V = kV[regulator.from_bus] / sqrt(3.0)
             yield (
-                f"New Transformer.{regulator.name}{phase} phases=1 xhl=1e-5 %loadloss=1e-6 ppm_antifloat=0 buses=("
+                f"New Transformer.{regulator.name}{phase} phases=1 xhl=1e-6 %loadloss=1e-7 ppm_antifloat=0 buses=("
                 f"{_at(regulator.from_bus, phase)} {_at(regulator.to_bus, phase)}) conns=(wye wye) kvs=({V!r} {V!r}) "
                 f"kvas=(5000 5000) taps=(1 {regulator.ratio!r})"
             )
     for transformer in feeder.transformers:
         kind = "delta" if transformer.connection == "D-D" else "wye"
-        kVA, V = transformer.S_rated / 1e3, (kV[transformer.from_bus], kV[transformer.to_bus])
+        kVA, first, second = transformer.S_rated / 1e3, kV[transformer.from_bus], kV[transformer.to_bus]
         yield (
             f"New Transformer.{transformer.name} phases=3 xhl={transformer.z.imag * 100!r} "
             f"%loadloss={transformer.z.real * 100!r} buses=({transformer.from_bus} {transformer.to_bus}) "
-            f"conns=({kind} {kind}) kvs=({V[0]!r} {V[1]!r}) kvas=({kVA!r} {kVA!r})"
+            f"conns=({kind} {kind}) kvs=({first!r} {second!r}) kvas=({kVA!r} {kVA!r})"
         )
     for i, bank in enumerate(feeder.capacitors):
         for phase, Q in zip("ABC", bank.Q, strict=True):

@@ -1,0 +1,97 @@
+"""Part (a): the power flow beside both OpenDSS engines."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from bench.validation.opendss.opendss_engines import ENGINES, solve_scripts
+from bench.validation.opendss.write_opendss import write_opendss
+from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from plant.equipment import Feeder
+from plant.network import Network, solve_power_flow
+from plant.opendss import read_opendss
+from plant.tables import read_feeder
+
+LIMIT = 1e-6
+"""Largest difference of a phasor (pu of nominal voltage); what the engines' switches and regulators drop is below."""
+
+SCRIPTS = Path(__file__).parents[2] / "tests" / "feeders"
+
+TEXT = f"""
+Every node's phasor of our power flow, beside both OpenDSS engines: that of dss-extensions (`dss-python`, in Pascal)
+and EPRI's own (`py-dss-interface`, in C++). IEEE 13 and 34 are scripts that all three read; the 123-node feeders are
+our tables, which `bench/validation/opendss/write_opendss.py` writes as a script with none of the plant's code.
+Differences of complex voltages are within {LIMIT:g} pu.
+"""
+
+CASES = {
+    "ieee13": "IEEE 13-node feeder, imported from its script",
+    "ieee34": "IEEE 34-node feeder, imported from its script",
+    "standard123": "IEEE 123-node feeder, our tables",
+    "microgrid123": "our microgrid feeder, load set main",
+    "microgrid123-event2": "our microgrid feeder, load set event2",
+}
+
+
+def _run(case: str) -> CaseResult:
+    with tempfile.TemporaryDirectory() as folder:
+        if case.startswith("ieee"):
+            script = SCRIPTS / f"{case}.dss"
+            feeder = read_opendss(script)
+        else:
+            name, _, load_set = case.partition("-")
+            feeder, script = read_feeder(name, load_set or "main"), Path(folder) / "feeder.dss"
+            script.write_text(write_opendss(feeder), encoding="utf-8")
+        return _beside_engines(case, feeder, script)
+
+
+def _beside_engines(case: str, feeder: Feeder, script: Path) -> CaseResult:
+    ours, nominal = _our_voltages(feeder)
+    differences = {engine: _differences(ours, nominal, engine, script) for engine in ENGINES}
+    return CaseResult(
+        case,
+        tuple(Measured(f"V, pu, {engine}", float(gap.max()), LIMIT) for engine, gap in differences.items()),
+        {"nodes": str(len(differences[ENGINES[0]]))},
+        differences,
+    )
+
+
+def _our_voltages(feeder: Feeder) -> tuple[dict[str, complex], dict[str, float]]:
+    """Return voltage and nominal voltage (V) of each node, named as OpenDSS names them."""
+    network = Network(feeder)
+    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    names = [f"{bus}.{'ABC456789'.index(phase) + 1}" for bus, phase in network.nodes]
+    return dict(zip(names, V.tolist(), strict=True)), dict(zip(names, network.V_nom.tolist(), strict=True))
+
+
+def _differences(
+    ours: Mapping[str, complex], nominal: Mapping[str, float], engine: str, script: Path
+) -> NDArray[np.float64]:
+    """Return the difference (pu) at every node of the engine; nan where we lack it. Ours has more: at switches."""
+    theirs = solve_scripts(engine, [(script, [()])])[0].state(0)
+    return np.array([abs(ours.get(name, complex("nan")) - V) / nominal.get(name, 1.0) for name, V in theirs.items()])
+
+
+def _draw(results: Sequence[CaseResult]) -> Figure:
+    """Draw the distribution of the differences over the nodes."""
+    figure = Figure(figsize=(7.0, 2.8), layout="constrained")
+    panels = figure.subplots(1, len(ENGINES), sharey=True)
+    for axes, engine in zip(panels, ENGINES, strict=True):
+        for result in results:
+            gap = np.sort(result.curves[engine])
+            axes.semilogx(np.maximum(gap, 1e-16), np.linspace(0.0, 1.0, gap.size), label=result.case)
+        axes.axvline(LIMIT, color="black", linestyle=":", linewidth=1.0)
+        axes.set_title(engine)
+        axes.set_xlabel("difference of V at a node (pu)")
+    panels[0].set_ylabel("share of nodes below")
+    panels[0].legend()
+    return figure
+
+
+POWER_FLOW = ValidationPart("power-flow", "Power flow, beside OpenDSS", TEXT, ENGINES, CASES, _run, _draw)

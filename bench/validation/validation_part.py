@@ -1,0 +1,102 @@
+"""What a part of the cross-validation is: cases, each a row of its table, and one figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from math import floor, log10
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+
+class Measured(NamedTuple):
+    """A number of a case beside the limit that it must keep."""
+
+    quantity: str
+    """Head of its column, with the unit: "V, pu"."""
+    value: float
+    """Mostly the largest difference between ours and the rival; nan if there is none, which fails."""
+    limit: float
+    """What it must not exceed."""
+    at_least: bool = False
+    """Whether the limit is the least value instead."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the limit is kept."""
+        return self.value >= self.limit if self.at_least else self.value <= self.limit
+
+    def text(self) -> str:
+        """Write the value; a difference is rounded up to 1, 2 or 5 times a power of ten, which hides noise."""
+        if self.at_least:
+            return f"{self.value:.3g}"
+        return rounded_up(self.value)
+
+
+class CaseResult(NamedTuple):
+    """A case that was run: a row of its part's table."""
+
+    case: str
+    measured: tuple[Measured, ...]
+    facts: Mapping[str, str] = {}
+    """Further columns: how many states, where the largest difference is. Nothing that changes from run to run."""
+    curves: Mapping[str, NDArray] = {}  # type: ignore[type-arg]
+    """What the part's figure draws of it."""
+
+    def broken(self) -> list[str]:
+        """Return a sentence for each limit that is not kept."""
+        return [
+            f"{self.case}: {each.quantity}: {each.value:.3g} is {'below' if each.at_least else 'beyond'} {each.limit:g}"
+            for each in self.measured
+            if not each.passed
+        ]
+
+
+class ValidationPart(NamedTuple):
+    """A part of the cross-validation: its cases, how one is run, and how all are drawn."""
+
+    name: str
+    """On the command line, and of its figure's file."""
+    title: str
+    """Heading of its section of the page."""
+    text: str
+    """Markdown: what is compared with what, with which tolerance and why."""
+    needs: tuple[str, ...]
+    """Distributions of the rivals: "gridlabd"."""
+    cases: Mapping[str, str]
+    """Each case's name, and what it is in a few words."""
+    run: Callable[[str], CaseResult]
+    """Run a case, by its name."""
+    draw: Callable[[Sequence[CaseResult]], Figure]
+    """Draw the part's figure from the results of all cases."""
+
+    def missing(self) -> str:
+        """Return which distributions are missing and how to install them; empty if none is."""
+        absent = [name for name in self.needs if not _version(name)]
+        if not absent:
+            return ""
+        return f"{self.name} needs {', '.join(absent)}: pip install 'gridpeers[validation]'"
+
+    def rivals(self) -> str:
+        """Return the rivals with their versions: "gridlabd 6.0.0"."""
+        return ", ".join(f"{name} {_version(name)}" for name in self.needs)
+
+
+def rounded_up(value: float) -> str:
+    """Write a difference as the next of 1, 2 and 5 times a power of ten: "2e-11"."""
+    if value == 0.0:
+        return "0"
+    if not 0.0 < value < float("inf"):
+        return str(value)
+    exponent = floor(log10(value))
+    digit = next(digit for digit in (1, 2, 5, 10) if value <= digit * 10.0**exponent * (1 + 1e-12))
+    return f"{float(f'{digit}e{exponent}'):g}"
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return ""

@@ -1,0 +1,8 @@
+"""All parts of the cross-validation, in the order of the page. A new part is one file, and its line here."""
+
+from __future__ import annotations
+
+from bench.validation.power_flow_part import POWER_FLOW
+from bench.validation.validation_part import ValidationPart
+
+PARTS: tuple[ValidationPart, ...] = (POWER_FLOW,)

@@ -1,0 +1,17 @@
+"""Runs a case of the cross-validation, and asserts what the page would say."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.validation.validation_part import CaseResult, ValidationPart
+
+
+def assert_limits_kept(part: ValidationPart, case: str) -> CaseResult:
+    """Run a case and fail with every limit that it breaks; skip where a rival is not installed."""
+    if missing := part.missing():
+        pytest.skip(missing)
+    result = part.run(case)
+    assert result.broken() == []
+    assert result.measured
+    return result
