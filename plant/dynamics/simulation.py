@@ -11,7 +11,8 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, set_equilibrium
 from plant.dynamics.inverters import Inverter, Inverters
-from plant.dynamics.kernel.step import FAILURES, READING, run_steps
+from plant.dynamics.kernel.controller_pass import READING, Units
+from plant.dynamics.kernel.step import FAILURES, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduced import Complex, Real
@@ -98,7 +99,7 @@ class Dynamics:
         return trips
 
     def run(self, steps: int) -> Real:
-        """Advance by `steps` steps; return steps x n_inv x `kernel.step.READING`, all finite.
+        """Advance by `steps` steps; return steps x n_inv x `kernel.controller_pass.READING`, all finite.
 
         Where the frozen tangent leads to no solution it is renewed, as often as necessary. An island without
         solution is de-energised before the step, and the others take the step. With 0 steps the inner loop is only
@@ -130,13 +131,8 @@ class Dynamics:
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network = self.inverters, self.network
-        return run_steps(
-            begin,
-            steps,
-            self.h,
+        arrays = Units(
             units.f_nom,
-            TOLERANCE * float(units.V_b.max(initial=1.0)),
-            network.net,
             units.gfm,
             units.gfm_at,
             units.gfm_state,
@@ -153,9 +149,9 @@ class Dynamics:
             self._J_0,
             units.V,
             units.I,
-            network.x,
-            out,
         )
+        tolerance = TOLERANCE * float(units.V_b.max(initial=1.0))
+        return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
 
     def _return(self) -> None:
         """Go back to the start of the step that failed."""

@@ -1,0 +1,189 @@
+"""One pass of all inverters' controllers: from a network solution to the injections of the next one, compiled.
+
+Every method of time stepping consists of such passes. A pass is a whole step of a model in the order of its own
+blocks. A pass of length 0 leaves the states, except that it holds them within their limits, and writes what they are
+at this point: slopes and outputs. So a model is described once, for every method.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.kernel.arithmetic import A120
+from plant.dynamics.kernel.compiled import compiled
+from plant.dynamics.kernel.gfl import advance_gfl
+from plant.dynamics.kernel.gfm import advance_gfm
+
+READING = 6
+"""Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), and V of the lowest and the highest phase (V)."""
+
+
+class Units(NamedTuple):
+    """The inverters of a run as the compiled functions take them: parameters, states, and their terminals."""
+
+    f_nom: float
+    """Nominal frequency (Hz)."""
+    gfm: Any
+    """Records of `plant.dynamics.kernel.gfm.PARAMETERS`."""
+    gfm_at: NDArray[np.int64]
+    """The inverter that each belongs to."""
+    gfm_state: Any
+    """Their states; advanced by a pass."""
+    gfm_0: Any
+    """Their states at the start of the step."""
+    gfm_d: Any
+    """Slopes of the step's first pass."""
+    gfl: Any
+    """The same for `plant.dynamics.kernel.gfl`."""
+    gfl_at: NDArray[np.int64]
+    gfl_state: Any
+    gfl_0: Any
+    gfl_d: Any
+    online: NDArray[np.bool_]
+    """Inverters that are connected and in a live island."""
+    set_points: NDArray[np.float64]
+    """n_inv x 3: P_set, V_set, Q_set (pu)."""
+    J: NDArray[np.complex128]
+    """Injections (A), n_inv x 3: in, those of the network solution; out, the new ones."""
+    J_0: NDArray[np.complex128]
+    """Injections (A) at the start of the step."""
+    V: NDArray[np.complex128]
+    """Terminal voltages (V), n_inv x 3, of the last network solution."""
+    I: NDArray[np.complex128]  # noqa: E741  # the paper's symbol
+    """Currents out of the inverters (A), n_inv x 3, of the last network solution."""
+
+
+@compiled
+def read_voltage(V: NDArray[np.complex128], reading: NDArray[np.float64]) -> None:
+    """Write the mean of the phases' voltages, the lowest and the highest (V) into an inverter's reading."""
+    a, b, c = abs(V[0]), abs(V[1]), abs(V[2])
+    reading[3], reading[4], reading[5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
+
+
+@compiled
+def read_terminal(
+    y_f: complex,
+    J: NDArray[np.complex128],
+    V: NDArray[np.complex128],
+    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    reading: NDArray[np.float64],
+) -> None:
+    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2)."""
+    S = 0.0j
+    for phase in range(3):
+        I[phase] = J[phase] - y_f * V[phase]
+        S += V[phase] * I[phase].conjugate()
+    reading[1], reading[2] = S.real, S.imag
+    read_voltage(V, reading)
+
+
+@compiled
+def read_offline(units: Any, readings: NDArray[np.float64]) -> None:
+    """Write the readings of the inverters that deliver nothing: `f_nom`, or 0 Hz where there is no voltage."""
+    for i in range(units.online.size):
+        if not units.online[i]:
+            read_voltage(units.V[i], readings[i])
+            readings[i, 0] = units.f_nom if readings[i, 3] > 0.0 else 0.0
+            readings[i, 1], readings[i, 2] = 0.0, 0.0
+
+
+@compiled
+def keep_start(units: Any) -> None:
+    """Keep the present states and injections as the start of a step."""
+    for k in range(units.gfm_at.size):
+        units.gfm_0[k] = units.gfm_state[k]
+    for k in range(units.gfl_at.size):
+        units.gfl_0[k] = units.gfl_state[k]
+    units.J_0[:] = units.J
+
+
+@compiled
+def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDArray[np.complex128]) -> None:
+    """Write the factor that turns phasors into each island's frame, by the present angle of its leader.
+
+    Parameters
+    ----------
+    units
+        `Units`.
+    net
+        A `plant.dynamics.reduced.Reduced`.
+    theta
+        Room for a number an inverter.
+    rotation
+        One factor an island, written here.
+    """
+    for k in range(units.gfm_at.size):
+        theta[units.gfm_at[k]] = units.gfm_state[k].theta
+    for island in range(net.leader.size):
+        rotation[island] = 1.0
+        if net.leader[island] >= 0:
+            rotation[island] = np.exp(-1j * (theta[net.leader[island]] - net.theta_lin[island]))
+
+
+@compiled
+def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.float64]) -> None:
+    """Take one pass of every inverter on the network.
+
+    Parameters
+    ----------
+    units
+        `Units`: V is read; states, J and I are advanced.
+    h
+        Step (s); 0: only slopes and outputs at the present states.
+    second
+        Whether this is the step's second pass.
+    readings
+        n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network solution.
+    """
+    set_points, J, V = units.set_points, units.J, units.V
+    for k in range(units.gfm_at.size):
+        i = units.gfm_at[k]
+        if not units.online[i]:
+            continue
+        former = units.gfm[k]
+        read_terminal(former.y_f, J[i], V[i], units.I[i], readings[i])
+        state = units.gfm_state[k]
+        advance_gfm(
+            former,
+            set_points[i, 0],
+            set_points[i, 1],
+            units.gfm_0[k],
+            state,
+            units.gfm_d[k],
+            readings[i, 1] / former.S_b,
+            readings[i, 2] / former.S_b,
+            readings[i, 3] / former.V_b,
+            h,
+            second,
+        )
+        J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
+        J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
+        readings[i, 0] = units.f_nom + state.w / (2.0 * np.pi)
+
+    for k in range(units.gfl_at.size):
+        i = units.gfl_at[k]
+        if not units.online[i]:
+            continue
+        follower = units.gfl[k]
+        read_terminal(follower.y_f, J[i], V[i], units.I[i], readings[i])
+        J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
+            follower,
+            set_points[i, 0],
+            set_points[i, 1],
+            set_points[i, 2],
+            units.gfl_0[k],
+            units.gfl_state[k],
+            units.gfl_d[k],
+            V[i, 0],
+            V[i, 1],
+            V[i, 2],
+            J[i, 0],
+            J[i, 1],
+            J[i, 2],
+            h,
+            second,
+        )
+        readings[i, 0] = units.gfl_state[k].f
