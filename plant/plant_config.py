@@ -223,9 +223,15 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Changes by inverter."""
 
 
+Simulator = Literal["gridpeers"]
+"""What simulates the plant."""
+
+
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All settings that determine the plant's numbers."""
 
+    simulator: Simulator = "gridpeers"
+    """What simulates the plant."""
     feeder: str = "microgrid123"
     """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
     load_set: str = "main"

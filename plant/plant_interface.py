@@ -1,4 +1,4 @@
-"""The interface of a plant to its node: `plant.feeder.Plant` has it, and so have the small plants of the tests."""
+"""The interface of a plant to its node: that of `plant.feeder.Plant`, and of the plants of other simulators."""
 
 from __future__ import annotations
 
@@ -59,6 +59,10 @@ class PlantLike(Protocol):
 
     def take_events(self) -> tuple[PlantEvent, ...]:
         """Take out the events since the last call."""
+        ...
+
+    def close(self) -> None:
+        """End what belongs to the plant outside of this process, after a good end and after a bad one."""
         ...
 
 

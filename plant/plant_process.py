@@ -26,10 +26,10 @@ at the very first start; the plant waits for agents."""
 
 
 def build(config: PlantConfig) -> LivePlant:
-    """Build the configuration's plant."""
-    from plant.build import build_plant  # numba and scipy take a second: import them only once the session is open
+    """Start the configuration's plant."""
+    from plant.build import start_plant  # numba and scipy take a second: import them only once the session is open
 
-    return build_plant(config)
+    return start_plant(config)
 
 
 def print_word(word: str) -> None:
@@ -73,6 +73,7 @@ def run_plant(
     wall = config.clock == "wall"
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
+    plant: LivePlant | None = None
     session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
     try:
         on_word(LISTENING)
@@ -103,6 +104,8 @@ def run_plant(
             serve(node, session, log)
     finally:
         session.close()
+        if plant is not None:
+            plant.close()
     if node.cause is not None:
         log.error("the plant broke", exc_info=node.cause)
     if node.rejects.counts:

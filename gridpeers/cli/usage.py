@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -21,8 +22,8 @@ ScenarioName = Annotated[
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 
 
-def load(name: str) -> tuple[ScenarioModel, Feeder]:
-    """Read and check a scenario and its feeder, or end with every problem in them."""
+def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[ScenarioModel, Feeder]:
+    """Read and check a scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
     from scenarios.schema import ScenarioError
 
@@ -31,6 +32,8 @@ def load(name: str) -> tuple[ScenarioModel, Feeder]:
 
     try:
         scenario = load_face(name)
+        if changes:
+            scenario = scenario.replace(changes)
         return scenario.spec, scenario.feeder
     except ScenarioError as error:
         refuse(error)

@@ -52,8 +52,8 @@ class Pace(TypedDict, total=False):
     strict: bool
 
 
-def check_how(driver: str, pace: Pace, *, dash: str = "") -> None:
-    """Check the options of a run; `dash` stands before their names: "--" on a command line.
+def check_how(driver: str, pace: Pace, simulator: str, *, dash: str = "") -> None:
+    """Check the options of a run on a plant; `dash` stands before their names: "--" on a command line.
 
     Raises
     ------
@@ -70,6 +70,8 @@ def check_how(driver: str, pace: Pace, *, dash: str = "") -> None:
         if speed != 1.0 or strict:
             name = "strict" if strict else "speed"
             wrong = f"{dash}{name}: simulated time has no pace to keep; use it with {dash}clock wall"
+    elif simulator != "gridpeers":
+        wrong = f'{dash}clock wall: the plant of "{simulator}" keeps no real time; use {dash}clock simulated'
     elif driver == "inprocess":
         wrong = f"{dash}clock wall: needs a process per agent; use {dash}driver processes"
     elif not (isinstance(speed, int | float) and low <= speed <= high):

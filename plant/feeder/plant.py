@@ -226,6 +226,9 @@ class Plant:
         events, self._events = tuple(self._events), []
         return events
 
+    def close(self) -> None:
+        """Do nothing: all of this plant is in this process."""
+
     def _time(self, step: int) -> float:
         """Return the time of a step (s)."""
         return time_of(step, self._h)

@@ -103,6 +103,10 @@ class GridlabdPlant:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End GridLAB-D's process."""
+        self.close()
+
+    def close(self) -> None:
+        """End GridLAB-D's process."""
         self._process.kill()
         self._process.communicate()
         self._folder.cleanup()

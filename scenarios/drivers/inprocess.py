@@ -188,16 +188,17 @@ def run_inprocess(
         events.extend(telemetry.events)
         on_telemetry(telemetry)
 
-    if plant is None:
-        from plant.build import build_plant  # numba and scipy: only for who runs a plant
-
-        plant = build_plant(plant_config)
-    side = LockstepPlant(
-        msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links)
-    )
     known = {config.name: config for config in agent_configs}
     laws: list[Law] = []
     with ExitStack() as stack:
+        if plant is None:
+            from plant.build import start_plant  # numba and scipy: only for who runs a plant
+
+            plant = start_plant(plant_config)
+            stack.callback(plant.close)
+        side = LockstepPlant(
+            msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links)
+        )
         stack.callback(close_laws, laws)
 
         def agent_of(config: AgentConfig, instance: str) -> LockstepAgent:

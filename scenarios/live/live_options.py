@@ -80,6 +80,10 @@ def configure(
     (None, ('inv10',), 'inv10')
     """
     _check(options)
+    if scenario.plant.simulator != "gridpeers":
+        raise UsageError(
+            f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use gridpeers run, or "gridpeers"'
+        )
     case = chosen_case(scenario, options.case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
     # links are emulated even without a fault: gridpeers link may set one during the run

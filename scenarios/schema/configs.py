@@ -58,6 +58,7 @@ def configs(
     plant = PlantConfig(
         run=run,
         settings=PlantSettings(
+            simulator=scenario.plant.simulator,
             feeder=scenario.plant.feeder,
             load_set=scenario.plant.load_set,
             h=time.h_s,

@@ -25,7 +25,7 @@ from scenarios.schema.checks import (
 )
 from scenarios.schema.configs import as_in
 from scenarios.schema.netem_tables import check_netem, with_delays
-from scenarios.schema.participants import check_agentless, check_schedule, inverters_of
+from scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
 from scenarios.schema.plugin_keys import check_benchmark, check_graphs, check_laws, check_measures, with_folders
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
@@ -180,6 +180,7 @@ def check_tables(
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), problems)
     check_graphs(scenario, feeder, problems)
     check_events(scenario, problems)
+    check_simulator(scenario, problems)
     check_netem(scenario, feeder, problems)
     if feeder:
         check_changes(scenario, feeder, problems)

@@ -70,6 +70,18 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
         present = (present - set(event.leave)) | set(event.join)
 
 
+def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
+    """Note joins and leaves under another simulator, whose inverters are on its network for the whole run."""
+    simulator = scenario.plant.simulator
+    for i, event in enumerate(scenario.events):
+        for key in ("leave", "join"):
+            if getattr(event, key) and simulator != "gridpeers":
+                problems.add(
+                    f"event[{i}].{key}",
+                    f'plant.simulator = "{simulator}" lets no inverter leave or join; use simulator = "gridpeers"',
+                )
+
+
 def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note names that there are not, and events and faults that ask for an agent that there is not."""
     names = tuple(row.name for row in inverters_of(scenario, feeder))

@@ -12,7 +12,7 @@ import msgspec
 
 from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
-from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from plant.plant_config import GflParameters, GfmParameters, Protection, Simulator, SyncCheck
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Divides, MultipleOf
 from wire.schema.table_schema import INHERITED, INLINE, Example, Label
@@ -77,6 +77,8 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[plant]`: the feeder, its loads, and where the inverters start."""
 
+    simulator: Simulator = "gridpeers"
+    """What simulates the plant."""
     feeder: str = "microgrid123"
     """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
     load_set: Annotated[str, Label("load set")] = "main"

@@ -93,7 +93,8 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     feeder = as_in(scenario, _feeder(scenario.plant.feeder, scenario.plant.load_set))
     plant, agents = configs(scenario, feeder, case)
     recorder = Recorder()
-    outcome = run_inprocess(plant, agents, recorder, plant=plant_at_start(plant), on_links=recorder)
+    ready = plant_at_start(plant) if plant.settings.simulator == "gridpeers" else None
+    outcome = run_inprocess(plant, agents, recorder, plant=ready, on_links=recorder)
     if outcome.broke:
         return SweepRow(number=number, status="broke", why=outcome.broke), None
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)

@@ -109,6 +109,9 @@ class ToyPlant:
         events, self._events = tuple(self._events), []
         return events
 
+    def close(self) -> None:
+        """Nothing of it is elsewhere."""
+
     @property
     def _t(self) -> float:
         return round(self._tick * self._config.T_c, 9)

@@ -37,6 +37,10 @@ def run(
     strict: Annotated[
         bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
     ] = False,
+    plant: Annotated[
+        Literal["gridpeers"] | None,
+        typer.Option(help="What simulates the plant; as the scenario says when left out."),
+    ] = None,
     case: Annotated[
         str | None, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")
     ] = None,
@@ -63,11 +67,11 @@ def run(
     from gridpeers.runs.choices import Pace, check_how
     from scenarios.schema import ScenarioError
 
-    spec, feeder = load(scenario)
+    spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
     spec = chosen(spec, case, seed)
     pace = Pace(clock=clock, speed=speed, strict=strict)
     try:
-        check_how(driver, pace, dash="--")
+        check_how(driver, pace, spec.plant.simulator, dash="--")
     except ScenarioError as error:
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
