@@ -16,6 +16,9 @@ LIMITS = "vminpu=0.01 vlowpu=0.005 vmaxpu=9"
 IDEAL = "r1=1e-8 r0=1e-8 x1=0 x0=0 c1=0 c0=0 length=1"
 """Impedance in place of a switch (ohm)."""
 
+IDEAL_SOURCE = "r1=0 r0=0 x1=1e-7 x0=1e-7"
+"""Impedance of a stiff source (ohm)."""
+
 
 def write_opendss(feeder: Feeder) -> str:
     """Return a script with the feeder's source, lines, switches, regulators, transformers, capacitors and loads."""
@@ -28,7 +31,7 @@ def _commands(feeder: Feeder) -> Iterator[str]:
     yield f"Clear\nSet DefaultBaseFrequency={feeder.f_nom!r}"
     yield (
         f"New Circuit.{feeder.name} bus1={source.bus} basekv={kV[source.bus]!r} pu={source.V_pu!r} "
-        f"angle={source.angle * 180.0 / pi!r} r1=0 r0=0 x1=1e-7 x0=1e-7"
+        f"angle={source.angle * 180.0 / pi!r} {IDEAL_SOURCE}"
     )
     for config in feeder.line_configs:
         for phases in sorted({line.phases for line in feeder.lines if line.config == config.name}):
