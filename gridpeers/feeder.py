@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,6 +10,7 @@ import msgspec
 
 from plant.equipment import Feeder as Tables
 from plant.equipment import InverterRow
+from plant.inverter_parameters import GflParameters, GfmParameters
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,6 +86,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         microgrid: str = "MG1",
         m_p: float = 0.01,
         m_q: float = 0.05,
+        params: str | Mapping[str, Any] | GfmParameters | GflParameters | None = None,
     ) -> Feeder:
         """Return the feeder with one inverter more.
 
@@ -102,12 +104,16 @@ class Feeder(Tables, frozen=True, kw_only=True):
             Microgrid it belongs to.
         m_p, m_q : float, optional
             Droops (pu frequency per pu power, pu voltage per pu reactive power).
+        params : str, Mapping, GfmParameters or GflParameters, optional
+            Its own parameters, which replace those of `[plant.gfm]` or `[plant.gfl]` of a scenario: the name of a set
+            that the feeder has, some by their keys there ({"T_p_s": 0.02}), or all.
 
         Raises
         ------
         ValueError
-            If the name or the bus is taken, or the bus is not there or lacks a phase.
+            If the name or the bus is taken, the bus is not there or lacks a phase, or a parameter is wrong.
         """
+        from plant.tables.parameter_sets import as_set
         from wire.schema.suggestion import suggestion
 
         found = {one.name: one for one in self.buses}.get(bus)
@@ -120,10 +126,19 @@ class Feeder(Tables, frozen=True, kw_only=True):
                 raise ValueError(
                     f'inverter "{row.name}" at bus {row.bus} is there already; names and buses must differ'
                 )
+        set_name, sets = as_set(name, kind, params, self.parameter_sets)
         row = InverterRow(
-            name=name, kind=kind, bus=bus, microgrid=microgrid, P_rated=P_rated, V_nom=found.V_nom, m_p=m_p, m_q=m_q
+            name=name,
+            kind=kind,
+            bus=bus,
+            microgrid=microgrid,
+            P_rated=P_rated,
+            V_nom=found.V_nom,
+            m_p=m_p,
+            m_q=m_q,
+            parameters=set_name,
         )
-        return msgspec.structs.replace(self, inverters=(*self.inverters, row))
+        return msgspec.structs.replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
 
     def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:
         """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg.

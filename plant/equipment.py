@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from typing import Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from plant.imported_equipment import LinearElement, LoadPart
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.own_parameters import InverterParameters, OwnParameters, given
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")
@@ -184,6 +187,10 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     """Q-V droop (pu voltage per pu reactive power)."""
     spare: bool = False
     """Whether it stays off until an agent joins for it."""
+    parameters: str = ""
+    """Name of its set of parameters (`Feeder.parameter_sets`); empty for none."""
+    own: OwnParameters = OwnParameters()
+    """Parameters that replace those of its set and of its kind: a scenario gives them."""
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):
@@ -215,6 +222,31 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """Notes of the import of such a feeder: commands that were not run, protection that was left out."""
     spares: tuple[InverterRow, ...] = ()
     """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""
+    parameter_sets: dict[str, OwnParameters] = {}
+    """Parameters that single inverters have instead of their kind's, by the name of the set."""
+
+    def parameters_of(self, row: InverterRow, gfm: GfmParameters, gfl: GflParameters) -> InverterParameters:
+        """Return the parameters of one inverter: its own, then those of its set, then its kind's.
+
+        Parameters
+        ----------
+        row
+            One of this feeder's inverters.
+        gfm, gfl
+            Parameters by kind, as the scenario has them.
+
+        Examples
+        --------
+        >>> from plant.tables import read_feeder
+        >>> feeder = read_feeder("microgrid123")
+        >>> feeder.parameters_of(feeder.inverters[0], GfmParameters(P_max=1.2), GflParameters()).P_max
+        1.2
+        """
+        of_set = self.parameter_sets.get(row.parameters, OwnParameters())
+        kind: InverterParameters = gfm if row.kind == "GFM" else gfl
+        own = given(of_set) | given(row.own)
+        # what its kind has not, the checks of feeder and scenario refuse; others of their checks come first
+        return replace(kind, **{name: value for name, value in own.items() if name in kind.__struct_fields__})
 
     def demands(self) -> Iterator[tuple[str, str, complex]]:
         """Yield the bus, the phases ("A", or "AB" between two) and the nominal power (VA) of each branch of a load."""

@@ -93,7 +93,7 @@ class Plant:
                     V_b=unit.V_nom,
                     m_p=unit.m_p,
                     m_q=unit.m_q,
-                    parameters=settings.gfm if unit.kind == "GFM" else settings.gfl,
+                    parameters=network.feeder.parameters_of(unit, settings.gfm, settings.gfl),
                     f_nom=network.feeder.f_nom,
                 )
                 for unit in network.inverters

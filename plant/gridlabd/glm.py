@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
-from plant.plant_config import GflParameters, GfmParameters
+from plant.own_parameters import InverterParameters
 
 from .glm_inverters import inverter_blocks
 from .glm_network import network_blocks
@@ -24,8 +24,7 @@ def write_glm(
     folder: Path,
     load_set: str,
     start: Mapping[str, complex],
-    gfm: GfmParameters,
-    gfl: GflParameters,
+    parameters: Mapping[str, InverterParameters],
     h: float,
     seconds: int,
 ) -> str:
@@ -39,8 +38,8 @@ def write_glm(
         Which load table.
     start
         Power (VA) that each inverter delivers at the start.
-    gfm, gfl
-        Parameters of the inverters.
+    parameters
+        Parameters of each inverter.
     h
         Step (s).
     seconds
@@ -59,7 +58,7 @@ def write_glm(
         (
             _header(h, seconds, table["buses"][0]["bus"]),
             *network_blocks(table, load_set, V_nom, leaders),
-            *inverter_blocks(inverters, start, gfm, gfl),
+            *inverter_blocks(inverters, start, parameters),
         )
     )
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import pi
 
-from plant.plant_config import GflParameters, GfmParameters
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.own_parameters import InverterParameters
 
 from .glm_network import F_NOM, TableRow, block
 
@@ -14,13 +15,13 @@ NO_LIMIT = 1e3
 
 
 def inverter_blocks(
-    rows: Iterable[TableRow], start: Mapping[str, complex], gfm: GfmParameters, gfl: GflParameters
+    rows: Iterable[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
 ) -> list[str]:
     """Return the objects of inverters, with the powers (VA) that they deliver at the start."""
     blocks = []
     for row in rows:
-        S = start[row["name"]]
-        unit = _gfm(row, gfm) if row["kind"] == "GFM" else _gfl(row, gfl)
+        S, own = start[row["name"]], parameters[row["name"]]
+        unit = _gfm(row, own) if isinstance(own, GfmParameters) else _gfl(row, own)
         blocks.append(
             block(
                 "inverter_dyn",

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from plant.feeder import Plant
 from plant.feeder.plant import Reading
+from plant.inverter_parameters import GflParameters
 from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 
@@ -62,6 +63,10 @@ class GridlabdPlant:
         self._h, self._steps, self._python = settings.h, round(T_c / settings.h), python
         self._network = ours.network
         self._units = {unit.name: unit for unit in ours.network.inverters}
+        self._parameters = {
+            unit.name: ours.network.feeder.parameters_of(unit, settings.gfm, settings.gfl)
+            for unit in ours.network.inverters
+        }
         self._closed = ours.network.closed0
         self._writes = self._scheduled(settings)
         self._folder = tempfile.TemporaryDirectory()
@@ -69,9 +74,7 @@ class GridlabdPlant:
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
         seconds = round(REST + end + 2.0)
         model.write_text(
-            write_glm(
-                FEEDERS / settings.feeder, settings.load_set, start, settings.gfm, settings.gfl, settings.h, seconds
-            ),
+            write_glm(FEEDERS / settings.feeder, settings.load_set, start, self._parameters, settings.h, seconds),
             encoding="utf-8",
         )
         with self._log.open("w") as log:
@@ -163,7 +166,9 @@ class GridlabdPlant:
             name = self._network.switch_name(event.switch)
             writes.setdefault(round(event.t / settings.h), []).append((name, "status", event.action))
         for limit in settings.limits:
-            P_max = limit.P_max / (self._units[limit.inverter].P_rated * settings.gfl.S_max)
+            parameters = self._parameters[limit.inverter]
+            assert isinstance(parameters, GflParameters), "the plant limits the power of a GFL alone"
+            P_max = limit.P_max / (self._units[limit.inverter].P_rated * parameters.S_max)
             writes.setdefault(round(limit.t / settings.h), []).append((limit.inverter, "Pref_max", P_max))
         return writes
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from plant.equipment import Feeder, InverterRow
+from plant.own_parameters import OwnParameters
 from plant.plant_config import FeederChanges
 
 
@@ -53,6 +54,8 @@ def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
         m_p=row.m_p * changes.m_p_factor if own is None or own.m_p is None else own.m_p,
         m_q=row.m_q * changes.m_q_factor if own is None or own.m_q is None else own.m_q,
         P_rated=row.P_rated if own is None or own.P_rated is None else own.P_rated,
+        parameters=row.parameters if own is None or own.parameters is None else own.parameters,
+        own=OwnParameters() if own is None else own.own,
     )
 
 

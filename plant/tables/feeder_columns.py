@@ -200,6 +200,19 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Q-V droop (pu voltage per pu reactive power)."""
     spare: Literal["", "yes"] = ""
     """"yes" if it stands by, switched off, until an agent comes for it."""
+    parameters: str = ""
+    """Name of its set of parameters in inverter_parameters.csv; empty: those of its kind."""
+
+
+class ParameterColumns(msgspec.Struct, frozen=True, kw_only=True):
+    """inverter_parameters.csv: parameters of single inverters, one a row; a set is all rows of its name."""
+
+    set: str
+    """Name of the set, which inverters.csv gives in `parameters`."""
+    key: str
+    """Which parameter, as in the tables [plant.gfm] and [plant.gfl] of a scenario: P_max_pu."""
+    value: str
+    """Its value."""
 
 
 class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
@@ -271,6 +284,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "transformers.csv": TransformerColumns,
     "capacitors.csv": CapacitorColumns,
     "inverters.csv": InverterColumns,
+    "inverter_parameters.csv": ParameterColumns,
     "source.csv": SourceColumns,
     "elements.csv": ElementColumns,
 }

@@ -11,6 +11,7 @@ from plant.tables.csv_table import required_columns
 from plant.tables.feeder_columns import TABLES, LoadColumns
 from plant.tables.imported import read_elements, read_load_parts
 from plant.tables.manifest import read_f_nom
+from plant.tables.parameter_sets import read_parameter_sets
 from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
 from wire.schema.suggestion import suggestion
 
@@ -101,7 +102,8 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     elements = read_elements(folder, buses, problems)
     load_parts = read_load_parts(folder, f"load_parts_{load_set}.csv", buses, problems)
     capacitors = read_capacitors(folder, buses, problems)
-    inverters = read_inverters(folder, buses, loads, problems)
+    parameter_sets = read_parameter_sets(folder, problems)
+    inverters = read_inverters(folder, buses, loads, parameter_sets, problems)
     source = read_source(folder, buses, problems)
     f_nom = read_f_nom(folder, problems)
     found = Feeder(
@@ -121,6 +123,7 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
         f_nom=f_nom,
         elements=elements,
         load_parts=load_parts,
+        parameter_sets=parameter_sets or {},
     )
     if not problems and found.buses:
         # After other problems this would only repeat them: a misnamed end leaves the right bus unconnected.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from math import radians
 from pathlib import Path
 from typing import Any
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
+from plant.own_parameters import OwnParameters, foreign
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import (
@@ -24,6 +26,7 @@ from plant.tables.feeder_columns import (
 from wire.keys import check_name
 from wire.messages import OFF, PLANT
 from wire.schema.plausible import Plausible
+from wire.schema.suggestion import suggestion
 
 TAKEN = {
     PLANT: "the plant sends under it",
@@ -100,9 +103,13 @@ def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
 
 
 def read_inverters(
-    folder: Path, buses: BusTable, loads: tuple[Load, ...], problems: list[str]
+    folder: Path,
+    buses: BusTable,
+    loads: tuple[Load, ...],
+    sets: Mapping[str, OwnParameters] | None,
+    problems: list[str],
 ) -> tuple[InverterRow, ...]:
-    """Read inverters.csv: nameplates and places. The column `spare` ("yes" or empty) may be missing.
+    """Read inverters.csv: nameplates, places, and the sets of parameters by name, None where they are unreadable.
 
     A rating is held against the feeder's loads: one that is more than `TIMES_THE_LOAD` of all is in another unit.
     """
@@ -115,6 +122,8 @@ def read_inverters(
             row.require("P_rated_kW", _rating(bus, total))
         if name:
             _require_name(row, name)
+        if it.parameters and sets is not None:
+            _require_set(row, sets)
         if name in inverters:
             row.problem(f'inverter "{name}": there is one of this name already; names must differ')
         if bus is None:
@@ -136,9 +145,19 @@ def read_inverters(
                 m_p=it.m_p_pu,
                 m_q=it.m_q_pu,
                 spare=it.spare == "yes",
+                parameters=it.parameters,
             ),
         )
     return tuple(inverters.values())
+
+
+def _require_set(row: CsvRow[InverterColumns], sets: Mapping[str, OwnParameters]) -> None:
+    """Note a problem if an inverter's set of parameters is not there, or has what its kind has not."""
+    name, kind = row.columns.parameters, row.columns.kind
+    if name not in sets:
+        row.problem(f'parameters "{name}": no such set; {suggestion(name, sets, "sets of inverter_parameters.csv")}')
+    elif wrong := foreign(sets[name], kind):
+        row.problem(f'parameters "{name}": a {kind} has no {", ".join(wrong)}; give it a set of its own')
 
 
 def _rating(bus: Bus, load: float) -> Plausible:

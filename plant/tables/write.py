@@ -11,14 +11,18 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder
+from plant.own_parameters import OwnParameters
 from plant.tables.feeder_columns import (
     BusColumns,
     ElementColumns,
     InverterColumns,
     LoadPartColumns,
+    ParameterColumns,
     SourceColumns,
     SwitchColumns,
 )
+from plant.tables.parameter_sets import FILE
+from wire.schema.table_schema import fields_of
 
 
 def write_feeder(feeder: Feeder, folder: Path) -> None:
@@ -91,10 +95,22 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
                 row.m_p,
                 row.m_q,
                 "yes" if row.spare else "",
+                row.parameters,
             )
             for row in (*feeder.inverters, *feeder.spares)
         ),
     )
+    if feeder.parameter_sets:
+        _write(
+            folder / FILE,
+            ParameterColumns,
+            (
+                (name, field.key, str(value).lower() if isinstance(value, bool) else value)
+                for name, own in feeder.parameter_sets.items()
+                for field in fields_of(OwnParameters)
+                if (value := getattr(own, field.name)) is not None
+            ),
+        )
     if feeder.source:
         source = feeder.source
         _write(folder / "source.csv", SourceColumns, [(source.bus, source.V_pu, degrees(source.angle))])

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from agents.agent_config import Control, Gains
 from agents.topology import adjacency
 from plant.equipment import F_NOM, Feeder, InverterRow
-from plant.plant_config import GflParameters, GfmParameters
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.own_parameters import InverterParameters
 from scenarios.results.history import Flags, Floats
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import inverters_of, without_agent
@@ -54,10 +55,8 @@ class InverterGroup:
     """Nominal frequency (Hz)."""
     T_c: float = 0.02
     """Control period (s)."""
-    gfm: GfmParameters = field(default_factory=GfmParameters)
-    """Of the plant's GFM."""
-    gfl: GflParameters = field(default_factory=GflParameters)
-    """Of the plant's GFL."""
+    parameters: tuple[InverterParameters, ...] = ()
+    """Of the plant's inverters; the defaults of their kind, if left out."""
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -65,6 +64,9 @@ class InverterGroup:
         for name, value in defaults.items():
             if not getattr(self, name).size:
                 object.__setattr__(self, name, np.full(n, value))
+        if not self.parameters:
+            kinds = tuple(GfmParameters() if forming else GflParameters() for forming in self.GFM.tolist())
+            object.__setattr__(self, "parameters", kinds)
         if self.A.shape != (n, n):
             raise ValueError(f"A must be {n} x {n}, one row per name, got {self.A.shape}")
 
@@ -72,6 +74,18 @@ class InverterGroup:
     def n(self) -> int:
         """Number N of inverters."""
         return len(self.names)
+
+    @property
+    def gfl(self) -> tuple[GflParameters, ...]:
+        """Parameters of its grid-following inverters, in their order."""
+        return tuple(it for it in self.parameters if isinstance(it, GflParameters))
+
+    @property
+    def T_p(self) -> float:
+        """Time constant (s) of what the GFM's filtered powers add up to: the mean of theirs by their weights."""
+        T_p = np.array([it.T_p for it in self.parameters if isinstance(it, GfmParameters)])
+        own = self.weight[self.GFM]
+        return float(T_p[0] if (T_p == T_p[0]).all() else T_p @ own / own.sum())
 
     @property
     def leads(self) -> Flags:
@@ -104,7 +118,13 @@ class InverterGroup:
         """Return some of the inverters, e.g. those of an island; the others are not heard."""
         at = np.flatnonzero(which)
         arrays = {name: getattr(self, name)[at] for name in ("GFM", "acts", "shares", "s", "m_p", "m_q")}
-        return replace(self, names=tuple(self.names[i] for i in at.tolist()), A=self.A[np.ix_(at, at)], **arrays)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in at.tolist()),
+            parameters=tuple(self.parameters[i] for i in at.tolist()),
+            A=self.A[np.ix_(at, at)],
+            **arrays,
+        )
 
 
 def inverter_group_of(
@@ -163,8 +183,7 @@ def inverter_group_of(
         gains=rule.gains,
         f_nom=feeder.f_nom,
         T_c=scenario.time.T_c_s,
-        gfm=scenario.plant.gfm,
-        gfl=scenario.plant.gfl,
+        parameters=tuple(feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in rows.values()),
     )
     return inverters if island is None else inverters.part(np.array([name in island for name in rows], bool))
 

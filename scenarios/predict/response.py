@@ -23,6 +23,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
+from plant.inverter_parameters import GfmParameters
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.results.history import Floats
 
@@ -75,7 +76,7 @@ def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response
 
 def _follows(inverters: InverterGroup) -> Floats:
     """Return 1 for an inverter whose power follows the frequency, 0 for a GFL without freq-watt."""
-    return np.where(inverters.GFM | inverters.gfl.frequency_watt, 1.0, 0.0)
+    return np.array([1.0 if isinstance(it, GfmParameters) or it.frequency_watt else 0.0 for it in inverters.parameters])
 
 
 def _quasi_steady(inverters: InverterGroup) -> Response:
@@ -99,7 +100,9 @@ def _lagged(inverters: InverterGroup) -> Response:
     n, w, gfl = inverters.n, inverters.weight, inverters.gfl
     forming, following = np.flatnonzero(inverters.GFM), np.flatnonzero(~inverters.GFM)
     w_F = float(w[forming].sum())
-    u, delta, zeta, phi, first = 0, 1, 2, 3, 4
+    locks = dict.fromkeys((it.k_pPLL, it.k_iPLL, it.T_ff) for it in gfl)  # GFL with equal ones see the same
+    phi_of = {lock: 3 + 3 * k for k, lock in enumerate(locks)}
+    u, first = 0, 1 + 3 * len(locks)
     size = first + following.size
     powers = first + np.arange(following.size)
 
@@ -108,15 +111,18 @@ def _lagged(inverters: InverterGroup) -> Response:
 
     A, B, E = np.zeros((size, size)), np.zeros((size, n)), np.zeros(size)
     A[u, u], A[u, powers], E[u] = -1.0, -w[following], 1.0
-    A[u], E[u] = A[u] / inverters.gfm.T_p, E[u] / inverters.gfm.T_p
-    A[delta], B[delta] = C, D
-    A[delta, delta] -= gfl.k_pPLL
-    A[delta, zeta] -= 1.0
-    A[zeta, delta] = gfl.k_iPLL
-    A[phi, [delta, zeta, phi]] = gfl.k_pPLL / gfl.T_ff, 1.0 / gfl.T_ff, -1.0 / gfl.T_ff
-    A[powers, phi] = -1.0 / gfl.T_pf if gfl.frequency_watt else 0.0
-    A[powers, powers] = -1.0 / gfl.T_pf
-    B[powers, following] = 1.0 / gfl.T_pf
+    A[u], E[u] = A[u] / inverters.T_p, E[u] / inverters.T_p
+    for (k_p, k_i, T_ff), phi in phi_of.items():
+        delta, zeta = phi - 2, phi - 1
+        A[delta], B[delta] = C, D
+        A[delta, delta] -= k_p
+        A[delta, zeta] -= 1.0
+        A[zeta, delta] = k_i
+        A[phi, [delta, zeta, phi]] = k_p / T_ff, 1.0 / T_ff, -1.0 / T_ff
+    for power, unit, it in zip(powers, following, gfl, strict=True):
+        A[power, phi_of[it.k_pPLL, it.k_iPLL, it.T_ff]] = -1.0 / it.T_pf if it.frequency_watt else 0.0
+        A[power, power] = -1.0 / it.T_pf
+        B[power, unit] = 1.0 / it.T_pf
 
     whole = np.zeros((size + n + 1, size + n + 1))
     whole[:size] = np.hstack([A, B, E[:, None]])

@@ -6,13 +6,16 @@ import math
 import re
 from collections.abc import Mapping
 
-from plant.equipment import Feeder
+from plant.equipment import Feeder, InverterRow
+from plant.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given
 from plant.trip_settings import DEFAULTS, defaults
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import InverterTable, ScenarioModel
 from wire.plugins.plugin import plugin_of
+from wire.schema.relations import contradictions
 from wire.schema.suggestion import suggestion
+from wire.schema.type_words import keys_of
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
@@ -56,13 +59,17 @@ def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
     if problems.touch("plant.gfm", "plant.gfl"):
         return
     P_known, V_known = (not problems.touch(f"plant.{key}") for key in ("P_set0_pu", "V_set0_pu"))
-    for kind, names in _LIMITS_OF_P.items():
-        table, parameters = f"plant.{kind.lower()}", getattr(plant, kind.lower())
-        units = [row for row in feeder.inverters if row.kind == kind]
-        for name in names:
-            key, limit, below = f"{table}.{name}_pu", getattr(parameters, name), name == "P_min"
+    alike: dict[tuple[str, InverterParameters], list[InverterRow]] = {}
+    for row in feeder.inverters:
+        alike.setdefault((row.kind, feeder.parameters_of(row, plant.gfm, plant.gfl)), []).append(row)
+    for (kind, parameters), units in sorted(alike.items(), key=lambda item: item[0][0], reverse=True):
+        table, common = f"plant.{kind.lower()}", getattr(plant, kind.lower())
+        names = ", ".join(row.name for row in units)
+        for name in _LIMITS_OF_P[kind]:
+            limit, below = getattr(parameters, name), name == "P_min"
+            key = f"{table}.{name}_pu" if limit == getattr(common, name) else f"{name}_pu of {names}"
             right = limit <= P if below else limit >= P
-            if right or not units or not P_known or problems.touch(key):
+            if right or not P_known or problems.touch(key):
                 continue
             kW = ", ".join(f"{row.name} {P * row.P_rated / 1e3:g} of {limit * row.P_rated / 1e3:g}" for row in units)
             problems.add(
@@ -73,9 +80,10 @@ def check_start(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> 
             break
         low, high = parameters.V_set_min, parameters.V_set_max
         if V_known and not low <= V <= high:
+            where = table if (low, high) == (common.V_set_min, common.V_set_max) else names
             problems.add(
                 "plant.V_set0_pu",
-                f"{V:g} pu is beyond {table}.V_set_min_pu = {low:g} to V_set_max_pu = {high:g}, which limit every "
+                f"{V:g} pu is beyond {where}.V_set_min_pu = {low:g} to V_set_max_pu = {high:g}, which limit every "
                 "later set-point; choose it within, or change them",
             )
 
@@ -129,13 +137,26 @@ def check_limits(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
 
 
 def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note inverters that there are not, and tables that change nothing."""
+    """Note inverters that there are not, tables that change nothing, and parameters that an inverter cannot have."""
     rows = {row.name: row for row in (*feeder.inverters, *feeder.spares)}
-    keys = InverterTable.__struct_fields__
     for name, table in scenario.plant.inverter.items():
         path = f"plant.inverter.{name}"
-        if not problems.unknown(path, "inverter", name, rows) and table == InverterTable() and not problems.below(path):
-            problems.add(path, f"changes nothing; give it one of {', '.join(keys)}")
+        if problems.unknown(path, "inverter", name, rows):
+            continue
+        kind, sets = rows[name].kind, feeder.parameter_sets
+        if table == InverterTable() and not problems.below(path):
+            problems.add(
+                path, f"changes nothing; give it one of {', '.join(keys_of(InverterTable))}, or a key of {kind}"
+            )
+        for key in foreign(table.own, kind):
+            problems.add(
+                f"{path}.{key}", f"a {kind} has no such parameter; {name} takes those of [plant.{kind.lower()}]"
+            )
+        if table.parameters and not problems.unknown(f"{path}.parameters", "parameter set", table.parameters, sets):
+            for key in foreign(sets[table.parameters], kind):
+                problems.add(f"{path}.parameters", f'set "{table.parameters}" has {key}, which a {kind} has not')
+    for row in rows.values():
+        _check_own(row, scenario, feeder, problems)
 
 
 def check_switches(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
@@ -197,6 +218,18 @@ def check_protection(scenario: ScenarioModel, f_nom: float, problems: Problems) 
             )
 
 
+def _check_own(row: InverterRow, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Note parameters of one inverter that contradict each other where its own meet those of its kind."""
+    plant, path = scenario.plant, f"plant.inverter.{row.name}"
+    own = row.parameters or given(row.own)
+    if not own or problems.touch("plant.gfm", "plant.gfl", path, f"{path}.parameters") or problems.below(path):
+        return
+    table = f"plant.{row.kind.lower()}"
+    for key, text in contradictions(PARAMETERS_OF[row.kind], feeder.parameters_of(row, plant.gfm, plant.gfl)):
+        if not problems.touch(f"{table}.{key}"):
+            problems.add(f"{path}.{key}", f"{text}; both together are those of [{table}], of its set and of its table")
+
+
 def _check_links(path: str, links: tuple[tuple[str, str], ...], inverters: tuple[str, ...], problems: Problems) -> None:
     seen: set[frozenset[str]] = set()
     for i, pair in enumerate(links):
@@ -224,7 +257,8 @@ def _check_limits(
     for name, kW in limits.items():
         if problems.unknown(path, "inverter", name, rows):
             continue
-        row, most = rows[name], rows[name].P_rated * scenario.plant.gfl.P_max / 1e3
+        row, plant = rows[name], scenario.plant
+        most = row.P_rated * feeder.parameters_of(row, plant.gfm, plant.gfl).P_max / 1e3
         if row.kind == "GFM":
             following = ", ".join(other.name for other in rows.values() if other.kind == "GFL")
             problems.add(

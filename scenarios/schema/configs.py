@@ -163,4 +163,6 @@ def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
 
 def _inverter_change(table: InverterTable) -> InverterChange:
     P_rated = None if table.P_rated_kW is None else 1e3 * table.P_rated_kW
-    return InverterChange(m_p=table.m_p_pu, m_q=table.m_q_pu, P_rated=P_rated)
+    return InverterChange(
+        m_p=table.m_p_pu, m_q=table.m_q_pu, P_rated=P_rated, parameters=table.parameters, own=table.own
+    )

@@ -168,7 +168,6 @@ def check_tables(
     if not scenario.name:
         scenario = msgspec.structs.replace(scenario, name=path.stem)
     check_times(scenario, problems)
-    check_step(scenario, problems)
     check_names(scenario, problems)
     scenario = with_folders(scenario, path.parent)
     check_benchmark(scenario, problems)
@@ -176,6 +175,7 @@ def check_tables(
     check_laws(scenario, problems)
     scenario = with_delays(_with_feeder_path(scenario, path.parent), path.parent, problems)
     feeder = _feeder_of(scenario, problems, read_feeder)
+    check_step(scenario, feeder, problems)
     check_protection(scenario, feeder.f_nom if feeder else F_NOM, problems)
     check_cases(scenario, tuple(row.name for row in inverters_of(scenario, feeder)) if feeder else (), problems)
     check_graphs(scenario, feeder, problems)

@@ -12,7 +12,9 @@ import msgspec
 
 from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
-from plant.plant_config import GflParameters, GfmParameters, Protection, Simulator, SyncCheck
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.own_parameters import OwnParameters
+from plant.plant_config import Protection, Simulator, SyncCheck
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Divides, MultipleOf
 from wire.schema.table_schema import INHERITED, INLINE, Example, Label
@@ -63,7 +65,8 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table `[plant.inverter.NAME]`: changes of one inverter of the feeder's table.
 
-    It is taken as it stands: the factors of `[plant]` do not act on it.
+    It is taken as it stands: the factors of `[plant]` do not act on it. Beside the keys below it takes those of the
+    inverter's kind, `[plant.gfm]` or `[plant.gfl]`: they replace what its set and the table of its kind say.
     """
 
     m_p_pu: Annotated[float | None, Unit("pu"), Plausible("a P-f droop", 0.001, 0.2)] = None
@@ -72,6 +75,11 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Q-V droop (pu voltage per pu reactive power)."""
     P_rated_kW: Annotated[float | None, Unit("kW"), Plausible("a rating", 0.1, 1e6)] = None
     """Rated power (kW), the base of its per-unit values."""
+    parameters: Annotated[str | None, Example('"fast"')] = None
+    """Name of a set of parameters of the feeder (inverter_parameters.csv), in place of what inverters.csv names; "" is
+    none."""
+    own: Annotated[OwnParameters, INLINE] = OwnParameters()
+    """Parameters of its kind, in its table."""
 
 
 class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

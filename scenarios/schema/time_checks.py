@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from plant.equipment import Feeder
+from plant.inverter_parameters import GfmParameters
+from plant.own_parameters import InverterParameters, given
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from wire.schema.relations import MultipleOf
@@ -44,13 +47,14 @@ def check_times(scenario: ScenarioModel, problems: Problems) -> None:
             )
 
 
-def check_step(scenario: ScenarioModel, problems: Problems) -> None:
+def check_step(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
     """Note an integration step that does not resolve every time constant of the inverters: the numbers would ring."""
     gfm, gfl = scenario.plant.gfm, scenario.plant.gfl
-    of = {("plant.gfm", name): getattr(gfm, name) for name in ("T_p", "T_q", "T_v")}
-    of |= {("plant.gfl", name): getattr(gfl, name) for name in ("T_ff", "T_pf", "T_vf", "T_qf")}
-    if gfl.model == "current_source":
-        of["plant.gfl", "T_if"] = gfl.T_if
+    of = _time_constants("plant.gfm", gfm) | _time_constants("plant.gfl", gfl)
+    if feeder:
+        for row in (*feeder.inverters, *feeder.spares):
+            if row.parameters or given(row.own):
+                of |= _time_constants(f"plant.inverter.{row.name}", feeder.parameters_of(row, gfm, gfl))
     (table, name), least = min(of.items(), key=lambda item: item[1])
     most, h = PART_OF_T * least, scenario.time.h_s
     if problems.touch("time.h_s", f"{table}.{name}_s") or h <= most * (1.0 + 1e-9):
@@ -60,6 +64,15 @@ def check_step(scenario: ScenarioModel, problems: Problems) -> None:
         f"{h:g} s is too long a step for {name}_s = {least:g} s of [{table}]: what it computes would ring; "
         f"at most {most:g} s, {PART_OF_T:g} of the shortest time constant",
     )
+
+
+def _time_constants(table: str, parameters: InverterParameters) -> dict[tuple[str, str], float]:
+    """Return the time constants (s) that an inverter's step must resolve, by table and name."""
+    if isinstance(parameters, GfmParameters):
+        names: tuple[str, ...] = ("T_p", "T_q", "T_v")
+    else:
+        names = ("T_ff", "T_pf", "T_vf", "T_qf", *(("T_if",) if parameters.model == "current_source" else ()))
+    return {(table, name): getattr(parameters, name) for name in names}
 
 
 def multiple(path: str, value: float, of: str, step: float, rule: str, problems: Problems) -> None:

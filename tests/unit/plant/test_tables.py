@@ -233,8 +233,8 @@ def test_misnamed_file_is_told(folder: Path) -> None:
 
     assert problems(folder) == (
         'inverter.csv: not a table of a feeder; did you mean "inverters.csv"? The tables are buses.csv, lines.csv, '
-        "line_configs.csv, switches.csv, regulators.csv, transformers.csv, capacitors.csv, inverters.csv, source.csv, "
-        "elements.csv",
+        "line_configs.csv, switches.csv, regulators.csv, transformers.csv, capacitors.csv, inverters.csv, "
+        "inverter_parameters.csv, source.csv, elements.csv",
     )
 
 

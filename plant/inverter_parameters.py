@@ -1,0 +1,132 @@
+"""Parameters of inverters by kind, `inverter-models.md` sections 3 and 4: meaning, unit, range, default."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import Below
+
+TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
+Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]
+Resistance = Annotated[float, Unit("pu"), Plausible("a filter resistance", 0.0, 1.0)]
+Reactance = Annotated[float, Unit("pu"), Plausible("a filter reactance", 0.001, 1.0, above_zero=True)]
+LimitOfP = Annotated[float, Unit("pu"), Plausible("a limit of P", -2.0, 3.0)]
+LimitOfQ = Annotated[float, Unit("pu"), Plausible("a limit of Q", -10.0, 10.0)]
+BoundOfPset = Annotated[float, Unit("pu"), Plausible("the bound of P_set", 0.1, 10.0, above_zero=True)]
+BoundOfVset = Annotated[float, Unit("pu"), Plausible("a bound of V_set", 0.1, 2.0, above_zero=True)]
+InternalVoltage = Annotated[float, Unit("pu"), Plausible("a limit of the internal voltage", 0.0, 2.0)]
+Capacity = Annotated[float, Unit("pu"), Plausible("a limit of apparent power or current", 0.1, 5.0, above_zero=True)]
+VoltageBand = Annotated[float, Unit("pu"), Plausible("a dead band", 0.0, 0.2)]
+FrequencyBand = Annotated[float, Unit("Hz"), Plausible("a dead band", 0.0, 5.0)]
+
+
+class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
+
+    R_f: Resistance = 0.015
+    """Filter resistance (pu)."""
+    X_f: Reactance = 0.15
+    """Filter reactance (pu)."""
+    T_p: TimeConstant = 0.01
+    """Filter of measured P (s)."""
+    T_q: TimeConstant = 0.01
+    """Filter of measured Q (s)."""
+    T_v: TimeConstant = 0.01
+    """Filter of measured V (s)."""
+    P_max: LimitOfP = 1.0
+    """Overload limit (pu)."""
+    P_min: Annotated[LimitOfP, Below("P_max")] = 0.0
+    """Under-load limit (pu)."""
+    k_pp: Annotated[Gain, Unit("rad/s per pu")] = 3.0
+    """Proportional gain of the P limiters (rad/s per pu)."""
+    k_ip: Annotated[Gain, Unit("rad/s^2 per pu")] = 60.0
+    """Integral gain of the P limiters (rad/s^2 per pu)."""
+    w_lim: Annotated[float, Unit("rad/s"), Plausible("the limiters' bound w_lim", 0.1, 1e4, above_zero=True)] = 200.0
+    """Bound of the P limiters' output (rad/s)."""
+    Q_max: LimitOfQ = 10.0
+    """Upper reactive limit (pu)."""
+    Q_min: Annotated[LimitOfQ, Below("Q_max")] = -10.0
+    """Lower reactive limit (pu)."""
+    k_pq: Annotated[Gain, Unit("pu V per pu")] = 3.0
+    """Proportional gain of the Q limiters (pu V per pu)."""
+    k_iq: Annotated[Gain, Unit("pu V per pu s")] = 20.0
+    """Integral gain of the Q limiters (pu V per pu s)."""
+    V_lim: Annotated[float, Unit("pu"), Plausible("the limiters' bound V_lim", 0.01, 10.0, above_zero=True)] = 10.0
+    """Bound of the Q limiters' output (pu V)."""
+    k_pv: Gain = 0.0
+    """Proportional gain of the voltage controller."""
+    k_iv: Annotated[Gain, Unit("1/s")] = 5.86
+    """Integral gain of the voltage controller (1/s)."""
+    E_min: Annotated[InternalVoltage, Below("E_max")] = 0.0
+    """Lower bound of the internal voltage (pu)."""
+    E_max: InternalVoltage = 1.25
+    """Upper bound of the internal voltage (pu)."""
+    P_set_lim: BoundOfPset = 3.0
+    """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
+    unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
+    """Lower bound of V_set (pu)."""
+    V_set_max: BoundOfVset = 1.2
+    """Upper bound of V_set (pu)."""
+
+
+class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Grid-following inverter, `inverter-models.md` section 4. Per unit of own rating."""
+
+    model: Literal["voltage_source", "current_source"] = "voltage_source"
+    """Representation towards the network (sections 4.6, 4.7)."""
+    R_f: Resistance = 0.01
+    """Filter resistance (pu)."""
+    X_f: Reactance = 0.15
+    """Filter reactance (pu)."""
+    k_pPLL: Annotated[Gain, Unit("rad/s per pu")] = 50.0
+    """PLL proportional gain (rad/s per pu)."""
+    k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu")] = 900.0
+    """PLL integral gain (rad/s^2 per pu)."""
+    k_pc: Annotated[Gain, Unit("pu", in_key=False)] = 0.05
+    """Current controller, proportional (pu)."""
+    k_ic: Annotated[Gain, Unit("1/s")] = 5.0
+    """Current controller, integral (1/s)."""
+    F_current: Annotated[float, Plausible("the cross-coupling gain F_current", 0.0, 1.0)] = 0.6
+    """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
+    T_if: TimeConstant = 0.005
+    """Current lag of the current-source form (s)."""
+    frequency_watt: bool = True
+    """Frequency-watt droop on."""
+    volt_var: bool = True
+    """Volt-var droop on."""
+    T_ff: TimeConstant = 0.02
+    """Filter of the PLL frequency (s)."""
+    T_pf: TimeConstant = 0.05
+    """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
+    T_vf: TimeConstant = 0.05
+    """Filter of measured V (s)."""
+    T_qf: TimeConstant = 0.1
+    """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with
+    four GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
+    db_UF: FrequencyBand = 0.0
+    """Dead band below nominal frequency (Hz)."""
+    db_OF: FrequencyBand = 0.0
+    """Dead band above nominal frequency (Hz)."""
+    db_UV: VoltageBand = 0.0
+    """Dead band below V_set (pu)."""
+    db_OV: VoltageBand = 0.0
+    """Dead band above V_set (pu)."""
+    P_max: LimitOfP = 1.0
+    """Upper bound of the P reference (pu)."""
+    P_min: Annotated[LimitOfP, Below("P_max")] = -1.0
+    """Lower bound of the P reference (pu)."""
+    S_max: Capacity = 1.2
+    """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
+    i_max: Capacity = 1.2
+    """Bound of each axis of the current reference (pu)."""
+    P_set_lim: BoundOfPset = 1.0
+    """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
+    set-point that was wound up delay the inverter's response."""
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
+    """Lower bound of V_set (pu)."""
+    V_set_max: BoundOfVset = 1.2
+    """Upper bound of V_set (pu)."""

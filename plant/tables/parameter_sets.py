@@ -1,0 +1,111 @@
+"""Parameters of single inverters: sets by name, in which each value is a row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from plant.own_parameters import InverterParameters, OwnParameters, foreign
+from plant.tables.csv_table import CsvTable
+from plant.tables.feeder_columns import ParameterColumns
+from wire.schema.relations import contradictions
+from wire.schema.suggestion import suggestion
+from wire.schema.table_reading import read_table
+from wire.schema.table_schema import fields_of
+
+FILE = "inverter_parameters.csv"
+"""Name of the file; a feeder without it has no such sets."""
+
+
+def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParameters] | None:
+    """Read inverter_parameters.csv, or return None if it is unreadable.
+
+    Which inverter has a set decides whether it can have its parameters: `plant.tables.shunts` asks.
+    """
+    values: dict[str, dict[str, float | bool | str]] = {}
+    table = CsvTable(folder, FILE, ParameterColumns, problems)
+    for row in table:
+        it = row.columns
+        before = values.setdefault(it.set, {})
+        if it.key in before:
+            row.problem(f'set "{it.set}" has {it.key} already; give each parameter once')
+            continue
+        value = value_of(it.value)
+        found = read_table(OwnParameters, {it.key: value})[1] if it.key else []
+        for path, text in found:
+            row.problem(f'set "{it.set}": {path}: {text}')
+        if it.key and not found:
+            before[it.key] = value
+    sets = {name: read_table(OwnParameters, own)[0] for name, own in values.items()}
+    for name, own in sets.items():
+        problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
+    return sets if table.readable else None
+
+
+def value_of(cell: str) -> float | bool | str:
+    """Return the value that a cell means: true, false, a number, or a text.
+
+    Examples
+    --------
+    >>> value_of("0.02"), value_of("true"), value_of("current_source")
+    (0.02, True, 'current_source')
+    """
+    if cell in ("true", "false"):
+        return cell == "true"
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+def as_set(
+    name: str,
+    kind: str,
+    params: str | Mapping[str, Any] | InverterParameters | None,
+    sets: Mapping[str, OwnParameters],
+) -> tuple[str, dict[str, OwnParameters]]:
+    """Return the name of the set that an inverter's parameters are, and all sets with it.
+
+    Parameters
+    ----------
+    name
+        Its name, which a new set takes.
+    kind
+        Its kind.
+    params
+        The name of a set, some parameters by their keys in a file, all of them, or none.
+    sets
+        The sets that there are.
+
+    Raises
+    ------
+    ValueError
+        With all that is wrong with them.
+
+    Examples
+    --------
+    >>> as_set("inv1", "GFM", {"P_max_pu": 1.2}, {})[0]
+    'inv1'
+    """
+    if not params:
+        return "", dict(sets)
+    found: list[str] = []
+    if isinstance(params, str):
+        if params not in sets:
+            raise ValueError(f'inverter "{name}": no parameter set "{params}"; {suggestion(params, sets, "sets")}')
+        own, label = sets[params], params
+    else:
+        if isinstance(params, Mapping):
+            values = dict(params)
+        else:
+            values = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
+        own, noted = read_table(OwnParameters, values)
+        found = [f"{path}: {text}" for path, text in noted]
+        label = next((known for known, other in sets.items() if other == own), name)
+    found += [f"{key}: a {kind} has no such parameter" for key in foreign(own, kind)]
+    if label in sets and sets[label] != own:
+        found.append(f'there is another set "{label}" already; name the inverter otherwise')
+    if found:
+        raise ValueError(f'inverter "{name}": ' + "; ".join(found))
+    return label, {**sets, label: own}
