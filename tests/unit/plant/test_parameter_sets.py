@@ -44,24 +44,36 @@ def scenario_of(tmp_path: Path, folder: Path, tables: str = "") -> Path:
 
 
 def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(tmp_path: Path) -> None:
-    """[plant.inverter.NAME] beats the feeder's set, which beats [plant.gfl], which beats the defaults; in the plant."""
+    """[plant.inverter.NAME] beats the feeder's set, which beats [plant.gfl], which beats the defaults."""
     folder = folder_of(tmp_path, inv2="slow", inv3="slow")
     tables = "\n[plant.inverter.inv2]\nk_pPLL = 30\n[plant.gfl]\nT_pf_s = 0.1\nT_qf_s = 0.15\n"
     scenario, feeder = load_scenario(scenario_of(tmp_path, folder, tables))
 
-    built = build_plant(configs(scenario, feeder, "I")[0])._dynamics.inverters.gfl
+    units = [feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in feeder.inverters]
+    gfl = [unit for unit in units if isinstance(unit, GflParameters)][:3]
 
-    assert built["k_pPLL"][:3].tolist() == [30.0, 40.0, 50.0]
-    assert built["T_pf"][:3].tolist() == [0.2, 0.2, 0.1]
-    assert built["T_qf"][:3].tolist() == [0.15, 0.15, 0.15]
-    assert built["volt_var"][:3].tolist() == [False, False, True]
+    assert [it.k_pPLL for it in gfl] == [30.0, 40.0, 50.0]
+    assert [it.T_pf for it in gfl] == [0.2, 0.2, 0.1]
+    assert [it.T_qf for it in gfl] == [0.15, 0.15, 0.15]
+    assert [it.volt_var for it in gfl] == [False, False, True]
+
+
+def test_the_plant_runs_each_inverter_with_its_own_parameters(tmp_path: Path) -> None:
+    """A bound of P_set that one inverter alone has holds for that one alone."""
+    folder = folder_of(tmp_path, "set,key,value\nweak,P_set_lim_pu,0.7\n", inv2="weak")
+    plant = build_plant(configs(*load_scenario(scenario_of(tmp_path, folder)), "I")[0])
+
+    for name in ("inv2", "inv3"):
+        plant.hold(name, 0.9 * 350e3, 2401.0)
+
+    assert [plant.measure()[name].P_set for name in ("inv2", "inv3")] == pytest.approx([0.7 * 350e3, 0.9 * 350e3])
 
 
 def test_a_scenario_may_give_an_inverter_another_set_or_none(tmp_path: Path) -> None:
     """Key `parameters` replaces what inverters.csv names, and "" takes it away."""
     folder = folder_of(tmp_path, inv2="slow", inv3="slow")
     tables = '\n[plant.inverter.inv2]\nparameters = ""\n[plant.inverter.inv5]\nparameters = "slow"\n'
-    scenario, feeder = load_scenario(scenario_of(tmp_path, folder, tables))
+    _, feeder = load_scenario(scenario_of(tmp_path, folder, tables))
 
     T_pf = [feeder.parameters_of(row, GfmParameters(), GflParameters()) for row in feeder.inverters]
 
