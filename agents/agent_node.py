@@ -50,6 +50,8 @@ class AgentNode(PlantFollower):
         """Why the agent could not continue, or take part at all; empty otherwise."""
         self.plant_seen = False
         """Whether the agent has ever seen the plant's token."""
+        self.session_broken = False
+        """Whether it closes only to begin again with a new session."""
         self._config, self._instance, self._links = config, instance, links
         self._agent = Agent(config, law)
         self.states = NeighbourStates()
@@ -78,6 +80,9 @@ class AgentNode(PlantFollower):
     def finished(self) -> bool:
         """Whether the driver should close."""
         return bool(self.stopped or self.failed)
+
+    def note_siblings(self, names: frozenset[str]) -> None:
+        """Note the agents of the same process, whose messages do not come from outside."""
 
     def work(self, now: float) -> bool:
         """Do nothing: an agent computes when a message permits it, or its tick is due."""

@@ -1,9 +1,10 @@
-"""An agent as a process: `LockstepAgent` or `RealtimeAgent` on a Zenoh session."""
+"""One agent or several as a process: `LockstepAgent` or `RealtimeAgent`, behind one Zenoh session."""
 
 from __future__ import annotations
 
 import logging
-from contextlib import closing
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from time import time_ns
 
 from msgspec.structs import replace
@@ -17,86 +18,128 @@ from wire.driver.drive import StoppedError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
 from wire.driver.session import Session
 from wire.keys import check_name
+from wire.node_group import NodeGroup
+
+AgentProcess = AgentConfig | tuple[AgentConfig, ...]
+"""Configuration of a process: one agent, or several."""
+
+AnyAgent = RealtimeAgent | LockstepAgent
 
 
-def run_agent(config: AgentConfig, make_links: MakeLinks = no_links) -> str:
+def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     """Take part in a run until it ends.
 
     Parameters
     ----------
-    config : AgentConfig
-        The agent's nameplate, the run's rule, and the rendezvous.
+    process : AgentConfig or tuple[AgentConfig, ...]
+        Each agent's nameplate, the run's rule, and the rendezvous. Agents of one process share a session; they are of
+        one run, under one kind of time.
     make_links : MakeLinks, optional
         Makes the emulated links, if there are any.
 
     Returns
     -------
     str
-        Why the agent could not continue; empty if the run ended with a `Stop`.
+        Why an agent could not continue; empty if the run ended with a `Stop`.
 
     Raises
     ------
     ConfigurationError, SessionError
-        If the configuration cannot work. In wall-clock time also if the plant refuses the agent, or there is none
+        If the configuration cannot work. In wall-clock time also if the plant refuses an agent, or there is none
         within the deadline.
     """
-    log = logging.getLogger(config.name)
+    configs = process if isinstance(process, tuple) else (process,)
+    _check(configs)
+    wall = configs[0].clock == "wall"
+    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
+        configs = tuple(replace(config, epoch=max(config.epoch, time_ns() // 1_000_000)) for config in configs)
+    with ExitStack() as laws:
+        nodes = _one_session_after_the_other(configs, make_links, laws)
+    failures = []
+    for config, node in zip(configs, nodes, strict=True):
+        log = logging.getLogger(config.name)
+        if node.rejects.counts:
+            log.warning("%s: dropped messages by kind: %s", config.name, dict(node.rejects.counts))
+        if not node.failed:
+            log.info("%s: %s", config.name, node.stopped)
+            continue
+        asks = "" if node.plant_seen else f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
+        failures.append(f"{node.failed}{asks}")
+    if failures and wall:
+        raise ConfigurationError("\n".join(failures))
+    return "\n".join(failures)
+
+
+def _check(configs: Sequence[AgentConfig]) -> None:
+    """Raise ConfigurationError unless these agents can share a process."""
+    if not configs:
+        raise ConfigurationError("the configuration names no agent")
     try:
-        check_name("run", config.run)
-        check_name("name", config.name)
+        for config in configs:
+            check_name("run", config.run)
+            check_name("name", config.name)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    wall = config.clock == "wall"
-    if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
-        config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
-    try:
-        law = make_law(config.control)
-    except ValueError as error:
-        raise ConfigurationError(f"{config.name}: {error}") from None
-    with closing(law):
-        node = _one_session_after_the_other(config, make_links, law, log)
-    if node.rejects.counts:
-        log.warning("%s: dropped messages by kind: %s", config.name, dict(node.rejects.counts))
-    if not node.failed:
-        log.info("%s: %s", config.name, node.stopped)
-        return ""
-    failed = node.failed
-    if not node.plant_seen:
-        failed += f"; is the plant of run {config.run} running at {', '.join(config.connect)}?"
-    if wall:
-        raise ConfigurationError(failed)
-    return failed
+    first = configs[0]
+    for config in configs[1:]:
+        for key in ("run", "clock", "listen", "connect"):
+            if getattr(config, key) != getattr(first, key):
+                raise ConfigurationError(
+                    f"{config.name}: {key} {getattr(config, key)!r} differs from that of {first.name}; "
+                    "agents of one process share it"
+                )
+    names = [config.name for config in configs]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise ConfigurationError(f"agents {', '.join(twice)} stand twice in the configuration")
 
 
 def _one_session_after_the_other(
-    config: AgentConfig, make_links: MakeLinks, law: Law, log: logging.Logger
-) -> RealtimeAgent | LockstepAgent:
+    configs: Sequence[AgentConfig], make_links: MakeLinks, laws: ExitStack
+) -> tuple[AnyAgent, ...]:
     """Take part with one session, and open a new one whenever the last was broken."""
-    node: RealtimeAgent | LockstepAgent | None = None
-    while node is None or (isinstance(node, RealtimeAgent) and node.session_broken):
-        session = Session(config.name, listen=config.listen, connect=config.connect, clock=config.clock)
+    first = configs[0]
+    made: list[Law] = []
+    for config in configs:
         try:
-            if node is None:
-                try:
-                    links = make_links(config.name, config.links)
-                    node = (RealtimeAgent if config.clock == "wall" else LockstepAgent)(config, session.id, links, law)
-                except ValueError as error:
-                    raise ConfigurationError(str(error)) from None
-            _take_part(node, session, log)
+            made.append(laws.enter_context(closing(make_law(config.control))))
+        except ValueError as error:
+            raise ConfigurationError(f"{config.name}: {error}") from None
+    nodes: tuple[AnyAgent, ...] = ()
+    core: AnyAgent | NodeGroup | None = None
+    while core is None or core.session_broken:
+        session = Session(first.name, listen=first.listen, connect=first.connect, clock=first.clock)
+        try:
+            if core is None:
+                nodes = tuple(
+                    _node(config, session.id, make_links, law) for config, law in zip(configs, made, strict=True)
+                )
+                core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
+            _take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()
-    return node
+    return nodes
 
 
-def _take_part(node: RealtimeAgent | LockstepAgent, session: Session, log: logging.Logger) -> None:
-    """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
-    session.answer(*node.nameplate)
-    for key in node.publications:
-        session.prepare(key)
+def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law) -> AnyAgent:
     try:
-        drive(node, session, log)
+        links = make_links(config.name, config.links)
+        return (RealtimeAgent if config.clock == "wall" else LockstepAgent)(config, instance, links, law)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+
+
+def _take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Session, log: logging.Logger) -> None:
+    """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
+    for node in nodes:
+        session.answer(*node.nameplate)
+        for key in node.publications:
+            session.prepare(key)
+    try:
+        drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
-        if isinstance(node, RealtimeAgent):
+        leaving = [node for node in nodes if isinstance(node, RealtimeAgent)]
+        for node in leaving:
             node.leave(f"asked to leave: {stop}")
-            serve(node, session, log)  # until the plant has acknowledged
+        if leaving:
+            serve(core, session, log)  # until the plant has acknowledged
         raise

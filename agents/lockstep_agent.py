@@ -104,6 +104,10 @@ class LockstepAgent(AgentNode):
         """End of the present wait (s on the driver's clock); None if it has none."""
         return self._barrier.deadline
 
+    def note_siblings(self, names: frozenset[str]) -> None:
+        """Note the agents of the same process."""
+        self._barrier.siblings = names
+
     def start(self, now: float) -> None:
         """Start to wait for the plant, which is built first."""
         self._barrier.renew(now)

@@ -186,8 +186,11 @@ class Scenario:
         case : str or list of str, optional
             Name of one case, which gives a `Result`; several names, or none for all, give `Results`.
         driver : {"inprocess", "processes"}
-            All in this process, or a plant process and a process per agent over Zenoh. In simulated time both give the
+            All in this process, or a plant process and processes of agents over Zenoh. In simulated time both give the
             same bytes.
+        processes : int
+            With the driver "processes": number of processes that the agents share; 0 gives each agent its own. An
+            agent that the scenario starts, stops, kills or pauses has its own in any case.
         clock : {"simulated", "wall"}
             Lock-step, or real time, which needs the driver "processes".
         speed : float

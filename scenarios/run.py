@@ -62,6 +62,8 @@ class Request(RunMetrics):
     """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""
 
     driver: Driver
+    processes: int = 0
+    """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
     self_check: bool = False
@@ -212,7 +214,9 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             else:
                 from scenarios.drivers.process_driver import run_processes
 
-                outcome = run_processes(plant, agents, request.folder / "log" / case, note, on_links=recorder)
+                outcome = run_processes(
+                    plant, agents, request.folder / "log" / case, note, on_links=recorder, shared=request.processes
+                )
             if outcome.broke:
                 raise BrokenRunError(f"case {case}: {outcome.broke}")
             return recorder.finish(time.end_s, time.record_s), outcome

@@ -16,10 +16,18 @@ class Fetch(NamedTuple):
     """Query a key; the answer arrives as a message on that key. A missing answer is no error."""
 
     key: str
+    reply_key: str = ""
+    """Key under which the answer arrives instead, to tell the answers of several queries apart."""
 
 
 class Listen(NamedTuple):
     """Subscribe to a key, before any later request."""
+
+    key: str
+
+
+class WithdrawToken(NamedTuple):
+    """Withdraw a liveliness token, whose node has finished."""
 
     key: str
 
@@ -30,4 +38,4 @@ class Log(NamedTuple):
     text: str
 
 
-Action = Publish | Fetch | Listen
+Action = Publish | Fetch | Listen | WithdrawToken

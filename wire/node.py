@@ -76,6 +76,21 @@ class Node:
         self._actions: list[Action | Log] = []
 
     @property
+    def name(self) -> str:
+        """Name under which it sends."""
+        return self._name
+
+    @property
+    def token(self) -> str:
+        """Key of the own liveliness token."""
+        raise NotImplementedError
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        """Keys of the own tokens: one."""
+        return (self.token,)
+
+    @property
     def finished(self) -> bool:
         """Whether the driver should close."""
         raise NotImplementedError

@@ -52,8 +52,6 @@ class RealtimeAgent(AgentNode):
         self.routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
         self._first_routes = dict(self.routes)
         self.phase: Phase = "seeking"
-        self.session_broken = False
-        """Whether it closes only to begin again with a new session."""
         self.statistics = AgentStatistics()
         """Its counts."""
         self._plant_epoch = 0

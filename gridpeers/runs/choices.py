@@ -45,11 +45,12 @@ def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option
 
 
 class Pace(TypedDict, total=False):
-    """Time keeping of a run: fields of a `Request`, options of the command, arguments of `gridpeers.Scenario.run`."""
+    """Time and processes of a run: fields of a `Request`, options of the command, arguments of `Scenario.run`."""
 
     clock: Clock
     speed: float
     strict: bool
+    processes: int
 
 
 def check_how(driver: str, pace: Pace, simulator: str, *, dash: str = "") -> None:
@@ -66,6 +67,13 @@ def check_how(driver: str, pace: Pace, simulator: str, *, dash: str = "") -> Non
             raise ScenarioError([f'{dash}{word}: there is no "{value}"; {suggestion(str(value), choices, "choices")}'])
     low, high = SPEEDS
     wrong = ""
+    processes = pace.get("processes", 0)
+    if not isinstance(processes, int) or processes < 0:
+        raise ScenarioError(
+            [f"{dash}processes: must be a number of processes from 1, or 0 for one an agent, got {processes!r}"]
+        )
+    if processes and driver == "inprocess":
+        raise ScenarioError([f"{dash}processes: needs {dash}driver processes; in one process all agents share it"])
     if clock == "simulated":
         if speed != 1.0 or strict:
             name = "strict" if strict else "speed"

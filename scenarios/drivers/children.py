@@ -35,7 +35,7 @@ class Child:
         Name of the inverter, or "plant".
     command : list[str]
         What to run, without the interpreter.
-    config : msgspec.Struct
+    config : msgspec.Struct or tuple of these
         Configuration, sent as one line of JSON.
     log : Path
         File for what it prints.
@@ -51,7 +51,7 @@ class Child:
         self,
         name: str,
         command: list[str],
-        config: msgspec.Struct,
+        config: msgspec.Struct | tuple[msgspec.Struct, ...],
         log: Path,
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,

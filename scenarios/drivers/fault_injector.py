@@ -62,6 +62,11 @@ class FaultInjector:
         """Agents that a fault has killed."""
         self._paused: set[str] = set()
 
+    @property
+    def names(self) -> set[str]:
+        """Agents that a fault concerns."""
+        return {fault.name for fault in self._due}
+
     def note_time(self, t: float, at: float) -> None:
         """Note that the run had reached t (s) at a time of `monotonic` (s).
 

@@ -1,4 +1,4 @@
-"""Driver with processes: run the plant and one process per agent, take their telemetry, and end them in every case.
+"""Driver with processes: run the plant and its agents, take their telemetry, and end them in every case.
 
 The driver decides nothing about the run. It takes the plant's telemetry as any other peer could, and notices deaths.
 """
@@ -48,8 +48,9 @@ def run_processes(
     on_start: Callable[[Children], None] | None = None,
     on_links: Callable[[LinkReport], None] = lambda report: None,
     plant_command: Sequence[str] = (),
+    shared: int = 0,
 ) -> Outcome:
-    """Run a scenario with a plant process and one process per agent, in simulated or in wall-clock time.
+    """Run a scenario with a plant process and processes of agents, in simulated or in wall-clock time.
 
     In wall-clock time the plant ends the run after end / speed, the death of an agent is only an event, and the
     scenario's kills and pauses are real signals. An agent that joins, or joins again, is started when the plant awaits
@@ -75,6 +76,8 @@ def run_processes(
         Called with every report of emulated links.
     plant_command : Sequence[str], optional
         Arguments of the interpreter for another plant than the usual one; tests have smaller ones.
+    shared : int, optional
+        Number of processes that agents share; 0 gives each agent its own.
 
     Returns
     -------
@@ -99,7 +102,9 @@ def run_processes(
     log_dir.mkdir(parents=True, exist_ok=True)
     driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_status)
     try:
-        with Supervisor(plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command) as supervisor:
+        with Supervisor(
+            plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command, shared=shared
+        ) as supervisor:
             supervisor.start(*order)
             if on_start is not None:
                 on_start(supervisor.children)

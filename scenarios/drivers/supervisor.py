@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
@@ -36,6 +37,9 @@ class Supervisor:
         Arguments of the interpreter for another plant than the usual one.
     prefixes : Mapping[str, Sequence[str]], optional
         By agent, what stands before its command, e.g. to run it on another host.
+    shared : int, optional
+        Number of processes that agents share; 0 gives each agent its own. An agent that the scenario starts, stops,
+        kills or pauses has its own in any case.
     """
 
     def __init__(
@@ -47,12 +51,16 @@ class Supervisor:
         on_word: Callable[[str], None] | None = None,
         plant_command: Sequence[str] = (),
         prefixes: Mapping[str, Sequence[str]] = MappingProxyType({}),
+        shared: int = 0,
     ) -> None:
         self.children = Children()
         self._plant, self._agents, self._log_dir = plant, {config.name: config for config in agents}, log_dir
         self._on_exit, self._on_word, self._plant_command, self._prefixes = on_exit, on_word, plant_command, prefixes
         self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
         self._awaited: set[str] = set()
+        alone = self._faults.names | {action.inverter for action in plant.schedule} | set(prefixes)
+        self._shared = share(tuple(name for name in self._agents if name not in alone), shared)
+        """Agents that share the process of each."""
 
     def __enter__(self) -> Supervisor:
         return self
@@ -66,8 +74,14 @@ class Supervisor:
             self.children.end()
 
     def start(self, *names: str) -> None:
-        """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life."""
+        """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life.
+
+        Agents that share a process start with the first of them.
+        """
         for name in names:
+            mates = self._shared.get(name, (name,))
+            if name != mates[0]:
+                continue
             life = len(self.children.lives(name)) + 1
             log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
             if name == PLANT:
@@ -75,10 +89,11 @@ class Supervisor:
                 command = list(self._plant_command or usual)
                 self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
                 continue
-            config = replace(self._agents[name], epoch=life)
-            command = ["-m", "scenarios.emulation.emulated_agent" if config.links else "agents"]
+            configs = tuple(replace(self._agents[mate], epoch=life) for mate in mates)
+            command = ["-m", "scenarios.emulation.emulated_agent" if configs[0].links else "agents"]
             prefix = self._prefixes.get(name, ())
-            self.children.add(Child(name, command, config, log, self._on_exit, prefix=prefix))
+            process = configs if len(configs) > 1 else configs[0]
+            self.children.add(Child(name, command, process, log, self._on_exit, prefix=prefix))
 
     def start_when_gone(self, names: Iterable[str]) -> None:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""
@@ -108,3 +123,19 @@ class Supervisor:
     def failed(self, child: Child) -> bool:
         """Whether a process has ended, or still runs, though neither the scenario nor a request explains it."""
         return child.status != 0 and child.name not in self._faults.killed
+
+
+def share(names: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:
+    """Return the agents that share a process with each, itself included; neighbours in the order stay together.
+
+    Examples
+    --------
+    >>> share(("inv1", "inv2", "inv3"), 2)["inv2"]
+    ('inv1', 'inv2')
+    >>> share(("inv1", "inv2", "inv3"), 0)["inv2"]
+    ('inv2',)
+    """
+    count = min(processes or len(names), len(names))
+    bounds = [len(names) * k // count for k in range(count + 1)] if count else [0]
+    blocks = [tuple(names[a:b]) for a, b in pairwise(bounds)]
+    return {name: block for block in blocks for name in block}

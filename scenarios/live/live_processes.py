@@ -15,7 +15,7 @@ from typing import NoReturn
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
-from agents.agent_process import run_agent
+from agents.agent_process import run_agents
 from plant.plant_config import PlantConfig
 from plant.plant_process import COMPILING, READY, run_plant
 from plant.realtime.pacer import sentence
@@ -162,16 +162,16 @@ def all_here(
 
 
 def agent_here(
-    where: RunAddress, name: str, listen: tuple[str, ...] | None, wait: float, *, trusts: bool = False
+    where: RunAddress, names: tuple[str, ...], listen: tuple[str, ...] | None, wait: float, *, trusts: bool = False
 ) -> ProcessOutcome:
-    """Run an agent in this process, with the configuration that the plant hands out, until it leaves.
+    """Run agents in this process, with the configurations that the plant hands out, until they leave.
 
     Parameters
     ----------
     where : RunAddress
         The run, and where to look for it.
-    name : str
-        Name of its inverter.
+    names : tuple[str, ...]
+        Names of their inverters; several agents share a session.
     listen : tuple[str, ...] or None
         Where other agents can connect; None is for any free port, of all addresses if others can reach the plant.
     wait : float
@@ -188,19 +188,23 @@ def agent_here(
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
-    say(f"{name}: seeks the plant of {where}, for up to {wait:g} s")
+    who = ", ".join(names)
+    say(f"{who}: seeks the plant of {where}, for up to {wait:g} s")
     try:
         with RunClient(where) as client:
-            client.find_plant(wait, lambda line: say(f"{name}: {line}"))
-            config = configuration(client, name)
-            check_free(client, name)
-        if not (trusts or is_loopback(where.connect)) and (named := own_code(config)):
+            client.find_plant(wait, lambda line: say(f"{who}: {line}"))
+            configs = [configuration(client, name) for name in dict.fromkeys(names)]
+            for name in names:
+                check_free(client, name)
+        named = list(dict.fromkeys(code for config in configs for code in own_code(config)))
+        if named and not (trusts or is_loopback(where.connect)):
             raise UsageError(
-                f"{name}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
+                f"{who}: the plant of {where} has its agents run {' and '.join(named)}, which is code of whoever runs "
                 "the plant; if you trust it, say --own-code"
             )
-        listen = listen or return_path((*where.connect, *config.connect))
-        return ProcessOutcome(broke=run_agent(replace(config, connect=where.connect, listen=listen), links_of))
+        listen = listen or return_path((*where.connect, *configs[0].connect))
+        process = tuple(replace(config, connect=where.connect, listen=listen) for config in configs)
+        return ProcessOutcome(broke=run_agents(process, links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
         return ProcessOutcome(interrupted=_signal_of(stop))
 

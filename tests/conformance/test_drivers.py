@@ -70,6 +70,20 @@ def test_every_graph_gives_the_same_rows(driver: Driver, graph: GraphRule) -> No
     assert first_difference(in_one_process(plant, agents).rows, driver(plant, agents).rows) == ""
 
 
+@pytest.mark.parametrize("graph", ["full", "ring"])
+@pytest.mark.parametrize("processes", [1, 2, 4])
+def test_agents_that_share_processes_give_the_same_rows(processes: int, graph: GraphRule, tmp_path: Path) -> None:
+    """How agents are spread over processes decides nothing."""
+    plant, agents = toy_configs(6, Control(secondary="all", graph=graph))
+    run = ProcessRun(plant, agents, tmp_path)
+
+    outcome = run(shared=processes)
+
+    assert (outcome.broke, outcome.notes) == ("", ())
+    assert len(run.pids) == 1 + processes
+    assert first_difference(in_one_process(plant, agents).rows, run.rows) == ""
+
+
 def test_listed_links_give_the_same_rows(driver: Driver) -> None:
     """An agent without any link takes part all the same."""
     control = Control(secondary="all", graph="links", links=(("inv1", "inv2"), ("inv2", "inv3")))

@@ -7,20 +7,30 @@ from collections.abc import Sequence
 from time import monotonic
 from typing import Protocol
 
-from wire.actions import Action, Fetch, Listen, Log, Publish
-from wire.codec import RejectedMessages
+from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from wire.driver.log_limit import limit_log
 from wire.driver.session import Session
+
+
+class RejectLines(Protocol):
+    """The log lines of rejected messages, as `wire.codec.RejectedMessages` has them."""
+
+    @property
+    def has_lines(self) -> bool: ...  # noqa: D102
+    def take_lines(self) -> tuple[str, ...]: ...  # noqa: D102
 
 
 class Core(Protocol):
     """The part of a node (`wire.node`) that the driver uses."""
 
-    rejects: RejectedMessages
+    @property
+    def rejects(self) -> RejectLines:
+        """Rejected messages."""
+        ...
 
     @property
-    def token(self) -> str:
-        """Key of the own token."""
+    def tokens(self) -> tuple[str, ...]:
+        """Keys of the own tokens."""
         ...
 
     @property
@@ -90,9 +100,11 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
         if isinstance(action, Publish):
             session.publish(action.key, action.payload)
         elif isinstance(action, Fetch):
-            session.fetch(action.key)
+            session.fetch(action.key, action.reply_key)
         elif isinstance(action, Listen):
             session.subscribe(action.key)
+        elif isinstance(action, WithdrawToken):
+            session.withdraw_token(action.key)
         else:
             log.info("%s", action.text)
 
@@ -107,7 +119,8 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
-    session.hold_token(core.token)
+    for token in core.tokens:
+        session.hold_token(token)
     serve(core, session, log)
 
 

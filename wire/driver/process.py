@@ -12,8 +12,8 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from types import FrameType
-from typing import Any, TypeVar
+from types import FrameType, UnionType
+from typing import Any, TypeVar, get_args
 
 import msgspec
 
@@ -60,7 +60,7 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
         raise ConfigurationError(f"{name}: the configuration has emulated links; start it with scenarios.emulation")
 
 
-def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:
+def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
     """Read the configuration and run.
 
     Parameters
@@ -70,7 +70,7 @@ def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) 
     what : str
         Description of the process, for the usage message.
     config_type : type
-        Type of the configuration.
+        Type of the configuration; of a union, the usage message names the first.
     run : Callable[[C], str]
         Runs, and returns why the run broke, or an empty text.
 
@@ -84,11 +84,12 @@ def main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) 
     return status
 
 
-def _main(module: str, what: str, config_type: type[C], run: Callable[[C], str]) -> int:
+def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
     watch_readers(quits=False)
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
-        config_name = f"{config_type.__module__}.{config_type.__name__}"
+        named = get_args(config_type)[0] if isinstance(config_type, UnionType) else config_type
+        config_name = f"{named.__module__}.{named.__name__}"
         sys.stderr.write(_USAGE.format(module=module, what=what, leash=LEASH, config=config_name))
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")

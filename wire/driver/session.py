@@ -132,6 +132,7 @@ class Session:
         self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
         config = _config(listen, connect, gossip, meets_all, profile)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
@@ -201,8 +202,8 @@ class Session:
         handler = self._direct(on_query)
         self._declared.append(self._session.declare_queryable(key, handler, complete=True))
 
-    def fetch(self, key: str) -> None:
-        """Query a key; an answer enters the inbox like a message.
+    def fetch(self, key: str, reply_key: str = "") -> None:
+        """Query a key; an answer enters the inbox like a message on that key, or on `reply_key`.
 
         The query goes to all queryables of the key, because one may be the stale end of a lost link.
         """
@@ -210,7 +211,7 @@ class Session:
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                enqueue(("message", key, reply.ok.payload.to_bytes()))
+                enqueue(("message", reply_key or key, reply.ok.payload.to_bytes()))
 
         consolidation, target = self._zenoh.ConsolidationMode.NONE, self._zenoh.QueryTarget.ALL
         handler = self._direct(on_reply)
@@ -228,8 +229,12 @@ class Session:
         self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))
 
     def hold_token(self, key: str) -> None:
-        """Declare a liveliness token, until the session or the process ends."""
-        self._declared.append(self._session.liveliness().declare_token(key))
+        """Declare a liveliness token, until it is withdrawn, or the session or the process ends."""
+        self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    def withdraw_token(self, key: str) -> None:
+        """Undeclare a liveliness token."""
+        self._tokens.pop(key).undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def publish(self, key: str, payload: bytes) -> None:
         """Publish bytes on a key; block rather than drop, except in wall-clock time for keys of `LATEST_ONLY`."""

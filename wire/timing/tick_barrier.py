@@ -40,6 +40,10 @@ class TickBarrier:
         self._name, self._timeout = name, timeout
         self._awaited: dict[str, str] = {}
         """Missing message of each sender."""
+        self.siblings: frozenset[str] = frozenset()
+        """Senders in the same process, whose messages do not come from outside."""
+        self._from_outside = 0
+        """Number of missing messages of the others."""
         self._last: dict[str, tuple[int, float]] = {}
         """Number and time (s) of each sender's last message."""
         self.deadline: float | None = None
@@ -52,12 +56,13 @@ class TickBarrier:
 
     @property
     def messages_needed(self) -> int:
-        """Number of missing messages; at least one."""
-        return max(1, len(self._awaited))
+        """Number of missing messages from outside; at least one."""
+        return max(1, self._from_outside)
 
     def wait_for(self, awaited: Mapping[str, str], now: float) -> None:
         """Start a new wait for a message of each of these senders."""
         self._awaited = dict(awaited)
+        self._from_outside = len(self._awaited.keys() - self.siblings)
         self.renew(now)
 
     def awaits(self, name: str) -> bool:
@@ -66,7 +71,8 @@ class TickBarrier:
 
     def came(self, name: str) -> None:
         """Note that a sender has sent its message, or never will."""
-        self._awaited.pop(name, None)
+        if self._awaited.pop(name, None) is not None and name not in self.siblings:
+            self._from_outside -= 1
 
     def missing_messages(self) -> tuple[Awaited, ...]:
         """Return the missing messages with their senders."""

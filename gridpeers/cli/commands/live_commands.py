@@ -141,8 +141,8 @@ def up(**options: Any) -> None:
 
 
 def agent(
-    inverter: Annotated[
-        str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2; spare ones too.")
+    inverters: Annotated[
+        list[str], typer.Argument(metavar="INVERTER", help="Names of their inverters, e.g. inv2; spare ones too.")
     ],
     run: Run = RUN,
     connect: Connect = None,
@@ -156,7 +156,7 @@ def agent(
         typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
     ] = False,
 ) -> None:
-    """Run the agent of one inverter in this terminal. Ctrl-C leaves properly: the inverter is switched off.
+    """Run the agent of an inverter, or of several, in this terminal. Ctrl-C leaves properly: they are switched off.
 
     Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
 
@@ -169,11 +169,12 @@ def agent(
         from scenarios.live.run_address import address_of, check_endpoint, check_name, check_wait
 
         where = address_of(run, connect)
-        check_name("INVERTER", inverter)
+        for inverter in inverters:
+            check_name("INVERTER", inverter)
         check_wait(wait)
         watch_readers(quits=False)
         listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())
-        _finish(agent_here(where, inverter, listening or None, wait, trusts=own_code))
+        _finish(agent_here(where, tuple(inverters), listening or None, wait, trusts=own_code))
 
 
 def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:

@@ -41,6 +41,9 @@ def run(
         Literal["gridpeers"] | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
+    processes: Annotated[
+        int, typer.Option(metavar="N", help="Processes that the agents share; one an agent when left out.")
+    ] = 0,
     case: Annotated[
         str | None, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")
     ] = None,
@@ -69,7 +72,7 @@ def run(
 
     spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
     spec = chosen(spec, case, seed)
-    pace = Pace(clock=clock, speed=speed, strict=strict)
+    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
     try:
         check_how(driver, pace, spec.plant.simulator, dash="--")
     except ScenarioError as error:

@@ -57,6 +57,19 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
     assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
 
 
+def test_agents_of_a_killed_process_die_together(tmp_path: Path) -> None:
+    """Kill -9 of a process that two agents share: the plant goes on with the others, and names both."""
+    run = ProcessRun(*toy_configs(4, end=3.0), tmp_path)
+    run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
+    outcome = run(shared=2)
+    deaths = [event for event in outcome.events if event.kind == "roster"]
+
+    assert outcome.broke == ""
+    assert sorted(event.subject for event in deaths) == ["inv3", "inv4"]
+    assert run.rows[-1][0] == 3.0
+    assert len(outcome.notes) == 1
+
+
 def test_a_plant_killed_in_mid_run_ends_it(tmp_path: Path) -> None:
     """Kill -9: the run ends by itself within seconds, and says who died, when, and where its log lies."""
     run, killed = ProcessRun(*toy_configs(4, end=LONG), tmp_path), []

@@ -107,6 +107,24 @@ def test_who_is_asked_to_leave_leaves_properly(tmp_path: Path) -> None:
         assert not any("died" in event.text for event in town.events)
 
 
+def test_agents_of_one_process_live_and_leave_as_others_do(tmp_path: Path) -> None:
+    """Two agents behind one session tick, are asked to leave one by one, and leave together on SIGTERM."""
+    with Town(4, tmp_path) as town:
+        town.start("plant", "inv1", "inv4")
+        pair = town.add("pair", ["-m", "agents"], (town.agent_configs["inv2"], town.agent_configs["inv3"]))
+        town.together(FOUR)
+        settled(town)
+        town.command("stop", "inv2")
+        town.until_event("inv2", "inv2 disconnected").together(("inv1", "inv3", "inv4"))
+        town.until(lambda: not any("/inv2/" in key for key in town.tokens), "its token is gone")
+
+        assert pair.status is None
+        town.signal("pair", signal.SIGTERM)
+        assert town.until_ended("pair") == 0
+        town.until_event("inv3", "inv3 disconnected").together(("inv1", "inv4"))
+        assert not any("died" in event.text for event in town.events)
+
+
 def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(tmp_path: Path) -> None:
     """SIGSTOP: agents hold; SIGCONT: it does not rush through what it missed, and says how much it was.
 

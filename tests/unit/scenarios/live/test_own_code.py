@@ -48,12 +48,14 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     )
     monkeypatch.setattr(live_processes, "configuration", lambda client, name: CONFIG)
     monkeypatch.setattr(live_processes, "check_free", lambda client, name: None)
-    monkeypatch.setattr(live_processes, "run_agent", lambda config, links: ran.append(config.name) or "")
+    monkeypatch.setattr(
+        live_processes, "run_agents", lambda process, links: ran.extend(config.name for config in process) or ""
+    )
     monkeypatch.setattr(live_processes.signal, "signal", lambda *_: None)
 
     if runs:
-        live_processes.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+        live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
     else:
         with pytest.raises(UsageError, match=r"inv1: the plant of run demo .* run the law mine:Mine and .*--own-code"):
-            live_processes.agent_here(where, "inv1", None, 1.0, trusts=trusts)
+            live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
     assert ran == (["inv1"] if runs else [])

@@ -1,0 +1,267 @@
+"""Several nodes in one process, behind one session. Pure.
+
+A group looks like one node to its driver. Messages between its nodes stay inside; a message from outside arrives once
+and goes to every node with a route for it. The nodes hold one token each, so the others see as many agents.
+
+**Queries.** A node queries a process for its nameplate after it has subscribed to that process: the answer proves that
+the subscription is known (`agents.lockstep_agent`). A query proves the same for every subscription that was declared
+before it, so nodes share a query, or its answer, unless the group has declared a subscription in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from wire.codec import RejectedMessages
+
+
+class GroupedNode(Protocol):
+    """The part of an agent's node that its group uses, beside `wire.driver.drive.Core`."""
+
+    rejects: RejectedMessages
+    routes: dict[str, Any]
+    session_broken: bool
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def token(self) -> str: ...  # noqa: D102
+    @property
+    def nameplate(self) -> tuple[str, bytes]: ...  # noqa: D102
+    @property
+    def subscriptions(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def publications(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def watched(self) -> str: ...  # noqa: D102
+    @property
+    def finished(self) -> bool: ...  # noqa: D102
+    @property
+    def messages_needed(self) -> int: ...  # noqa: D102
+    @property
+    def deadline(self) -> float | None: ...  # noqa: D102
+
+    def note_siblings(self, names: frozenset[str]) -> None: ...  # noqa: D102
+    def start(self, now: float) -> None: ...  # noqa: D102
+    def take_actions(self) -> Sequence[Action | Log]: ...  # noqa: D102
+    def appeared(self, key: str, now: float) -> None: ...  # noqa: D102
+    def vanished(self, key: str, now: float) -> None: ...  # noqa: D102
+    def received(self, key: str, payload: bytes, now: float) -> None: ...  # noqa: D102
+    def work(self, now: float) -> bool: ...  # noqa: D102
+    def expire(self, now: float) -> None: ...  # noqa: D102
+
+
+class _Query(NamedTuple):
+    """The last query of a key."""
+
+    declared: int
+    """Subscriptions that the group had declared by then."""
+    askers: list[GroupedNode]
+    """Nodes that wait for its answer."""
+    answer: list[bytes]
+    """The answer, once it is there."""
+
+
+class NodeGroup:
+    """Nodes behind one session, as one `wire.driver.drive.Core`.
+
+    Parameters
+    ----------
+    nodes : sequence of GroupedNode
+        At least one; the names differ.
+    """
+
+    def __init__(self, nodes: Sequence[GroupedNode]) -> None:
+        self.nodes = tuple(nodes)
+        self.nameplates = dict(node.nameplate for node in nodes)
+        """Keys of the own queryables, and their answers."""
+        names = frozenset(node.name for node in nodes)
+        for node in nodes:
+            node.note_siblings(names)
+        self.rejects = _GroupRejects(self.nodes)
+        self._now = 0.0
+        self._start_anew()
+
+    def _start_anew(self) -> None:
+        self._active = list(self.nodes)
+        self._declared: set[str] = set()
+        """Keys that the session has subscribed to."""
+        self._queries: dict[str, _Query] = {}
+        """Last query of each key."""
+        self._open: dict[str, _Query] = {}
+        """Queries without an answer, by the key under which it will arrive."""
+        self._asked = 0
+
+    # ---------------------------------------------------------------- what the driver needs
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        """Keys of the own tokens."""
+        return tuple(node.token for node in self._active)
+
+    @property
+    def publications(self) -> tuple[str, ...]:
+        """Keys to be published on."""
+        return tuple(key for node in self.nodes for key in node.publications)
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the tokens are declared."""
+        keys = tuple(dict.fromkeys(key for node in self._active for key in node.subscriptions))
+        self._declared.update(keys)
+        return keys
+
+    @property
+    def watched(self) -> str:
+        """Tokens to watch."""
+        return self.nodes[0].watched
+
+    @property
+    def finished(self) -> bool:
+        """Whether to close: all nodes have finished, or one needs another session."""
+        return self.session_broken or not self._active
+
+    @property
+    def session_broken(self) -> bool:
+        """Whether the group closes only to begin again with a new session."""
+        return any(node.session_broken for node in self.nodes)
+
+    @property
+    def messages_needed(self) -> int:
+        """Number of messages from outside that the first of the nodes to continue needs."""
+        return min(node.messages_needed for node in self._active)
+
+    @property
+    def deadline(self) -> float | None:
+        """The earliest deadline (s); None if no node has one."""
+        return min((node.deadline for node in self._active if node.deadline is not None), default=None)
+
+    def start(self, now: float) -> None:
+        """Start all nodes; after a broken session, let those begin again that had no problem themselves, too."""
+        self._now = now
+        if self.session_broken:
+            for node in self.nodes:
+                node.session_broken = node.session_broken or not node.finished
+        self._start_anew()
+        self._active = [node for node in self.nodes if node.session_broken or not node.finished]
+        for node in self._active:
+            node.start(now)
+        for node in self._active:
+            for other in self._active:
+                if other is not node:
+                    node.appeared(other.token, now)
+
+    def take_actions(self) -> list[Action | Log]:
+        """Take out the actions of all nodes; what concerns the group alone is done on the way."""
+        actions: list[Action | Log] = []
+        before = -1
+        while before != len(actions) or self._has_finished:
+            before = len(actions)
+            for node in tuple(self._active):
+                for action in node.take_actions():
+                    self._perform(node, action, actions)
+            self._let_go(actions)
+        return actions
+
+    def appeared(self, key: str, now: float) -> None:
+        """Note a token from outside."""
+        if key not in self.tokens:
+            self._now = now
+            for node in self._active:
+                node.appeared(key, now)
+
+    def vanished(self, key: str, now: float) -> None:
+        """Note a lost token from outside."""
+        if key not in self.tokens:
+            self._now = now
+            for node in self._active:
+                node.vanished(key, now)
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message, or the answer to a query."""
+        self._now = now
+        query = self._open.pop(key, None)
+        if query is not None:
+            query.answer.append(payload)
+            key = key.partition("#")[0]
+        for node in self._active if query is None else query.askers:
+            if query is not None or key in node.routes:
+                node.received(key, payload, now)
+
+    def work(self, now: float) -> bool:
+        """Let every node do a piece of work; return whether one did."""
+        self._now = now
+        return any([node.work(now) for node in self._active])
+
+    def expire(self, now: float) -> None:
+        """Let the nodes act whose deadline has passed."""
+        self._now = now
+        for node in self._active:
+            if node.deadline is not None and now >= node.deadline:
+                node.expire(now)
+
+    # ---------------------------------------------------------------- inside
+
+    def _perform(self, node: GroupedNode, action: Action | Log, actions: list[Action | Log]) -> None:
+        if isinstance(action, Publish):
+            actions.append(action)
+            for other in self._active:
+                if other is not node and action.key in other.routes:
+                    other.received(action.key, action.payload, self._now)
+        elif isinstance(action, Listen):
+            if action.key not in self._declared:
+                self._declared.add(action.key)
+                actions.append(action)
+        elif isinstance(action, Fetch):
+            self._fetch(node, action.key, actions)
+        else:
+            actions.append(action)
+
+    def _fetch(self, node: GroupedNode, key: str, actions: list[Action | Log]) -> None:
+        """Answer from inside, or by a query that proves as much, or query."""
+        own = self.nameplates.get(key)
+        query = self._queries.get(key)
+        if own is not None:
+            node.received(key, own, self._now)
+        elif query is None or query.declared != len(self._declared):
+            self._asked += 1
+            query = self._queries[key] = _Query(len(self._declared), [node], [])
+            reply_key = f"{key}#{self._asked}"
+            self._open[reply_key] = query
+            actions.append(Fetch(key, reply_key))
+        elif query.answer:
+            node.received(key, query.answer[0], self._now)
+        else:
+            query.askers.append(node)
+
+    @property
+    def _has_finished(self) -> bool:
+        return any(node.finished and not node.session_broken for node in self._active)
+
+    def _let_go(self, actions: list[Action | Log]) -> None:
+        """Withdraw the tokens of the nodes that have finished; to the others inside they are gone."""
+        for node in tuple(self._active):
+            if node.finished and not node.session_broken:
+                actions.extend(node.take_actions())
+                self._active.remove(node)
+                actions.append(WithdrawToken(node.token))
+                for other in self._active:
+                    other.vanished(node.token, self._now)
+
+
+class _GroupRejects:
+    """The rejected messages of all nodes, as the driver logs them."""
+
+    def __init__(self, nodes: Sequence[GroupedNode]) -> None:
+        self._all = [node.rejects for node in nodes]
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether there are log lines to take."""
+        return any(rejects.has_lines for rejects in self._all)
+
+    def take_lines(self) -> tuple[str, ...]:
+        """Take out the log lines since the last call."""
+        return tuple(line for rejects in self._all for line in rejects.take_lines())
