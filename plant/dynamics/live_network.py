@@ -14,6 +14,9 @@ from plant.dynamics.reduced import Complex, Real, Reduced
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
 
+WORTH = 40
+"""Iterations of a network solution that cost as much time as a new tangent of a large network."""
+
 KEPT = 64
 """Number of factored networks to keep, 1 MB each: enough for all scheduled ones, and a bound for many switchings."""
 
@@ -54,6 +57,7 @@ class LiveNetwork:
         self.V_branch = circuit.V_branch.astype(complex)
         self.source_voltage = self.reduction.circuit.source_voltage
         """Phasors of the connected ideal sources (V)."""
+        self._excess = 0
 
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once; call it ahead of a scheduled event to save this work in the event's step."""
@@ -122,6 +126,22 @@ class LiveNetwork:
         """
         self._linearise(self._solve_islands(self._branch_voltages()))
 
+    def refresh(self, iterations: int, solutions: int) -> None:
+        """Linearise a large network again once its tangent has cost more iterations than a new one costs time.
+
+        A tangent at the present voltages needs one iteration or two a solution. A small network's is never renewed
+        for its speed: it costs more, and pinned histories depend on it.
+
+        Parameters
+        ----------
+        iterations, solutions
+            Of the steps since the last call.
+        """
+        if self.net.sparse.constant.size:
+            self._excess += max(iterations - 2 * solutions, 0)
+            if self._excess > WORTH:
+                self._linearise(self._branch_voltages())
+
     def set_source(self, source_voltage: Complex) -> None:
         """Move the ideal sources to other phasors (V), topology unchanged."""
         self.source_voltage = source_voltage
@@ -142,6 +162,7 @@ class LiveNetwork:
     def _linearise(self, V_b: Complex) -> None:
         self.net = self.reduction.linearise(V_b, self.source_voltage, self._inverters.theta())
         self.x = np.concatenate([V_b.real, V_b.imag])
+        self._excess = 0
 
     def _branch_voltages(self) -> Complex:
         """Return the present voltages of the live branches (V) in the common frame."""

@@ -126,6 +126,7 @@ class Dynamics:
             network.note()
             self.deenergise(sorted(islands), step)
             begin, renewed = 2 * step, -1
+        network.refresh(status, 2 * steps - begin)
         network.note()
         return out
 

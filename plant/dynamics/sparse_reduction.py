@@ -7,10 +7,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
+from plant.dynamics.block_pattern import BlockPattern, elimination_order
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.elimination import eliminated
 from plant.dynamics.island_newton import TOLERANCE, solve_island
-from plant.dynamics.kernel.sparse import SparseMaps, factorise, factors
+from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
+from plant.dynamics.kernel.sparse import SparseMaps
 from plant.dynamics.load_law import LoadLaw
 from plant.dynamics.reduced import Complex, Real, Reduced
 from plant.dynamics.switch_state import SwitchState
@@ -32,11 +34,13 @@ class SparseReduction(SwitchState):
         needed = (np.diff(C.indptr) > 0) | (np.diff(Y_S.indptr) > 0)
         at = self.place[circuit.terminals]
         needed[at[at >= 0]] = True
-        kept, self._Y = eliminated(self._whole, needed)
+        kept, Y = eliminated(self._whole, needed)
+        order = elimination_order(Y, C[kept].tocsc())
+        kept, self._Y = kept[order], Y[order][:, order].tocsc()
         self._label = self.label[self.unknown[kept]]
         self._Y_S, self._C, self._C_S = Y_S[kept].tocsc(), C[kept].tocsc(), by_node[circuit.sources].tocsc()
         self._Y_S_whole, self._C_whole = Y_S, C
-        self._ends = _ends(self._C)
+        self._pattern = BlockPattern(self._Y, self._C)
         self._lu: SuperLU | None = None
         place = np.full(circuit.Y.shape[0], -1, np.int64)
         place[self.unknown[kept]] = np.arange(kept.size)
@@ -50,20 +54,22 @@ class SparseReduction(SwitchState):
         from_sources = self._C_S.T @ source_voltage
         drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
         constant = -(self._Y_S @ source_voltage) - self._C @ drawn
-        first, second, a_first, a_second = self._ends
+        pattern, matrix = self._pattern, self._pattern.matrix(net.A, net.B)
+        factorise_blocks(matrix)
         return net._replace(
             sparse=SparseMaps(
-                factored=factors(factorise(real_form(self._Y, self._C, net.A, net.B))),
+                factored=matrix,
                 constant=_interleaved(constant),
-                first=first,
-                second=second,
-                a_first=a_first,
-                a_second=a_second,
+                first=pattern.first,
+                second=pattern.second,
+                a_first=pattern.a_first,
+                a_second=pattern.a_second,
                 from_sources=from_sources,
                 terminals=self._at,
                 fixed=self._held_voltages(source_voltage),
                 feeds=self._feeds,
-                scratch=np.empty(6 * constant.size),
+                scratch=np.empty(4 * constant.size),
+                increments=np.zeros((2, 2 * self._C.shape[1])),
             ),
         )
 
@@ -147,6 +153,7 @@ class SparseIsland:
         self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
         self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
         self._scale = np.abs(Y.diagonal()) * self.V_nom
+        self._pattern = BlockPattern(Y, C)
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
         """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
@@ -157,62 +164,17 @@ class SparseIsland:
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
         """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
         A, B = self._loads.tangent(self._C.T @ V + self._c)
-        try:
-            lu = factorise(real_form(self._Y, self._C, part * A, part * B))
-        except RuntimeError:  # it is singular
-            return None
-        dV = lu.solve(-_interleaved(F)).view(complex)
-        ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
+        matrix = self._pattern.matrix(part * A, part * B)
         # without load the determinant is that of a complex matrix, squared in magnitude: positive
-        return dV, not ended or _positive(lu)
-
-
-def real_form(Y: sp.csc_array, C: sp.csc_array, A: Complex, B: Complex) -> sp.csc_array:
-    """Return V -> (Y + C A C') V + C B C' V^* on [Re V_1, Im V_1, Re V_2, ...]."""
-    linear = (Y + C @ sp.diags_array(A) @ C.T).tocoo()
-    conjugate = (C @ sp.diags_array(B) @ C.T).tocoo()
-    rows, columns, values = [], [], []
-    for M, signs in ((linear, ((1, -1), (1, 1))), (conjugate, ((1, 1), (1, -1)))):
-        parts = ((M.data.real, M.data.imag), (M.data.imag, M.data.real))
-        for i in range(2):
-            for j in range(2):
-                rows.append(2 * M.row + i)
-                columns.append(2 * M.col + j)
-                values.append(signs[i][j] * parts[i][j])
-    size = 2 * Y.shape[0]
-    where = (np.concatenate(rows), np.concatenate(columns))
-    return sp.csc_array((np.concatenate(values), where), shape=(size, size))
+        positive = factorise_blocks(matrix)
+        step = _interleaved(-F)
+        solve_blocks(matrix, step)
+        dV = step.view(complex)
+        if not np.isfinite(dV).all():  # it is singular
+            return None
+        ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
+        return dV, not ended or positive
 
 
 def _interleaved(V: Complex) -> Real:
     return np.ascontiguousarray(V, complex).view(float)
-
-
-def _ends(C: sp.csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Real, Real]:
-    """Nodes of each branch and the ratios with which they count; -1 for none."""
-    m = C.shape[1]
-    nodes, ratios = np.full((2, m), -1, np.int64), np.zeros((2, m))
-    for b in range(m):
-        span = slice(C.indptr[b], C.indptr[b + 1])
-        for k, (node, ratio) in enumerate(zip(C.indices[span], C.data[span], strict=True)):
-            nodes[k, b], ratios[k, b] = node, ratio
-    return nodes[0], nodes[1], ratios[0], ratios[1]
-
-
-def _positive(lu: SuperLU) -> bool:
-    """Whether the determinant of a factored matrix is positive."""
-    negative = int((lu.U.diagonal() < 0.0).sum()) + _odd(lu.perm_r) + _odd(lu.perm_c)
-    return negative % 2 == 0
-
-
-def _odd(order: NDArray[np.int32]) -> int:
-    """1 if a permutation is odd, else 0."""
-    seen = np.zeros(order.size, bool)
-    swaps = 0
-    for start in range(order.size):
-        at = start
-        while not seen[at]:
-            seen[at] = True
-            at = int(order[at])
-            swaps += at != start
-    return swaps % 2

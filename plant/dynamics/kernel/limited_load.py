@@ -16,6 +16,18 @@ STEEPNESS = 500.0
 
 
 @compiled
+def power(m: float, n: float) -> float:
+    """Return m to the power of n, which is a small integer for nearly every load: they need no logarithm."""
+    if n == -2.0:
+        return 1.0 / (m * m)
+    if n == -1.0:
+        return 1.0 / m
+    if n == 0.0:
+        return 1.0
+    return float(m**n)
+
+
+@compiled
 def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
     """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
 
@@ -26,32 +38,27 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
     V
         Magnitude of the voltage across the load (V).
     """
-    V_nom, V_low, V_off = row[2], row[5], row[9]
+    P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off = row
+    per_square = 1.0 / (V_nom * V_nom)
     if V_low >= V or V <= 0.0:
-        return complex(row[0], -row[1]) / (V_nom * V_nom), 0.0j
-    g, slope = _connected(row, V)
+        return complex(P * per_square, -Q * per_square), 0.0j
+    if V_min >= V:  # current in proportion: from the nominal impedance's at V_low to the load's own at V_min
+        at_min = V_nom * power(V_min / V_nom, edge - 1.0)
+        rise = (at_min - V_low) / (V_min - V_low)
+        p = q = per_square * (V_low + rise * (V - V_low)) / V
+        p_slope = q_slope = per_square * (rise - 1.0) * V_low / (V * V)
+    elif V_max > 0.0 and V_max < V:
+        p = q = per_square * power(V_max / V_nom, edge - 2.0)
+        p_slope = q_slope = 0.0
+    else:
+        p, q = per_square * power(V / V_nom, n_p - 2.0), per_square * power(V / V_nom, n_q - 2.0)
+        p_slope, q_slope = (n_p - 2.0) * p / V, (n_q - 2.0) * q / V
+    g, slope = complex(P * p, -Q * q), complex(P * p_slope, -Q * q_slope)
     if V_off > 0.0:
         t = np.tanh(STEEPNESS * (V - V_off) / V_nom)
         on = 0.5 * (1.0 + t)
         return g * on, slope * on + g * (0.5 * STEEPNESS / V_nom * (1.0 - t * t))
     return g, slope
-
-
-@compiled
-def _connected(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
-    """Return the same above V_low, of a load that has not dropped out."""
-    P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, _ = row
-    nominal = complex(P, -Q) / (V_nom * V_nom)
-    if V_min >= V:  # current in proportion: from the nominal impedance's at V_low to the load's own at V_min
-        at_min = V_nom * (V_min / V_nom) ** (edge - 1.0)
-        slope = (at_min - V_low) / (V_min - V_low)
-        return nominal * ((V_low + slope * (V - V_low)) / V), nominal * ((slope - 1.0) * V_low / (V * V))
-    if V_max > 0.0 and V_max < V:
-        return nominal * (V_max / V_nom) ** (edge - 2.0), 0.0j
-    m = V / V_nom
-    p, q = P * m ** (n_p - 2.0), Q * m ** (n_q - 2.0)
-    g = complex(p, -q) / (V_nom * V_nom)
-    return g, complex((n_p - 2.0) * p, -(n_q - 2.0) * q) / (V_nom * V_nom * V)
 
 
 @compiled
@@ -62,8 +69,8 @@ def limited_currents(
     m = I_b.size
     for k in range(at.size):
         b = at[k]
-        V = complex(x[b], x[m + b])
-        I_b[b] = limited_admittance(law[k], abs(V))[0] * V
+        re, im = x[b], x[m + b]
+        I_b[b] = limited_admittance(law[k], np.sqrt(re * re + im * im))[0] * complex(re, im)
 
 
 @compiled

@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.dynamics.kernel.arithmetic import multiply_add
+from plant.dynamics.kernel.block_factors import solve_blocks
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.limited_load import limited_currents
-from plant.dynamics.kernel.sparse import branch_voltages, draw, solve_factored
+from plant.dynamics.kernel.sparse import branch_voltages, draw_remainders
 
 MAX_ITERATIONS = 60
+
+CAUTION = 0.1
+"""Part of the tolerance that what is left of an iteration may have by its rate so far."""
 
 
 @compiled
@@ -26,12 +30,13 @@ def load_currents(
 ) -> None:
     """Write the branch currents (A) of all loads at x = [Re V_b; Im V_b]."""
     m = S.size
-    for b in range(m):
-        re, im = x[b], x[m + b]
-        square = re * re + im * im
-        V = complex(re, im)
-        # (S/V)* = S* V / |V|^2
-        I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
+    if limited_at.size < m:
+        for b in range(m):
+            re, im = x[b], x[m + b]
+            square = re * re + im * im
+            V = complex(re, im)
+            # (S/V)* = S* V / |V|^2
+            I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
     limited_currents(limited_at, law, x, I_b)
 
 
@@ -53,8 +58,8 @@ def solve_sparse(
 ) -> int:
     """Solve as `solve_network` does, with the factors of a sparse matrix."""
     maps = net.sparse
-    n, m, u = J.shape[0], net.S.size, maps.constant.size
-    right, base, work = maps.scratch[:u], maps.scratch[u : 2 * u], maps.scratch[2 * u :]
+    n, u = J.shape[0], maps.constant.size
+    right, base = maps.scratch[:u], maps.scratch[u:]
     base[:] = maps.constant
     for i in range(n):
         if maps.feeds[i]:
@@ -65,20 +70,20 @@ def solve_sparse(
                     turned = J[i, phase] * turn
                     base[2 * at] += turned.real
                     base[2 * at + 1] += turned.imag
-    iterations = 0
+    iterations, former = 0, 0.0
     while True:
         iterations += 1
         load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
         right[:] = base
-        for b in range(m):
-            draw(maps, b, remainder(I_b[b], complex(x[b], x[m + b]), net.i_c[b], net.A[b], net.B[b]), right)
-        solve_factored(maps.factored, right, work)
+        draw_remainders(maps, I_b, net.i_c, net.A, net.B, x, right)
+        solve_blocks(maps.factored, right)
         change = branch_voltages(maps, right, x)
-        if change <= tolerance:
+        # the changes fall in a geometric series: what would follow is bounded by its sum
+        if change <= tolerance or (change < former and change * change <= CAUTION * tolerance * (former - change)):
             break
         if iterations >= MAX_ITERATIONS or not change < 1e12:
             return -1
-    load_currents(net.S, net.I0, net.limited_at, net.law, x, I_b)
+        former = change
     size = 0.0
     for i in range(n):
         back = rotation[net.inverter_island[i]].conjugate()

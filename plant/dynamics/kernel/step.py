@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.kernel.sparse import extrapolate, note_increment
 
 FAILURES = 3
 """What can fail in a step: 0 the first network solution, 1 the second, 2 a controller whose frequency is not finite."""
@@ -62,10 +63,12 @@ def run_steps(
             keep_start(units)
         turn_frames(units, net, theta, rotation)
         x_0[:] = x
+        extrapolate(net.sparse, x)
         iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance, work)
         if iterations < 0:
             x[:] = x_0
             return -1 - (FAILURES * step + solution % 2)
+        note_increment(net.sparse, x_0, x)
         total += iterations
         advance_inverters(units, h, second, out[step])
         if second:
