@@ -190,8 +190,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         Raises
         ------
-        ValueError
-            If the feeder is made of tables of our own, which are a folder already.
+        OSError
+            If the folder cannot be written.
         """
         from plant.tables.write import write_feeder
 

@@ -1,62 +1,119 @@
-"""A feeder from another program into a folder of tables, which `read_feeder` reads."""
+"""A feeder into a folder of tables, which `read_feeder` reads."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from math import degrees, sqrt
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from plant.equipment import Feeder
+from plant.equipment import Feeder, LineConfig
 from plant.own_parameters import OwnParameters
-from plant.tables.feeder_columns import (
-    BusColumns,
-    ElementColumns,
-    InverterColumns,
-    LoadPartColumns,
-    ParameterColumns,
-    SourceColumns,
-    SwitchColumns,
-)
+from plant.tables import feeder_columns as columns
 from plant.tables.parameter_sets import FILE
 from wire.schema.table_schema import fields_of
+
+TAP_STEP = 0.00625
+"""Step (pu) in which the ratios of regulators are written."""
+
+Row = Sequence[Any]
+Table = tuple[str, type[msgspec.Struct], list[Row]]
 
 
 def write_feeder(feeder: Feeder, folder: Path) -> None:
     """Write a feeder's tables into a folder, which is made if need be; what is there is written anew.
 
+    Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
+
     Raises
     ------
-    ValueError
-        If the feeder has tables of our own (lines, transformers, loads): these are a folder already.
     OSError
         If the folder cannot be written.
     """
-    if feeder.lines or feeder.transformers or feeder.regulators or feeder.capacitors or feeder.loads:
-        raise ValueError(f'feeder "{feeder.name}" is made of tables of its own; copy its folder instead')
     folder.mkdir(parents=True, exist_ok=True)
+    for file, of_row, rows in _tables(feeder):
+        with (folder / file).open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(of_row.__struct_fields__)
+            writer.writerows(rows)
+    (folder / "feeder.toml").write_text(f"f_nom_Hz = {feeder.f_nom!r}\n", encoding="utf-8")
+
+
+def _tables(feeder: Feeder) -> Iterator[Table]:
+    """Yield file, columns and rows of each table that the feeder has."""
     kV = sqrt(3.0) / 1e3
-    buses = [(bus.name, bus.phases, bus.V_nom * kV, bus.zone, bus.x, bus.y) for bus in feeder.buses]
-    _write(folder / "buses.csv", BusColumns, buses)
-    _write(
-        folder / "elements.csv",
-        ElementColumns,
-        (
+    yield (
+        "buses.csv",
+        columns.BusColumns,
+        [(bus.name, bus.phases, bus.V_nom * kV, bus.zone, bus.x, bus.y) for bus in feeder.buses],
+    )
+    if feeder.elements or not feeder.lines:
+        yield from _imported(feeder)
+    if feeder.lines or feeder.loads:
+        yield from _own(feeder)
+    yield (
+        "switches.csv",
+        columns.SwitchColumns,
+        [
+            (switch.from_bus, switch.to_bus, switch.phases, "closed" if switch.closed else "open", switch.alias)
+            for switch in feeder.switches
+        ],
+    )
+    yield (
+        "inverters.csv",
+        columns.InverterColumns,
+        [
+            (
+                row.name,
+                row.kind,
+                row.bus,
+                row.microgrid,
+                row.P_rated / 1e3,
+                row.m_p,
+                row.m_q,
+                "yes" if row.spare else "",
+                row.parameters,
+            )
+            for row in (*feeder.inverters, *feeder.spares)
+        ],
+    )
+    if feeder.parameter_sets:
+        yield (
+            FILE,
+            columns.ParameterColumns,
+            [
+                (name, field.key, str(value).lower() if isinstance(value, bool) else value)
+                for name, own in feeder.parameter_sets.items()
+                for field in fields_of(OwnParameters)
+                if (value := getattr(own, field.name)) is not None
+            ],
+        )
+    if feeder.source:
+        source = feeder.source
+        yield "source.csv", columns.SourceColumns, [(source.bus, source.V_pu, degrees(source.angle))]
+
+
+def _imported(feeder: Feeder) -> Iterator[Table]:
+    """Yield the tables of a feeder from another program."""
+    yield (
+        "elements.csv",
+        columns.ElementColumns,
+        [
             (
                 element.name,
                 " ".join(f"{bus}.{phase}" for bus, phase in element.nodes),
                 " ".join(_number(value) for row in element.Y for value in row),
             )
             for element in feeder.elements
-        ),
+        ],
     )
-    _write(
-        folder / f"load_parts_{feeder.load_set}.csv",
-        LoadPartColumns,
-        (
+    yield (
+        f"load_parts_{feeder.load_set}.csv",
+        columns.LoadPartColumns,
+        [
             (
                 part.name,
                 part.bus,
@@ -72,56 +129,69 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
                 part.V_off,
             )
             for part in feeder.load_parts
-        ),
+        ],
     )
-    _write(
-        folder / "switches.csv",
-        SwitchColumns,
-        (
-            (switch.from_bus, switch.to_bus, switch.phases, "closed" if switch.closed else "open", switch.alias)
-            for switch in feeder.switches
-        ),
+
+
+def _own(feeder: Feeder) -> Iterator[Table]:
+    """Yield the tables of lines, transformers, regulators, capacitors and loads."""
+    yield (
+        "lines.csv",
+        columns.LineColumns,
+        [(line.name, line.from_bus, line.to_bus, line.phases, line.config, line.length * 1e3) for line in feeder.lines],
     )
-    _write(
-        folder / "inverters.csv",
-        InverterColumns,
-        (
-            (
-                row.name,
-                row.kind,
-                row.bus,
-                row.microgrid,
-                row.P_rated / 1e3,
-                row.m_p,
-                row.m_q,
-                "yes" if row.spare else "",
-                row.parameters,
-            )
-            for row in (*feeder.inverters, *feeder.spares)
-        ),
+    yield (
+        "line_configs.csv",
+        columns.LineConfigColumns,
+        [row for config in feeder.line_configs for row in _upper_triangle(config)],
     )
-    if feeder.parameter_sets:
-        _write(
-            folder / FILE,
-            ParameterColumns,
-            (
-                (name, field.key, str(value).lower() if isinstance(value, bool) else value)
-                for name, own in feeder.parameter_sets.items()
-                for field in fields_of(OwnParameters)
-                if (value := getattr(own, field.name)) is not None
-            ),
+    yield (
+        f"loads_{feeder.load_set}.csv",
+        columns.LoadColumns,
+        [
+            (load.bus, load.connection, load.model, *(part / 1e3 for S in load.S for part in (S.real, S.imag)))
+            for load in feeder.loads
+        ],
+    )
+    if feeder.capacitors:
+        yield (
+            "capacitors.csv",
+            columns.CapacitorColumns,
+            [(bank.bus, *(Q / 1e3 for Q in bank.Q), bank.V_rated / 1e3) for bank in feeder.capacitors],
         )
-    if feeder.source:
-        source = feeder.source
-        _write(folder / "source.csv", SourceColumns, [(source.bus, source.V_pu, degrees(source.angle))])
-    (folder / "feeder.toml").write_text(f"f_nom_Hz = {feeder.f_nom!r}\n", encoding="utf-8")
+    if feeder.regulators:
+        yield (
+            "regulators.csv",
+            columns.RegulatorColumns,
+            [
+                (row.name, row.from_bus, row.to_bus, row.phases, (row.ratio - 1.0) / TAP_STEP, TAP_STEP)
+                for row in feeder.regulators
+            ],
+        )
+    if feeder.transformers:
+        yield (
+            "transformers.csv",
+            columns.TransformerColumns,
+            [
+                (
+                    row.name,
+                    row.from_bus,
+                    row.to_bus,
+                    row.connection,
+                    row.S_rated / 1e3,
+                    row.z.real * 100.0,
+                    row.z.imag * 100.0,
+                )
+                for row in feeder.transformers
+            ],
+        )
 
 
-def _write(path: Path, columns: type[msgspec.Struct], rows: Iterable[Sequence[Any]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns.__struct_fields__)
-        writer.writerows(rows)
+def _upper_triangle(config: LineConfig) -> Iterator[Row]:
+    for i, first in enumerate(config.phases):
+        for k, second in enumerate(config.phases[i:], start=i):
+            z = config.Z[i][k]
+            yield config.name, first, second, z.real, z.imag, config.B[i][k] * 1e6
 
 
 def _number(value: complex) -> str:
