@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plant.equipment import Feeder
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import PlantConfig
@@ -20,7 +21,16 @@ def start_plant(config: PlantConfig) -> LivePlant:
     RuntimeError
         If it cannot start; the message says why, and what to do.
     """
-    return build_plant(config)
+    if config.settings.simulator == "helics":
+        from plant.helics.helics_plant import HelicsPlant  # only who uses it needs the wheel
+
+        return HelicsPlant(config, _feeder(config))
+    plant = build_plant(config)
+    if config.bridged:
+        from plant.helics.bridged_plant import BridgedPlant
+
+        return BridgedPlant(plant, config)
+    return plant
 
 
 def build_plant(config: PlantConfig) -> Plant:
@@ -33,7 +43,10 @@ def build_plant(config: PlantConfig) -> Plant:
     PlantError
         If there is no operating point.
     """
+    network = Network(_feeder(config), spares=config.settings.spares)
+    return Plant(network, config.settings, config.T_c, config.record_step)
+
+
+def _feeder(config: PlantConfig) -> Feeder:
     settings = config.settings
-    feeder = changed(read_feeder(settings.feeder, settings.load_set), settings.changes)
-    network = Network(feeder, spares=settings.spares)
-    return Plant(network, settings, config.T_c, config.record_step)
+    return changed(read_feeder(settings.feeder, settings.load_set), settings.changes)

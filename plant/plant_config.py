@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from plant.helics.helics_settings import HelicsSettings
 from plant.inverter_parameters import GflParameters as GflParameters
 from plant.inverter_parameters import GfmParameters as GfmParameters
 from plant.own_parameters import OwnParameters
@@ -107,8 +108,8 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Changes by inverter."""
 
 
-Simulator = Literal["gridpeers"]
-"""What simulates the plant."""
+Simulator = Literal["gridpeers", "helics"]
+"""What simulates the plant: our own, or a federate of a HELICS co-simulation."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -116,6 +117,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     simulator: Simulator = "gridpeers"
     """What simulates the plant."""
+    helics: HelicsSettings = HelicsSettings()
+    """The HELICS federation, with simulator "helics" or a bridge."""
     feeder: str = "microgrid123"
     """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
     load_set: str = "main"
@@ -150,6 +153,9 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Agents the plant waits for before tick 0."""
     schedule: tuple[ScheduledAction, ...] = ()
     """Scheduled joins, leaves and deaths; an agent that joins need not be among `agents`."""
+    bridged: bool = False
+    """Whether the plant is a federate of a HELICS federation, and inverters without an agent follow set-points from
+    there."""
     T_c: float
     """Control period (s), a multiple of h."""
     end: float | None

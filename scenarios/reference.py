@@ -18,6 +18,7 @@ from netem.models.own_fault import FAULTS
 from netem.schema.fault import Fault
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
+from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
@@ -60,6 +61,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[plant.gfm]", GfmParameters),
     ("[plant.gfl]", GflParameters),
     ("[plant.sync_check]", SyncCheck),
+    ("[plant.helics]", HelicsSettings),
     ("[protection]", Protection),
     ("[gains]", Gains),
     ("[degraded_communication]", DegradedCommunication),

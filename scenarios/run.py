@@ -68,6 +68,8 @@ class Request(RunMetrics):
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
     self_check: bool = False
     """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
+    outside: tuple[str, ...] | None = None
+    """Inverters that federates of a HELICS federation control instead of our agents; None for a run without HELICS."""
     lasting: bool = True
     """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
 
@@ -229,6 +231,11 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
     real = request.clock == "wall"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
+    if request.outside is not None:
+        plant = msgspec.structs.replace(
+            plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)
+        )
+        agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.clock == "simulated":
         return plant, agents
     if request.driver != "processes":

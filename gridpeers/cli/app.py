@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from gridpeers.cli.commands.bridge_command import app as bridges
 from gridpeers.cli.commands.compare_command import compare
 from gridpeers.cli.commands.feeder_commands import app as feeders
 from gridpeers.cli.commands.init import init
@@ -91,3 +92,4 @@ for name, command in contributed():
     app.command(name)(command)
 register(app)
 app.add_typer(feeders, name="feeder")
+app.add_typer(bridges, name="bridge")

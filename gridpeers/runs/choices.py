@@ -53,8 +53,8 @@ class Pace(TypedDict, total=False):
     processes: int
 
 
-def check_how(driver: str, pace: Pace, simulator: str, *, dash: str = "") -> None:
-    """Check the options of a run on a plant; `dash` stands before their names: "--" on a command line.
+def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str = "") -> None:
+    """Check the options of a scenario's run; `dash` stands before their names: "--" on a command line.
 
     Raises
     ------
@@ -78,12 +78,15 @@ def check_how(driver: str, pace: Pace, simulator: str, *, dash: str = "") -> Non
         if speed != 1.0 or strict:
             name = "strict" if strict else "speed"
             wrong = f"{dash}{name}: simulated time has no pace to keep; use it with {dash}clock wall"
-    elif simulator != "gridpeers":
-        wrong = f'{dash}clock wall: the plant of "{simulator}" keeps no real time; use {dash}clock simulated'
+    elif spec.plant.simulator != "gridpeers":
+        wrong = f'{dash}clock wall: the plant of "{spec.plant.simulator}" keeps no real time; use {dash}clock simulated'
     elif driver == "inprocess":
         wrong = f"{dash}clock wall: needs a process per agent; use {dash}driver processes"
     elif not (isinstance(speed, int | float) and low <= speed <= high):
         got = f"{speed:g}" if isinstance(speed, int | float) else repr(speed)
         wrong = f"{dash}speed: must be from {low:g} to {high:g} (1 is real time), got {got}"
+    if spec.plant.simulator == "helics" and len(spec.cases) > 1:
+        names = ", ".join(spec.cases)
+        wrong = f"{dash}case: a HELICS federation runs once, so choose one case of {names}"
     if wrong:
         raise ScenarioError([wrong])

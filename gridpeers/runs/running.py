@@ -49,7 +49,7 @@ def run(
         if name not in words:
             raise TypeError(f'run has no argument "{name}"; {suggestion(name, words, "arguments")}')
     spec = with_cases(scenario.spec, cases)
-    check_how(driver, pace, spec.plant.simulator)
+    check_how(driver, pace, spec)
     if progress is not None and not callable(progress):
         raise ScenarioError([f"progress: must be a function of a case and two times, got {progress!r:.60}"])
     if driver == "processes" and (wrong := check_portable(spec)):

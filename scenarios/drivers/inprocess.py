@@ -194,7 +194,10 @@ def run_inprocess(
         if plant is None:
             from plant.build import start_plant  # numba and scipy: only for who runs a plant
 
-            plant = start_plant(plant_config)
+            try:
+                plant = start_plant(plant_config)
+            except RuntimeError as error:
+                return _not_started(f"plant: cannot start: {error}", perf_counter() - began)
             stack.callback(plant.close)
         side = LockstepPlant(
             msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links)
@@ -226,3 +229,7 @@ def run_inprocess(
         start_s=started - began,
         run_s=perf_counter() - started,
     )
+
+
+def _not_started(reason: str, start_s: float) -> Outcome:
+    return Outcome(broke=reason, reproducible=False, events=(), notes=(), ticks=0, start_s=start_s, run_s=0.0)

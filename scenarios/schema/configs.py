@@ -59,6 +59,7 @@ def configs(
         run=run,
         settings=PlantSettings(
             simulator=scenario.plant.simulator,
+            helics=scenario.plant.helics,
             feeder=scenario.plant.feeder,
             load_set=scenario.plant.load_set,
             h=time.h_s,

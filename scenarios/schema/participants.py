@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from plant.equipment import Feeder, InverterRow
+from plant.helics.helics_settings import settings_problems
 from plant.plant_config import ScheduledAction
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
@@ -71,8 +72,11 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note joins and leaves under another simulator, whose inverters are on its network for the whole run."""
+    """Note joins and leaves under another simulator, whose inverters stay, and what is wrong with its settings."""
     simulator = scenario.plant.simulator
+    for key, problem in settings_problems(scenario.plant.helics).items():
+        if not problems.touch(f"plant.helics.{key}"):
+            problems.add(f"plant.helics.{key}", problem)
     for i, event in enumerate(scenario.events):
         for key in ("leave", "join"):
             if getattr(event, key) and simulator != "gridpeers":

@@ -12,6 +12,7 @@ import msgspec
 
 from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
+from plant.helics.helics_settings import HelicsSettings
 from plant.inverter_parameters import GflParameters, GfmParameters
 from plant.own_parameters import OwnParameters
 from plant.plant_config import Protection, Simulator, SyncCheck
@@ -86,7 +87,7 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant]`: the feeder, its loads, and where the inverters start."""
 
     simulator: Simulator = "gridpeers"
-    """What simulates the plant."""
+    """What simulates the plant: "gridpeers", or "helics", a federate of a HELICS co-simulation (helics.md)."""
     feeder: str = "microgrid123"
     """Name of a feeder that comes with gridpeers, or a path to a folder of the same layout, seen from this file."""
     load_set: Annotated[str, Label("load set")] = "main"
@@ -112,6 +113,8 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
     gfl: GflParameters = GflParameters()
     """Table `[plant.gfl]`: parameters of the grid-following inverters."""
+    helics: HelicsSettings = HelicsSettings()
+    """Table `[plant.helics]`: the HELICS federation, with simulator "helics" or `gridpeers bridge helics`."""
     sync_check: SyncCheck = SyncCheck()
     """Table `[plant.sync_check]`: how far two islands may be apart when an event joins them `synchronised`."""
 

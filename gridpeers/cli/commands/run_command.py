@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
@@ -19,6 +19,12 @@ from gridpeers.cli.usage import (
     refuse,
     require,
 )
+
+if TYPE_CHECKING:
+    from gridpeers.runs.choices import Pace
+    from plant.equipment import Feeder
+    from scenarios.run import Driver
+    from scenarios.schema import ScenarioModel
 
 
 def run(
@@ -38,12 +44,15 @@ def run(
         bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
     ] = False,
     plant: Annotated[
-        Literal["gridpeers"] | None,
+        Literal["gridpeers", "helics"] | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
     processes: Annotated[
         int, typer.Option(metavar="N", help="Processes that the agents share; one an agent when left out.")
     ] = 0,
+    broker: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="With --plant helics: the broker, tcp://127.0.0.1:23404.")
+    ] = None,
     case: Annotated[
         str | None, typer.Option(help="Cases to run, e.g. I,IV; all when left out.", metavar="NAMES")
     ] = None,
@@ -65,20 +74,38 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
+    from gridpeers.runs.choices import Pace
+
+    changes = {"plant.simulator": plant, "plant.helics.broker": broker}
+    spec, feeder = load(scenario, {key: value for key, value in changes.items() if value is not None})
+    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
+    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check)
+
+
+def carry_out(
+    spec: ScenarioModel,
+    feeder: Feeder,
+    driver: Driver,
+    out: Path | None,
+    pace: Pace,
+    *,
+    self_check: bool = False,
+    outside: tuple[str, ...] | None = None,
+) -> NoReturn:
+    """Run a checked scenario into a folder, show its report, and end with its exit code."""
     from datetime import datetime
 
-    from gridpeers.runs.choices import Pace, check_how
+    from gridpeers.runs.choices import check_how
     from scenarios.schema import ScenarioError
 
-    spec, feeder = load(scenario, {} if plant is None else {"plant.simulator": plant})
-    spec = chosen(spec, case, seed)
-    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
     try:
-        check_how(driver, pace, spec.plant.simulator, dash="--")
+        check_how(driver, pace, spec, dash="--")
     except ScenarioError as error:
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
     require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    if outside is not None or spec.plant.simulator == "helics":
+        require({"helics": "a HELICS federate"}, "install it: pip install 'gridpeers[helics]'")
 
     from rich.console import Console
 
@@ -98,7 +125,9 @@ def run(
         fail([str(error)], BAD_INPUT)
 
     console = Console()
-    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, **pace)
+    request = Request(
+        scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
+    )
     try:
         with interruptible(), progress(console, tuple(spec.cases)) as tell:
             report = run_scenario(request, tell)

@@ -1,0 +1,204 @@
+"""The HELICS federate of a run, as its plant sees it: requests with a deadline, and every failure as one sentence."""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from plant.helics.helics_settings import HelicsSettings, endpoint
+from plant.helics.topics import Topic, Value
+
+PROCESS = Path(__file__).with_name("federate_process.py")
+
+MISSING = "HELICS is not installed; install it: pip install 'gridpeers[helics]'"
+
+IMPORT = 60.0
+"""Longest time (s) until the process has imported HELICS, on a machine that is busy."""
+
+FAREWELL = 5.0
+"""Longest wait (s) for the process to leave the federation."""
+
+ASK = 2.0
+"""Longest wait (s) for the answer where the others are."""
+
+
+class HelicsError(RuntimeError):
+    """The federation, or this federate, cannot go on."""
+
+
+class HelicsFederate:
+    """A federate in a process of its own (`federate_process.py`).
+
+    Parameters
+    ----------
+    settings
+        Its name, and its broker.
+    publications, subscriptions
+        Its topics.
+    deadline
+        Longest wait (s of real time) for the others.
+
+    Raises
+    ------
+    HelicsError
+        If the wheel is missing, the broker cannot be reached or started, or the name is taken.
+    """
+
+    def __init__(
+        self,
+        settings: HelicsSettings,
+        publications: Sequence[Topic],
+        subscriptions: Sequence[Topic],
+        deadline: float,
+    ) -> None:
+        self._settings, self._deadline = settings, deadline
+        self._when = "before t = 0"
+        self._rest = b""
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
+        self._process = subprocess.Popen(
+            [sys.executable, str(PROCESS)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            start_new_session=True,  # Ctrl-C is for the run, which then ends this process in order
+        )
+        assert self._process.stdout is not None
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._process.stdout, selectors.EVENT_READ)
+        try:
+            if "error" in self._take(IMPORT, f"its process did not start within {IMPORT:g} s"):
+                raise HelicsError(MISSING)
+            host, port = endpoint(settings.broker)
+            self._ask(
+                {
+                    "do": "join",
+                    "name": settings.name,
+                    "host": host,
+                    "port": port,
+                    "federates": settings.federates,
+                    "wait": 0.9 * deadline,
+                    "publications": publications,
+                    "subscriptions": subscriptions,
+                },
+                f"{settings.broker} does not answer as a HELICS broker within {deadline:g} s; "
+                "is it one, of core type ZMQ?",
+            )
+        except HelicsError:
+            self.abort("it could not join")
+            raise
+
+    def begin(self, publish: Mapping[str, Value]) -> dict[str, Any]:
+        """Publish what holds at t = 0 and wait for the federation; return who publishes what we need.
+
+        Returns
+        -------
+        dict
+            "others": names of the other federates; "missing": keys of topics that nobody publishes.
+        """
+        settings = self._settings
+        wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
+        late = f"the federation at {settings.broker} did not begin within {self._deadline:g} s ({wanted})"
+        return self._ask({"do": "begin", "publish": publish}, late)
+
+    def step(self, publish: Mapping[str, Value], t: float) -> dict[str, Value]:
+        """Publish, go to a time (s), and return the values that were published since the last step, by key."""
+        late = f"no grant of t = {t:g} s within {self._deadline:g} s"
+        answer = self._ask({"do": "step", "publish": publish, "time": t}, late)
+        if answer["gone"]:
+            raise HelicsError(
+                f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
+                "let it run at least as long as the scenario"
+            )
+        self._when = f"t = {answer['granted']:g} s"
+        values: dict[str, Value] = answer["values"]
+        return values
+
+    def end(self, publish: Mapping[str, Value]) -> None:
+        """Publish the last values and leave the federation, which goes on without this federate."""
+        try:
+            self._ask({"do": "end", "publish": publish}, "the federate did not leave")
+        except HelicsError:
+            pass  # the run has its end already
+        finally:
+            self.abort("")
+
+    def abort(self, reason: str) -> None:
+        """End the process; if it is in a federation still, the others get the reason."""
+        if self._process.poll() is None:
+            self._send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
+        try:
+            self._process.wait(FAREWELL)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._selector.close()
+        for stream in (self._process.stdin, self._process.stdout, self._log):
+            if stream is not None and not stream.closed:
+                stream.close()
+
+    def _ask(self, request: Mapping[str, Any], late: str) -> dict[str, Any]:
+        self._send(request)
+        answer = self._take(self._deadline, late)
+        if "error" in answer:
+            raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'])}")
+        return answer
+
+    def _send(self, request: Mapping[str, Any]) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+            self._process.stdin.flush()
+        except OSError:
+            pass  # it has ended: the answer will say so
+
+    def _take(self, wait: float, late: str) -> dict[str, Any]:
+        """Return the next answer, or complain that it is late, with the times at which the others are."""
+        answer = self._answer(monotonic() + wait)
+        if answer is not None:
+            return answer
+        self._send({"do": "stand"})
+        until = monotonic() + ASK
+        stand: list[str] = []
+        while (answer := self._answer(until)) is not None:
+            if "stand" in answer:
+                stand = answer["stand"]
+                break
+        where = f": {', '.join(stand)}" if stand else ""
+        raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise processes.deadline_s")
+
+    def _answer(self, until: float) -> dict[str, Any] | None:
+        """Return the next line of the process; None at a time of `monotonic` (s)."""
+        assert self._process.stdout is not None
+        while b"\n" not in self._rest:
+            if not self._selector.select(max(0.0, until - monotonic())):
+                return None
+            piece = os.read(self._process.stdout.fileno(), 1 << 20)
+            if not piece:
+                self._log.seek(0)
+                last = self._log.read()[-300:].decode(errors="replace").strip().rpartition("\n")[2]
+                raise HelicsError(f"HELICS, {self._when}: the process of the federate died; {last or 'no word'}")
+            self._rest += piece
+        line, _, self._rest = self._rest.partition(b"\n")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def _explained(self, error: str) -> str:
+        """Return an error of HELICS with what it means."""
+        broker = self._settings.broker
+        if error.startswith("no broker"):
+            return f"{error}; start one: helics_broker -f 2, or --start-broker of gridpeers bridge helics"
+        if "lost connection with broker" in error:
+            return f"the broker at {broker} has ended, or cannot be reached any more"
+        if "lost comms" in error:
+            return f"a federate at {broker} died without leaving ({error})"
+        if "duplicate" in error.lower():
+            return f'{error}; the name "{self._settings.name}" is taken at {broker}: choose another with --name'
+        return error

@@ -1,0 +1,260 @@
+"""One HELICS federate, and its broker if asked for: the only file that knows the package `helics`.
+
+It is a process of its own, because HELICS writes to the terminal from its own threads, and because a wait inside its
+library cannot be ended from Python: a process can. `plant.helics.federate` starts it as a script, so it imports
+nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its answer;
+what HELICS prints goes to standard error.
+
+    {"do": "join", "name", "host", "port", "federates", "wait", "publications", "subscriptions"}
+    {"do": "begin", "publish": {key: value}}            enter executing mode at t = 0
+    {"do": "step", "publish": {key: value}, "time": s}  publish, request a time, return the values that came
+    {"do": "end", "publish": {key: value}}              publish, leave the federation, end
+    {"do": "stand"}                                     where the others are; also in the middle of a wait
+    {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import socket
+import sys
+import threading
+import time
+from typing import Any
+
+GLOBAL_ERROR = 1
+"""HELICS's error code of a federation that we end."""
+
+BROKER_LEAVES = 3000
+"""Longest time (ms) that an own broker waits for the others after the end."""
+
+FAREWELL = 0.3
+"""Time (s) for the word of an abort to reach the others."""
+
+PROBE = 0.1
+"""Time (s) between two attempts to reach a broker."""
+
+
+class RefusedError(Exception):
+    """A request that cannot be done, in words for a person."""
+
+
+class Federate:
+    """The federate with its topics."""
+
+    def __init__(self) -> None:
+        try:
+            import helics
+        except ImportError as error:
+            raise RefusedError(f"no wheel: {error}") from None
+        self.helics: Any = helics
+        self.fed: Any = None
+        self.broker: Any = None
+        self.name = ""
+        self.publications: dict[str, tuple[Any, str]] = {}
+        self.subscriptions: dict[str, tuple[Any, str]] = {}
+        self.publishers: set[str] = set()
+
+    def join(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Start the broker if asked for, connect to it, and register all topics."""
+        helics, host, port = self.helics, request["host"], request["port"]
+        loopback = host in ("127.0.0.1", "localhost", "::1")
+        self.name = request["name"]
+        if request["federates"]:
+            _require_free(host, port)
+            options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
+            self.broker = helics.helicsCreateBroker("zmq", "", options)
+            if not helics.helicsBrokerIsConnected(self.broker):
+                raise RefusedError(f"cannot start a broker at tcp://{host}:{port}")
+        else:
+            _reach(host, port, request["wait"])
+        info = helics.helicsCreateFederateInfo()
+        helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+        options = f"--federates=1 --loglevel=no_print --broker_address=tcp://{host}:{port}"
+        if loopback:
+            options += f" --localinterface=tcp://{host}"
+        helics.helicsFederateInfoSetCoreInitString(info, options)
+        helics.helicsFederateInfoSetIntegerProperty(
+            info, helics.HELICS_PROPERTY_INT_LOG_LEVEL, helics.HELICS_LOG_LEVEL_NO_PRINT
+        )
+        # a value that comes between two requested times must not wake it: its times are those of the control period
+        helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
+        self.fed = helics.helicsCreateValueFederate(self.name, info)
+        for key, kind, unit in request["publications"]:
+            code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
+            self.publications[key] = helics.helicsFederateRegisterGlobalPublication(self.fed, key, code, unit), kind
+        for key, kind, unit in request["subscriptions"]:
+            self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
+            helics.helicsInputSetOption(
+                self.subscriptions[key][0], helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True
+            )
+        return {"version": helics.helicsGetVersion()}
+
+    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Wait for the whole federation, and tell which topics nobody publishes."""
+        self.helics.helicsFederateEnterInitializingMode(self.fed)
+        self._publish(request["publish"])
+        self.helics.helicsFederateEnterExecutingMode(self.fed)
+        topics: set[str] = set()
+        others = [name for name in self._query("root", "federates") if name != self.name]
+        for name in others:
+            theirs = set(self._query(name, "publications"))
+            if theirs & self.subscriptions.keys():
+                self.publishers.add(name)
+                topics |= theirs
+        missing = [key for key in self.subscriptions if key not in topics]
+        return {"others": others, "publishers": sorted(self.publishers), "missing": missing}
+
+    def step(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Publish, go to a time, and return what was published since the last step."""
+        helics = self.helics
+        self._publish(request["publish"])
+        granted = helics.helicsFederateRequestTime(self.fed, request["time"])
+        read = {
+            "double": helics.helicsInputGetDouble,
+            "boolean": lambda topic: bool(helics.helicsInputGetBoolean(topic)),
+            "string": helics.helicsInputGetString,
+        }
+        values = {
+            key: read[kind](topic)
+            for key, (topic, kind) in self.subscriptions.items()
+            if helics.helicsInputIsUpdated(topic)
+        }
+        gone = [] if values else [who for who in sorted(self.publishers) if self._query(who, "state") in _GONE]
+        return {"granted": granted, "values": values, "gone": gone}
+
+    def end(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Leave the federation; an own broker stays until the others have left, or for a while."""
+        self._publish(request["publish"])
+        self.helics.helicsFederateDisconnect(self.fed)
+        if self.broker is not None:
+            self.helics.helicsBrokerWaitForDisconnect(self.broker, BROKER_LEAVES)
+        return {}
+
+    def abort(self, reason: str) -> None:
+        """End the federation for everybody, with a reason that others can print."""
+        if self.fed is None:
+            return
+        with contextlib.suppress(Exception):
+            self.helics.helicsFederateGlobalError(self.fed, GLOBAL_ERROR, reason)
+            time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
+
+    def stand(self) -> list[str]:
+        """Return the other federates and the times at which they stand, for a complaint."""
+        if self.fed is None:
+            return []
+        answer = self._query("root", "global_time")
+        found = []
+        for core in answer.get("cores", []) if isinstance(answer, dict) else []:
+            for federate in core.get("federates", []):
+                name = federate.get("attributes", {}).get("name", "")
+                if name != self.name:
+                    found.append(f"{name} stands at t = {max(federate.get('granted_time', 0.0), 0.0):g} s")
+        return found
+
+    def _publish(self, values: dict[str, Any]) -> None:
+        helics = self.helics
+        write = {
+            "double": helics.helicsPublicationPublishDouble,
+            "boolean": lambda topic, value: helics.helicsPublicationPublishBoolean(topic, int(value)),
+            "string": helics.helicsPublicationPublishString,
+        }
+        for key, value in values.items():
+            topic, kind = self.publications[key]
+            write[kind](topic, value)
+
+    def _query(self, target: str, what: str) -> Any:
+        query = self.helics.helicsCreateQuery(target, what)
+        try:
+            return self.helics.helicsQueryExecute(query, self.fed)
+        finally:
+            self.helics.helicsQueryFree(query)
+
+
+_GONE = ("disconnected", "finalized", "error")
+"""States of a federate that publishes no more."""
+
+
+def _require_free(host: str, port: int) -> None:
+    """Refuse a port in use: HELICS itself would wait for it for a long time. A broker of type ZMQ has two ports."""
+    for each in (port, port + 1):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, each))
+            except OSError as error:
+                text = f"cannot start a broker at tcp://{host}:{port}: port {each}: {error.strerror}"
+                raise RefusedError(f"{text}; end what has it, or choose another port") from None
+
+
+def _reach(host: str, port: int, wait: float) -> None:
+    """Wait until something listens there: HELICS itself would say only much later that nothing does."""
+    until = time.monotonic() + wait
+    while True:
+        try:
+            with socket.create_connection((host, port), timeout=max(PROBE, until - time.monotonic())):
+                return
+        except OSError as error:
+            if time.monotonic() + PROBE > until:
+                why = error.strerror or str(error)
+                raise RefusedError(f"no broker at tcp://{host}:{port} within {wait:g} s ({why})") from None
+            time.sleep(PROBE)
+
+
+def _reason(error: Exception) -> str:
+    """Return the text of an error of HELICS without its number."""
+    text = str(error)
+    return text.partition("] ")[2] if text.startswith("[") else text
+
+
+def main() -> None:
+    """Answer requests until the end of standard input."""
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+    requests: queue.Queue[dict[str, Any]] = queue.Queue()
+    federate: Federate | None = None
+
+    def answer(content: dict[str, Any]) -> None:
+        with contextlib.suppress(OSError):  # the parent is gone: so is this process, in a moment
+            answers.write(json.dumps(content) + "\n")
+
+    def listen() -> None:
+        """Take requests; do at once what must not wait for the present one."""
+        for line in sys.stdin:
+            request = json.loads(line)
+            if request["do"] == "stand":
+                with contextlib.suppress(Exception):
+                    answer({"stand": federate.stand() if federate else []})
+            elif request["do"] == "abort":
+                if federate:
+                    federate.abort(request["reason"])
+                os._exit(0)
+            else:
+                requests.put(request)
+        if federate:
+            federate.abort("gridpeers ended without a word")
+        os._exit(0)
+
+    try:
+        federate = Federate()
+    except RefusedError as refused:
+        answer({"error": str(refused)})
+        return
+    answer({"ready": True})
+    threading.Thread(target=listen, daemon=True).start()
+    while True:
+        request = requests.get()
+        try:
+            answer(getattr(federate, request["do"])(request))
+        except Exception as error:
+            answer({"error": _reason(error)})
+        if request["do"] == "end":
+            answers.close()
+            os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

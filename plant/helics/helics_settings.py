@@ -1,0 +1,65 @@
+"""How a run takes part in a HELICS federation: table `[plant.helics]` of a scenario."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+import msgspec
+
+from wire.schema.plausible import Plausible
+from wire.schema.table_schema import Example
+
+BROKER = "tcp://127.0.0.1:23404"
+"""Address of a HELICS broker that was started without options on this machine."""
+
+_ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+|\[[0-9A-Fa-f:]+\])(:(?P<port>\d{1,5}))?")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+
+class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The federate of a run, and its broker."""
+
+    broker: Annotated[str, Example('"tcp://10.0.0.5:23404"')] = BROKER
+    """Address of the broker, of HELICS's core type ZMQ."""
+    name: str = "gridpeers"
+    """Name of the federate; no other of the federation has it."""
+    prefix: str = "grid"
+    """First part of every topic: "grid" gives grid/inv1/P."""
+    federates: Annotated[int, Plausible("a number of federates", 0, 1000)] = 0
+    """Above 0, the run starts the broker itself, and the federation waits for so many federates, this one included;
+    at 0 there must be a broker."""
+
+
+def settings_problems(settings: HelicsSettings) -> dict[str, str]:
+    """Return what is wrong with the settings, by key.
+
+    Examples
+    --------
+    >>> settings_problems(HelicsSettings(broker="tcp://127.0.0.1:99999", prefix="my grid"))["broker"]
+    'must be like tcp://127.0.0.1:23404, got "tcp://127.0.0.1:99999"'
+    """
+    found = {}
+    match = _ADDRESS.fullmatch(settings.broker)
+    if match is None or not 0 < int(match["port"] or 1) < 65536:
+        found["broker"] = f'must be like {BROKER}, got "{settings.broker}"'
+    for key in ("name", "prefix"):
+        value = getattr(settings, key)
+        if not _NAME.fullmatch(value):
+            found[key] = f'must be up to 64 letters, digits, "_", "-" or ".", got "{value}"'
+    if settings.federates == 1:
+        found["federates"] = "must be at least 2, this one and an outside one; 0 starts no broker"
+    return found
+
+
+def endpoint(broker: str) -> tuple[str, int]:
+    """Return host and port of a broker's address.
+
+    Examples
+    --------
+    >>> endpoint("tcp://10.0.0.5:24000"), endpoint("localhost")
+    (('10.0.0.5', 24000), ('localhost', 23404))
+    """
+    match = _ADDRESS.fullmatch(broker)
+    assert match is not None, broker
+    return match[2].strip("[]"), int(match["port"] or 23404)
