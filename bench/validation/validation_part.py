@@ -71,6 +71,8 @@ class ValidationPart(NamedTuple):
     """Run a case, by its name."""
     draw: Callable[[Sequence[CaseResult]], Figure]
     """Draw the part's figure from the results of all cases."""
+    run_short: Callable[[str], CaseResult] | None = None
+    """The same case in less time, with the same limits, for the tests; `run` if left out."""
 
     def missing(self) -> str:
         """Return which distributions are missing and how to install them; empty if none is."""

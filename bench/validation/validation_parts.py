@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from bench.validation.gridlabd_part import GRIDLABD
 from bench.validation.power_flow_part import POWER_FLOW
 from bench.validation.validation_part import ValidationPart
 
-PARTS: tuple[ValidationPart, ...] = (POWER_FLOW,)
+PARTS: tuple[ValidationPart, ...] = (POWER_FLOW, GRIDLABD)

@@ -45,9 +45,13 @@ class Closings:
         self._waiting: dict[str, _Pending] = {}
         self.joined: list[Closing] = []
 
+    def difference(self, name: str) -> Difference | None:
+        """Return the difference across a switch (by its name) now; None if it does not part two live islands."""
+        return self._sync.across(name, self._switches.closed)
+
     def refusal(self, name: str) -> str:
         """Return why a switch (by its name) may not close now under a synchronism check; "" if it may."""
-        difference = self._sync.across(name, self._switches.closed)
+        difference = self.difference(name)
         if difference is None or difference.within:
             return ""
         return (

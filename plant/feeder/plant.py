@@ -15,7 +15,7 @@ from plant.feeder.in_service import InService
 from plant.feeder.islands import Islands
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
-from plant.feeder.synchronism import Synchronism
+from plant.feeder.synchronism import Difference, Synchronism
 from plant.feeder.trips import trip_event
 from plant.network import Network
 from plant.plant_config import PlantSettings, PowerLimit
@@ -180,6 +180,10 @@ class Plant:
             closed = then if at <= step else closed
         self._switches.put(step, known, action, synchronised=synchronised)
         return (known in closed) == (action == "close")
+
+    def difference_across(self, name: str) -> Difference | None:
+        """Return angle, frequency and voltage across a switch, by its name or alias, that parts two live islands."""
+        return self._closings.difference(self.network.switch_name(name))
 
     def connect(self, name: str, on: bool) -> None:
         """Connect an inverter at zero current and in step with the network, or disconnect it; see `InService`."""

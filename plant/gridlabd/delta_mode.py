@@ -9,6 +9,7 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
 
     {"load": path, "inverters": [[name, bus, kind], ...]}   {"version": ...}; the first step of delta mode is done
     {"write": [[object, property, value], ...]}             {}; acts from the next step on
+    {"phasors": bus}                                        {"phasors": [real, imaginary] (V) of its phases A, B, C}
     {"advance": n}                                          {"steps": n lists of a reading per inverter}
 
 A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), and the set-points as GridLAB-D holds them: `Pset` (pu)
@@ -195,6 +196,9 @@ def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     for request in requests:
         if "advance" in request:
             yield {"steps": simulation.advance(request["advance"])}
+        elif "phasors" in request:
+            phases = (simulation.core.doubles(request["phasors"], f"voltage_{phase}", 2) for phase in "ABC")
+            yield {"phasors": [list(phase) for phase in phases]}
         else:
             for name, key, value in request["write"]:
                 simulation.core.write(name, key, value)

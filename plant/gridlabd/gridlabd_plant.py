@@ -24,10 +24,7 @@ REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
 
 MISSING = """GridLAB-D is not there: {python} is no interpreter that has the package "gridlabd".
-Install the wheel (Linux, x86-64) into an environment of its own and name the interpreter of that one:
-
-    python3 -m venv gld && gld/bin/pip install gridlabd==6.0.0
-    .venv/bin/python -m bench.validation.compare_gridlabd --gridlabd gld/bin/python"""
+Install its wheel (Linux, x86-64): pip install 'gridpeers[gridlabd]'"""
 
 
 class GridlabdError(RuntimeError):
@@ -126,6 +123,10 @@ class GridlabdPlant:
             f, P, Q, V, P_set, V_set = self._in_units(name, reading)
             readings[name] = Reading(P, Q, V, f, P_set, V_set, fed, "grid" if fed else first.setdefault(buses, name))
         return readings
+
+    def phasors(self, bus: str) -> tuple[complex, ...]:
+        """Return the voltages (V) of phases A, B and C at a bus."""
+        return tuple(complex(*phase) for phase in self._ask(phasors=f"n{bus}")["phasors"])
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
         """Take set-points (W, V), in force from the next step on."""

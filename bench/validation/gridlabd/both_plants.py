@@ -1,0 +1,162 @@
+"""Our plant and GridLAB-D through the same run, step by step.
+
+GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.glm` writes from the feeder's tables
+without the code of `plant.network`. Both plants start from their own equilibrium; in closed loop each has its own
+agents.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from agents.agent_config import AgentConfig
+from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, shortened
+from bench.validation.gridlabd.impedance import with_impedances
+from plant.equipment import InverterRow
+from plant.feeder import Plant
+from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.network import Network
+from plant.plant_config import PlantConfig, SwitchEvent
+from plant.plant_interface import PlantLike
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+
+QUANTITIES = {"f": "Hz", "P": "pu", "Q": "pu", "V": "pu", "P_set": "pu", "V_set": "pu"}
+"""Quantities of each inverter in a row, and their units of comparison: pu of rating and of nominal voltage."""
+
+
+class Compared(NamedTuple):
+    """Both plants in one run."""
+
+    t: NDArray[np.float64]
+    """Times (s) of the steps."""
+    differences: Mapping[str, NDArray[np.float64]]
+    """Steps x inverters of each of `QUANTITIES`, in its unit."""
+    angles: tuple[float, float] | None
+    """Angle (deg) across the reclosed switch in the step before it closes, in ours and in GridLAB-D."""
+
+
+def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
+    """Let both plants go through a run.
+
+    Parameters
+    ----------
+    run
+        What to go through.
+    factor
+        Factor on all its times.
+
+    Raises
+    ------
+    GridlabdError
+        If GridLAB-D is missing, or ended.
+    """
+    scenario, feeder = load_scenario(run.scenario)
+    config, agents = configs(scenario, feeder, run.case)
+    settings = replace(config.settings, gfl=run.gfl or config.settings.gfl, events=run.events or config.settings.events)
+    run, config = shortened(run, replace(config, settings=settings, record_step=settings.h), factor)
+    network = Network(with_impedances(feeder) if run.impedances else feeder)
+    if run.reclosing:
+        config = _reclosing_at_its_angle(network, config, run.reclosing)
+    assert config.end is not None
+    ours = Plant(network, config.settings, config.T_c, config.record_step)
+    with GridlabdPlant(ours, config.settings, config.T_c, config.end, sys.executable) as theirs:
+        if run.closed_loop:
+            first, second = (_closed_loop(plant, config, agents) for plant in (ours, theirs))
+        else:
+            closes = {event.switch: round(event.t / config.T_c) for event in config.settings.events}
+            tick = closes[run.reclosing.switch] if run.reclosing else -1
+            first, second = (_open_loop(plant, run, config, tick) for plant in (ours, theirs))
+    (t, rows), (t_theirs, rows_theirs) = (_arranged(each.rows, network.inverters) for each in (first, second))
+    if not np.array_equal(t, t_theirs):
+        raise ValueError(f"rows of {t.size} and {t_theirs.size} steps are not of the same times")
+    gaps = np.abs(rows - rows_theirs)
+    angles = (first.angle, second.angle) if run.reclosing else None
+    return Compared(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
+
+
+class _Ran(NamedTuple):
+    """A plant at the end of a run."""
+
+    rows: list[tuple[float, ...]]
+    """Of every step, as `Plant.take_rows` has them."""
+    angle: float = float("nan")
+    """Angle (deg) across the switch that is to close."""
+
+
+def _reclosing_at_its_angle(network: Network, config: PlantConfig, reclosing: Reclosing) -> PlantConfig:
+    """Choose the times so that the switch closes at its angle, on a tick, where both plants can be read.
+
+    Our plant rehearses it. In a control period the angle grows by about a degree; so the switch closes on the first
+    tick beyond the angle, and opens as many steps later as take the excess away.
+    """
+
+    def schedule(opens: float, closes: float) -> PlantConfig:
+        end = round((closes + reclosing.further) / config.T_c) * config.T_c
+        events = (
+            SwitchEvent(t=opens, switch=reclosing.switch, action="open"),
+            SwitchEvent(t=closes, switch=reclosing.switch, action="close"),
+        )
+        return replace(config, settings=replace(config.settings, events=events), end=end)
+
+    h, T_c = config.settings.h, config.T_c
+    rehearsal = Plant(network, schedule(reclosing.opens, 60.0).settings, T_c, T_c)
+    before, angle = 0.0, 0.0
+    while angle < reclosing.angle:
+        rehearsal.advance()
+        difference = rehearsal.difference_across(reclosing.switch)
+        before, angle = angle, difference.angle if difference else 0.0
+    later = round((angle - reclosing.angle) / (angle - before) * T_c / h)
+    return schedule(reclosing.opens + later * h, rehearsal.tick * T_c)
+
+
+def _closed_loop(plant: PlantLike, config: PlantConfig, agents: tuple[AgentConfig, ...]) -> _Ran:
+    rows: list[tuple[float, ...]] = []
+    outcome = run_inprocess(config, agents, lambda telemetry: rows.extend(telemetry.rows), plant=plant)
+    if outcome.broke:
+        raise RuntimeError(outcome.broke)
+    return _Ran(rows)
+
+
+def _open_loop(plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig, closing: int) -> _Ran:
+    """Go through a run, and read the angle across the switch at the tick at which it closes."""
+    assert config.end is not None
+    units = {unit.name: unit for unit in load_scenario(run.scenario)[1].inverters}
+    orders = {round(order.t / config.T_c): order for order in run.orders}
+    angle = float("nan")
+    for tick in range(round(config.end / config.T_c)):
+        if tick in orders:
+            order = orders[tick]
+            for name in order.inverters:
+                plant.hold(name, order.P_set * units[name].P_rated, order.V_set * units[name].V_nom)
+        if run.reclosing and tick == closing:
+            angle = _angle_across(plant, run.reclosing.switch)
+        plant.advance()
+    return _Ran(list(plant.take_rows()), angle)
+
+
+def _angle_across(plant: Plant | GridlabdPlant, switch: str) -> float:
+    """Return the largest angle (deg) between equal phases of the two sides of an open switch."""
+    if isinstance(plant, Plant):
+        difference = plant.difference_across(switch)
+        assert difference is not None
+        return difference.angle
+    one, other = (plant.phasors(bus) for bus in switch.split("-"))
+    return float(np.degrees(np.abs(np.angle(np.array(one) / np.array(other)))).max())
+
+
+def _arranged(
+    rows: Sequence[tuple[float, ...]], units: Sequence[InverterRow]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the times (s), and steps x inverters x quantities in the units of `QUANTITIES`."""
+    table = np.array(rows)
+    P, V = (np.array([getattr(unit, name) for unit in units]) for name in ("P_rated", "V_nom"))
+    bases = np.column_stack([np.ones(len(units)), P, P, V, P, V])
+    return table[:, 0], table[:, 1:].reshape(len(table), len(units), len(QUANTITIES)) / bases

@@ -1,0 +1,150 @@
+"""The runs that our plant and GridLAB-D go through: events, set-points and limits over time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import msgspec
+
+from plant.plant_config import GflParameters, PlantConfig, SwitchEvent
+
+ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)
+"""GridLAB-D has one rating for a GFL's reference and its apparent power (ours: 1 and 1.2 pu), and no bound of V_set."""
+
+GFL = ("inv2", "inv3", "inv5", "inv6", "inv8", "inv9")
+
+SHORT = 0.2
+"""Factor on all times of a run in the tests."""
+
+
+class TimedSetPoints(NamedTuple):
+    """Set-points that inverters are given in an open-loop run."""
+
+    t: float
+    """Time (s), a multiple of T_c."""
+    inverters: tuple[str, ...]
+    P_set: float
+    """pu of the rating."""
+    V_set: float
+    """pu of the nominal voltage."""
+
+
+class Reclosing(NamedTuple):
+    """A switch that opens, and closes when its sides are an angle apart."""
+
+    switch: str
+    opens: float
+    """Time (s) at which it opens, to the nearest control period."""
+    angle: float
+    """Angle (deg) at which it closes, its island behind."""
+    further: float
+    """Time (s) that the run goes on."""
+
+
+class ComparedRun(NamedTuple):
+    """One run: the events and limits that both plants go through."""
+
+    text: str
+    scenario: str
+    case: str
+    closed_loop: bool = False
+    gfl: GflParameters | None = None
+    """Instead of the scenario's."""
+    events: tuple[SwitchEvent, ...] = ()
+    """Instead of the scenario's."""
+    orders: tuple[TimedSetPoints, ...] = ()
+    reclosing: Reclosing | None = None
+    """Instead of events."""
+    impedances: bool = True
+    """Whether our switches and regulators have GridLAB-D's impedances."""
+    tolerance: float = 1e-8
+    """Largest difference (Hz, pu) that passes."""
+    in_tests: bool = True
+    """Whether the tests have it too: three minutes on two cores have to do for all parts."""
+
+
+RUNS = {
+    "islanding-I": ComparedRun("constant set-points; islanding, then loss of load", "islanding", "I"),
+    "islanding-IV": ComparedRun("the same in closed loop, with case IV's agents", "islanding", "IV", closed_loop=True),
+    "set-points": ComparedRun(
+        "set-point steps: GFL to 1.3 and -1.3 pu, GFM beyond P_max",
+        "islanding",
+        "I",
+        gfl=ONE_RATING,
+        orders=(
+            TimedSetPoints(1.5, ("inv2",), 1.3, 1.03),
+            TimedSetPoints(2.0, ("inv2",), 0.647, 1.0),
+            TimedSetPoints(2.5, GFL, 0.1, 1.0),  # the GFM are left with 1.8 pu
+            TimedSetPoints(3.5, GFL, 0.647, 1.0),
+            TimedSetPoints(5.0, ("inv3", "inv8"), 1.3, 1.0),  # f > f_nom: the droop starts from the clipped 1 pu
+            TimedSetPoints(6.0, ("inv5",), -1.3, 1.0),
+        ),
+    ),
+    "available-power": ComparedRun(
+        "available power below the reference, in closed loop", "wind-up", "clamp", closed_loop=True
+    ),
+    "three-islands": ComparedRun(
+        "three islands, in closed loop",
+        "microgrid-switching",
+        "IV",
+        closed_loop=True,
+        # GridLAB-D de-energises microgrid 1 if both switches between the microgrids open in the same step
+        events=(
+            SwitchEvent(t=1.0, switch="13-152", action="open"),
+            SwitchEvent(t=4.0, switch="sw1_2", action="open"),
+            SwitchEvent(t=4.004, switch="sw2_3", action="open"),
+        ),
+    ),
+    "reclosing-30": ComparedRun(
+        "the substation reclosed at -30 degrees",
+        "islanding",
+        "I",
+        reclosing=Reclosing(switch="13-152", opens=0.1, angle=30.0, further=2.0),
+    ),
+    "reclosing-70": ComparedRun(
+        "the same at -70 degrees: down to 0.8 pu of voltage, up to 5 pu of power",
+        "islanding",
+        "I",
+        reclosing=Reclosing(switch="13-152", opens=0.1, angle=70.0, further=2.0),
+        in_tests=False,
+    ),
+    "wind-up": ComparedRun(
+        "available power below the reference, without anti-windup, in closed loop",
+        "wind-up",
+        "none",
+        closed_loop=True,
+        gfl=ONE_RATING,
+        in_tests=False,
+    ),
+    "ideal": ComparedRun(
+        "as islanding-I, our switches and regulators ideal, as shipped",
+        "islanding",
+        "I",
+        impedances=False,
+        tolerance=2e-4,
+        in_tests=False,
+    ),
+}
+
+
+def shortened(run: ComparedRun, config: PlantConfig, factor: float) -> tuple[ComparedRun, PlantConfig]:
+    """Return a run and its configuration with all times multiplied by a factor.
+
+    They stay multiples of the control period; what comes some steps after one still does.
+    """
+
+    def at(t: float) -> float:
+        ticks = int(t / config.T_c + 1e-6)
+        return round(factor * ticks) * config.T_c + (t - ticks * config.T_c)
+
+    assert config.end is not None
+    settings = msgspec.structs.replace(
+        config.settings,
+        events=tuple(msgspec.structs.replace(event, t=at(event.t)) for event in config.settings.events),
+        limits=tuple(msgspec.structs.replace(limit, t=at(limit.t)) for limit in config.settings.limits),
+    )
+    run = run._replace(
+        orders=tuple(order._replace(t=at(order.t)) for order in run.orders),
+        reclosing=run.reclosing and run.reclosing._replace(further=at(run.reclosing.further)),
+    )
+    return run, msgspec.structs.replace(config, settings=settings, end=at(config.end))

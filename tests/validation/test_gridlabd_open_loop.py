@@ -1,0 +1,13 @@
+"""Part (b) of docs/validation.md, constant set-points: the plant beside GridLAB-D, in a fifth of the page's time."""
+
+import pytest
+
+from bench.validation.gridlabd.compared_runs import RUNS
+from bench.validation.gridlabd_part import GRIDLABD
+from tests.validation.limits_kept import assert_limits_kept
+
+
+@pytest.mark.parametrize("case", [name for name, run in RUNS.items() if run.in_tests and not run.closed_loop])
+def test_the_plant_goes_through_a_run_as_gridlabd_does(case: str) -> None:
+    """Through islanding, set-point steps and reclosing, f, P, Q and V of all inverters are GridLAB-D's at each step."""
+    assert_limits_kept(GRIDLABD, case)
