@@ -67,7 +67,7 @@ class LockstepAgent(AgentNode):
         self._roster: Prepare | None = None
         """The last roster with this process."""
         self._processes: dict[str, str] = {}
-        """The process of each name on it."""
+        """The process of each name on it, in the order of the inverters."""
         self._ready = False
         """Whether the agent is ready for this roster. It stays so if an agent dies: the next roster changes it."""
         self._proofs: dict[tuple[str, str], bool] = {}
@@ -80,7 +80,7 @@ class LockstepAgent(AgentNode):
         """States of this tick that arrived before it was done, and their bytes."""
         self._neighbours: tuple[str, ...] = ()
         """In-neighbours on the roster of the last tick."""
-        self._neighbours_of: tuple[str, ...] = ()
+        self._neighbours_of: dict[str, str] = {}
         """Roster of the last tick."""
         self._ending = ""
         """Why the agent is about to close; empty otherwise."""
@@ -263,7 +263,7 @@ class LockstepAgent(AgentNode):
             raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
         self._grant = message
         self._barrier.came(PLANT)
-        for name in set(self._neighbours).difference(message.roster):
+        for name in set(self._neighbours).difference(self._processes):
             self._barrier.came(name)
         self._hear(message, payload, message.t)
         self._barrier.renew(now)
@@ -300,7 +300,7 @@ class LockstepAgent(AgentNode):
         if measured is None or (self._links is not None and self._links.stalled(grant.t)):
             state = self._agent.idle_state(grant)
         else:
-            neighbours = tuple(name for name in self._neighbours if name in grant.roster)
+            neighbours = tuple(name for name in self._neighbours if name in self._processes)
             state = self._agent.tick(replace(measured, seq=grant.seq, t=grant.t), neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         if (grant.seq + 1) % REPORT_TICKS == 0:
@@ -309,9 +309,9 @@ class LockstepAgent(AgentNode):
 
     def _await_next(self, grant: Measurement, now: float) -> None:
         """Start the wait for the next tick: it needs the states of this one, and some may be here already."""
-        if grant.roster != self._neighbours_of:
-            self._neighbours_of = grant.roster
-            self._neighbours = self._agent.in_neighbours(grant.roster)
+        if self._processes is not self._neighbours_of:
+            self._neighbours_of = self._processes
+            self._neighbours = self._agent.in_neighbours(self._processes)
         early, self._early = self._early, {}
         self._grant, self._tick = None, grant.seq + 1
         awaited = {

@@ -167,7 +167,7 @@ class ForeignAgent:
         if m is None or self.leaving or now < self.due:
             return
         k, speed, limit = (self.sent, c["speed"], c["max_age"]) if self.wall else (m["seq"], 1.0, inf)
-        for name in list(self.states) if self.wall else [n for n in self.neighbours if n in m["roster"]]:
+        for name in list(self.states) if self.wall else [n for n in self.neighbours if n in self.members]:
             heard = [one for one in self.states.get(name, []) if self.wall or one[1]["seq"] < k][-1:]
             if not self.wall and (not heard or heard[0][1]["seq"] < k - 1) and (name, self.members[name]) in self.alive:
                 return
@@ -183,7 +183,7 @@ class ForeignAgent:
         P_set, V_set = law(c, *self.set_points, m, near) if free else self.set_points
         self.publish("state", "State", k, m["t"], P_set=P_set, V_set=V_set, Q=m["Q"], island=m["island"])
         self.set_points, self.island = (None, "") if off else ((P_set, V_set), m["island"])
-        self.neighbours = [n for n in m["roster"] if (plate := self.plate(n)) and linked(c["control"], self.own, plate)]
+        self.neighbours = [n for n in self.members if (p := self.plate(n)) and linked(c["control"], self.own, p)]
 
 
 if __name__ == "__main__":

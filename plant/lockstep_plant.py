@@ -293,7 +293,7 @@ class LockstepPlant(PlantNode):
         self._barrier.wait_for(dict.fromkeys(roster, f"State({tick})"), now)
         readings = self._plant.measure()
         for name in roster:
-            measurement = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t, roster=roster)
+            measurement = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t)
             self._publish(self._measurement_keys[name], encode(measurement))
         if tick == 0:
             self._report(final=False)

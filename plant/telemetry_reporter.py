@@ -18,7 +18,7 @@ _NUMBER_BYTES = 9
 
 
 def measurement_of(
-    name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] = ()
+    name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] | None = None
 ) -> Measurement:
     """Return the measurement of one inverter (t in s) from its reading, within the range of a sensor.
 

@@ -137,7 +137,7 @@ def is_name(text: str) -> bool:
     return _PATTERN.fullmatch(text) is not None
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=4096)
 def check_names(*names: str) -> None:
     """Raise ValueError for a bad name; cached, because a sender's names are the same each time."""
     if not all(map(is_name, names)):

@@ -112,12 +112,15 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Whether a closed path leads to the substation: secondary control is then on hold."""
     island: QuickNameOrNone
     """Name of the island: "grid", or the first inverter in it; `OFF` if the inverter is out of service."""
-    roster: QuickNames
-    """Agents of this tick, in the order of the inverters. In wall-clock time the agents that the plant hears."""
+    roster: QuickNames | None = None
+    """In wall-clock time the agents that the plant hears, in the order of the inverters. None in simulated time, where
+    the agents of a tick are those of the last `Prepare`."""
 
     def __post_init__(self) -> None:
-        check_names(self.sender, self.to, self.island or self.to, *self.roster)
-        _once("roster", self.roster)
+        check_names(self.sender, self.to, self.island or self.to)
+        if self.roster is not None:
+            check_names(*self.roster)
+            _once("roster", self.roster)
 
 
 class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):

@@ -78,11 +78,11 @@ class Lab:
         roster, ids = tuple(processes), tuple(processes.values())
         self.hear(KEYS.control, Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=roster, instances=ids))
 
-    def measure(self, k: int, *names: str) -> None:
-        """The grant of tick k, for inv1 and these."""
+    def measure(self, k: int) -> None:
+        """The grant of tick k."""
         message = Measurement(
             sender="plant", epoch=1, seq=k, t=round(0.02 * k, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
-            P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", *names),
+            P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
         )  # fmt: skip
         self.hear(KEYS.measurement("inv1"), message)
 
@@ -107,7 +107,7 @@ def ticking(*names: str, tick: int = 0) -> Lab:
     lab = Lab()
     lab.meet(*names)
     lab.prepare(0, *names)
-    lab.measure(tick - 1 if tick else 0, *names)
+    lab.measure(tick - 1 if tick else 0)
     lab.decided.clear()
     lab.take()
     return lab

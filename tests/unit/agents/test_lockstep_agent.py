@@ -176,7 +176,7 @@ def test_the_first_tick_needs_the_measurement_alone() -> None:
     lab.prepare(0, "inv2")
     assert lab.missing == [("Measurement(0)", "plant")]
 
-    lab.measure(41, "inv2")
+    lab.measure(41)
     assert [state.seq for state in lab.decided] == [41]
 
 
@@ -187,7 +187,7 @@ def test_a_tick_is_done_with_whatever_comes_last(order: tuple[str, ...]) -> None
     for sender in order:
         assert lab.decided == []
         wanted.append(lab.node.messages_needed)
-        lab.measure(5, "inv2", "inv3") if sender == "plant" else lab.state(sender, 4)
+        lab.measure(5) if sender == "plant" else lab.state(sender, 4)
 
     assert wanted == [3, 2, 1]
     assert [state.seq for state in lab.decided] == [5]
@@ -199,9 +199,9 @@ def test_a_state_that_comes_too_early_is_kept_for_its_tick() -> None:
     for early in (True, False):
         lab = ticking("inv2", tick=1)
         lab.state("inv2", int(early), P_set=9e4 + early)
-        lab.state("inv2", int(not early), P_set=9e4 + (not early)) if early else lab.measure(1, "inv2")
-        lab.measure(1, "inv2") if early else lab.state("inv2", 1, P_set=9e4 + 1)
-        lab.measure(2, "inv2")
+        lab.state("inv2", int(not early), P_set=9e4 + (not early)) if early else lab.measure(1)
+        lab.measure(1) if early else lab.state("inv2", 1, P_set=9e4 + 1)
+        lab.measure(2)
         decided.append(lab.decided)
 
     assert [state.seq for state in decided[0]] == [1, 2]
@@ -215,17 +215,18 @@ def test_of_what_came_before_the_first_measurement_only_its_own_tick_counts() ->
     lab.prepare(0, "inv2", "inv3")
     lab.state("inv2", 40)
     lab.state("inv3", 41)
-    lab.measure(41, "inv2", "inv3")
-    lab.measure(42, "inv2", "inv3")
+    lab.measure(41)
+    lab.measure(42)
 
     assert lab.missing == [("State(41)", "inv2")]
 
 
 def test_who_is_off_the_roster_is_not_awaited() -> None:
-    """The measurement's roster ends the wait, though the token may still be there."""
+    """A roster without it ends the wait, though its token may still be there."""
     lab = ticking("inv2", "inv3", tick=5)
     lab.state("inv2", 4)
-    lab.measure(5, "inv2")
+    lab.prepare(1, "inv2")
+    lab.measure(5)
 
     assert [state.seq for state in lab.decided] == [5]
 
@@ -233,7 +234,7 @@ def test_who_is_off_the_roster_is_not_awaited() -> None:
 def test_a_dead_neighbours_last_value_counts_once_more() -> None:
     """The wait ends with the token of the process that is awaited, not with a namesake's."""
     lab = ticking("inv2", tick=5)
-    lab.measure(5, "inv2")
+    lab.measure(5)
     lab.token("inv2", "impostor", gone=True)
     assert lab.decided == []
 
@@ -246,7 +247,7 @@ def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
     """First the measurement, then the states; and the deadline says it."""
     lab = ticking("inv2", "inv3", tick=5)
     assert lab.missing == [("Measurement(5)", "plant")]
-    lab.measure(5, "inv2", "inv3")
+    lab.measure(5)
     lab.state("inv3", 4)
 
     assert lab.missing == [("State(4)", "inv2")]
@@ -258,7 +259,7 @@ def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
 def test_a_measurement_of_another_tick_is_refused(k: int, kind: str) -> None:
     """Ticks are granted one by one."""
     lab = ticking("inv2", tick=5)
-    lab.measure(k, "inv2")
+    lab.measure(k)
 
     assert lab.node.rejects.counts == {kind: 1}
 
@@ -266,8 +267,8 @@ def test_a_measurement_of_another_tick_is_refused(k: int, kind: str) -> None:
 def test_a_second_measurement_of_a_tick_is_refused() -> None:
     """A tick is granted once."""
     lab = ticking("inv2", tick=5)
-    lab.measure(5, "inv2")
-    lab.measure(5, "inv2")
+    lab.measure(5)
+    lab.measure(5)
 
     assert lab.node.rejects.counts == {"stale": 1}
 
@@ -284,7 +285,7 @@ def test_a_state_of_a_later_tick_is_left_alone() -> None:
     """The others can only go on without an agent that is off the roster; the plant's word of it may come later."""
     lab = ticking("inv2", tick=5)
     lab.state("inv2", 6)
-    lab.measure(5, "inv2")
+    lab.measure(5)
 
     assert lab.node.rejects.counts == {}
     assert lab.missing == [("State(4)", "inv2")]
