@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gridpeers.cli.commands.grow_command import grow
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ LeaveOut = Annotated[
 ]
 SHOWN = 12
 """Notes that are shown."""
+
+app.command()(grow)
 
 
 @app.command("import")
