@@ -1,4 +1,4 @@
-"""Feeders in Python: of our own tables, or written for OpenDSS."""
+"""Feeders in Python: of our own tables, or written for OpenDSS or GridLAB-D."""
 
 from __future__ import annotations
 
@@ -71,6 +71,37 @@ class Feeder(Tables, frozen=True, kw_only=True):
         from plant.opendss import read_opendss
 
         return cls._of(read_opendss(path, f_nom, leave_out=leave_out, switches=switches))
+
+    @classmethod
+    def from_glm(
+        cls,
+        path: str | Path,
+        f_nom: float | None = None,
+        *,
+        leave_out: Sequence[str] = (),
+        switches: Sequence[str] = (),
+    ) -> Feeder:
+        """Return the feeder of a model for GridLAB-D, as it is at the model's first moment; needs the extra `gridlabd`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The model.
+        f_nom : float, optional
+            Nominal frequency (Hz); the model's if left out.
+        leave_out : sequence of str, optional
+            Objects to do without, as `class.name`, with `*` for any: "house.*".
+        switches : sequence of str, optional
+            Lines that can be opened, beside the model's switches, reclosers and sectionalizers.
+
+        Raises
+        ------
+        plant.tables.FeederError
+            With everything that GridLAB-D refuses, and everything that cannot be represented.
+        """
+        from plant.gridlabd_import.read_glm import read_glm
+
+        return cls._of(read_glm(path, f_nom, leave_out=leave_out, switches=switches))
 
     @classmethod
     def _of(cls, tables: Tables) -> Feeder:

@@ -22,6 +22,8 @@ SMALLEST = 20e3
 """Load (W) below which a section has no inverters of its own."""
 DROOPS = 0.01, 0.05
 """P-f and Q-V droop (pu)."""
+LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "underground_line"}
+"""Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
 MOST_SECTIONS = 12
 """Sections that have inverters, those of most load first."""
 
@@ -140,8 +142,9 @@ def heads(feeder: Feeder, count: int = 3) -> list[str]:
             break
         for row in near:
             reached |= {bus for bus, _ in row.nodes}
-            if row.name.startswith("line.") and len(row.nodes) >= 6:
-                found.append("Line." + row.name.removeprefix("line."))
+            kind, _, name = row.name.partition(".")
+            if kind in LINES and len(row.nodes) >= 6:
+                found.append(f"{LINES[kind]}.{name}")
         rest = [row for row in rest if row not in near]
     return found[:count]
 

@@ -8,20 +8,18 @@ transformers of any connection; loads come over by the law of their `model`.
 from __future__ import annotations
 
 import contextlib
-import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from plant.equipment import NODES, Feeder
+from plant.import_checks import left_out_by, refuse_if, report_unconnected, report_undetermined
 from plant.imported_equipment import LoadPart
-from plant.opendss.dss_connections import report_unconnected, report_undetermined
 from plant.opendss.dss_elements import DssElements
 from plant.opendss.dss_engine import DssEngine
 from plant.opendss.dss_generation import GENERATION, read_generation
 from plant.opendss.dss_loads import read_loads
-from plant.tables.read import FeederError
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""
@@ -40,6 +38,9 @@ MACHINES = frozenset({"windgen", "indmach012", "isource"})
 
 INVERTER_CONTROLS = frozenset({"invcontrol", "expcontrol"})
 """Controls of inverters, which have acted likewise."""
+
+UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
+"""Remedy where nothing determines a voltage to ground."""
 
 
 def read_opendss(
@@ -62,12 +63,12 @@ def read_opendss(
 
 def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[str], switches: Sequence[str]) -> Feeder:
     engine = DssEngine()
-    _refuse_if(path, engine.read(path, scratch))
+    refuse_if(path, engine.read(path, scratch))
     circuit = engine.circuit
-    _refuse_if(path, _too_many_nodes(circuit))
+    refuse_if(path, _too_many_nodes(circuit))
     notes, problems = engine.notes, list[str]()
     everything = _elements(circuit)
-    left_out = _left_out([name for name, _ in everything], leave_out, problems)
+    left_out = left_out_by([name for name, _ in everything], leave_out, problems, "PVSystem.pv1")
     frequency = float(circuit.Solution.Frequency)
     if f_nom is not None and f_nom != frequency:
         problems.append(
@@ -100,7 +101,7 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
     if all(kind != "vsource" for _, kind in there):
         problems.append("no Vsource: a circuit has one, its substation")
     if not elements.source:
-        _refuse_if(path, problems)
+        refuse_if(path, problems)
     feeder = Feeder(
         name=str(circuit.Name),
         load_set="main",
@@ -120,15 +121,10 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         notes=tuple(notes),
     )
     report_unconnected(feeder, problems)
-    _refuse_if(path, problems)
-    report_undetermined(feeder, problems)
-    _refuse_if(path, problems)
+    refuse_if(path, problems)
+    report_undetermined(feeder, problems, UNGROUNDED)
+    refuse_if(path, problems)
     return feeder
-
-
-def _refuse_if(path: Path, problems: list[str]) -> None:
-    if problems:
-        raise FeederError(path.name, tuple(problems))
 
 
 def _elements(circuit: Any) -> list[tuple[str, str]]:
@@ -147,14 +143,3 @@ def _too_many_nodes(circuit: Any) -> list[str]:
     nodes = [str(name).partition(".") for name in circuit.YNodeOrder]
     buses = dict.fromkeys(bus.lower() for bus, _, number in nodes if int(number) > len(NODES))
     return [f"bus {bus}: nodes above {len(NODES)} are not supported; give its nodes lower numbers" for bus in buses]
-
-
-def _left_out(names: list[str], patterns: Sequence[str], problems: list[str]) -> set[str]:
-    """Return the elements that patterns match; note a problem for each pattern that matches none."""
-    left_out: set[str] = set()
-    for pattern in patterns:
-        matching = fnmatch.filter(names, pattern.lower())
-        if not matching:
-            problems.append(f'leave_out: "{pattern}" matches no element; write Class.name, e.g. "PVSystem.pv1"')
-        left_out.update(matching)
-    return left_out

@@ -17,7 +17,9 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, che
 
 FeederName = Annotated[
     str,
-    typer.Argument(metavar="FEEDER", help="A feeder that comes with gridpeers, a folder of tables, or a .dss file."),
+    typer.Argument(
+        metavar="FEEDER", help="A feeder that comes with gridpeers, a folder of tables, or a .dss or .glm file."
+    ),
 ]
 Switches = Annotated[
     list[str] | None,
@@ -35,12 +37,14 @@ app.command()(grow)
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(metavar="FILE.dss", help="Script for OpenDSS, often Master.dss.")],
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for its tables; else the circuit's name.")] = None,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Script for OpenDSS (.dss) or model for GridLAB-D (.glm).")
+    ],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for its tables; else the feeder's name.")] = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
-    """Read a feeder that was written for OpenDSS, and write it as tables that a scenario can name.
+    """Read a feeder that was written for OpenDSS or GridLAB-D, and write it as tables that a scenario can name.
 
     Exit code: 0 it was written, 2 something in it cannot be read or represented; every such element is named.
 
@@ -152,12 +156,18 @@ def plot(
 
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
-    """Read a feeder that was written for OpenDSS, or end with every problem in it."""
+    """Read a feeder that was written for another program, or end with every problem in it."""
     from gridpeers.feeder import Feeder
     from plant.tables import FeederError
 
+    readers = {".dss": Feeder.from_opendss, ".glm": Feeder.from_glm}
+    read = readers.get(Path(name).suffix.lower())
+    if read is None:
+        fail(
+            [f"{name}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"], BAD_INPUT
+        )
     try:
-        return Feeder.from_opendss(name, switches=switches, leave_out=leave_out)
+        return read(name, switches=switches, leave_out=leave_out)
     except FeederError as error:
         refuse(error)
 
@@ -167,10 +177,10 @@ def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> F
     from gridpeers.feeder import Feeder
     from plant.tables import FeederError
 
-    if name.lower().endswith(".dss"):
+    if Path(name).suffix.lower() in (".dss", ".glm"):
         return read_script(name, switch or [], leave_out or [])
     if switch or leave_out:
-        fail(["--switch and --leave-out are for .dss files; a folder's tables can be edited"], BAD_INPUT)
+        fail(["--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited"], BAD_INPUT)
     try:
         return Feeder.read(name)
     except FeederError as error:

@@ -52,7 +52,9 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project, new or empty.")],
     feeder: Annotated[
         Path | None,
-        typer.Option("--feeder", metavar="FILE.dss", help="Island this feeder: inverters and a scenario are proposed."),
+        typer.Option(
+            "--feeder", metavar="FILE", help="Island this feeder, a .dss or .glm file: a scenario is proposed."
+        ),
     ] = None,
     switch: Annotated[
         list[str] | None,

@@ -1,15 +1,18 @@
-"""`gridpeers feeder ...` and `gridpeers init --feeder`, on a feeder written for OpenDSS."""
+"""`gridpeers feeder ...` and `gridpeers init --feeder`, on feeders written for OpenDSS and GridLAB-D."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from plant.tables import read_feeder
 from tests.command_line import invoke
+from tests.unit.plant.gridlabd_import.glm_models import LOADS
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
+pytest.importorskip("gridlabd", reason="GridLAB-D is not installed")
 FEEDERS = Path(__file__).parents[3] / "feeders"
 IEEE13 = str(FEEDERS / "ieee13.dss")
 
@@ -46,11 +49,36 @@ def test_an_imported_feeder_is_checked_solved_and_drawn(elsewhere: Path) -> None
     assert Path("map.svg").stat().st_size > 1000
 
 
+def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
+    """A .glm file is checked, imported, solved and drawn, and becomes an islanding at a line near its substation."""
+    Path("feeder.glm").write_text(LOADS)
+    for words, text in (
+        (("check", "feeder.glm", "--switch", "head"), "switch head: closed; open, it cuts off"),
+        (("import", "feeder.glm", "--out", "mine"), "Tables: mine"),
+        (("solve", "feeder.glm", "--csv", "model.csv"), "lowest"),
+        (("solve", "mine", "--csv", "tables.csv"), "lowest"),
+        (("plot", "mine", "--out", "map.svg"), "Figure: map.svg"),
+    ):
+        code, printed = invoke("feeder", *words)
+        assert code == 0, printed
+        assert text in printed
+    tables, model = (pd.read_csv(f"{name}.csv") for name in ("tables", "model"))
+    assert (tables["V_pu"] - model["V_pu"]).abs().max() < 1e-9
+
+    code, made = invoke("init", "mine-islanded", "--feeder", "feeder.glm")
+
+    assert code == 0, made
+    assert "overhead_line.head is made one" in made
+    assert "switch head islands" in made
+
+
 @pytest.mark.parametrize(("words", "text"), [
     (("import", "nothere.dss"), "there is no such file"),
+    (("import", "nothere.glm"), "there is no such file"),
+    (("import", "bad.txt"), "a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D)"),
     (("check", "nothere"), "no such feeder and no such folder"),
     (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
-    (("plot", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss files"),
+    (("plot", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss and .glm files"),
     (("import", "bad.dss"), "3 problems"),
 ])  # fmt: skip
 def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: tuple[str, ...], text: str) -> None:

@@ -1,0 +1,1 @@
+"""Feeders written for GridLAB-D: it solves the model, we take over its admittances and loads."""
