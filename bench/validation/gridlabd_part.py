@@ -29,7 +29,7 @@ tests go through the first six cases in a fifth of the time.
 
 - Switches and regulators are ideal here, but not in GridLAB-D: there a closed switch is 1e-4 - j1e-4 ohm, and a
   regulator is 1e-4 ohm on its regulated side. All cases but `ideal` have these impedances in our network too
-  (`bench/validation/gridlabd/impedance.py`). Line charging is on in both.
+  (`plant/gridlabd/impedance.py`). Line charging is on in both.
 - A reclosing is rehearsed by our plant: 13-152 closes on the first control period in which its sides are further apart
   than the angle, and its opening is put off by the steps that bring the angle back; the column tells the angle that
   each plant has across the switch in the step before it closes. At 120 degrees both agree in the step of the closing;

@@ -50,7 +50,7 @@ def write_glm(
     str
         The model. Node `n13` is bus 13, `s13-152` the switch between 13 and 152; inverters keep their names.
     """
-    table = {path.stem: _read(path) for path in sorted(folder.glob("*.csv"))}
+    table = {path.stem: read_table(path) for path in sorted(folder.glob("*.csv"))}
     V_nom = {row["bus"]: float(row["V_nom_kV_LL"]) * 1e3 / sqrt(3) for row in table["buses"]}
     inverters = [row for row in table["inverters"] if row.get("spare") != "yes"]
     leaders = {row["bus"] for row in inverters if row["kind"] == "GFM"}
@@ -63,7 +63,8 @@ def write_glm(
     )
 
 
-def _read(path: Path) -> list[dict[str, str]]:
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

@@ -25,10 +25,11 @@ def network_blocks(
     return [
         *_buses(table["buses"], V_nom, table["source"][0], leaders),
         *_lines(table["lines"], table["line_configs"]),
-        *_switches(table["switches"]),
-        *_regulators(table["regulators"]),
+        *_switches(table.get("switches", ())),
+        *_regulators(table.get("regulators", ())),
+        *_transformers(table.get("transformers", ()), V_nom),
         *_loads(table[f"loads_{load_set}"], V_nom),
-        *_capacitors(table["capacitors"], V_nom),
+        *_capacitors(table.get("capacitors", ()), V_nom),
     ]
 
 
@@ -134,6 +135,37 @@ def _regulators(rows: Iterable[TableRow]) -> list[str]:
                 from_=f"n{start}",
                 to=f"n{end}",
                 phases="".join(sorted(tap)) + "N",
+                configuration=f"c{name}",
+            )
+        )
+    return blocks
+
+
+def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Three-phase transformers of equal connections on both sides, at the nominal voltages of their buses."""
+    kinds = {"D-D": ("DELTA_DELTA", "ABCD"), "Yg-Yg": ("WYE_WYE", "ABCN")}
+    blocks = []
+    for row in rows:
+        connection, phases = kinds[row["connection"]]
+        name, start, end = (row[key] for key in ("transformer", "from_bus", "to_bus"))
+        blocks.append(
+            block(
+                "transformer_configuration",
+                name=f"c{name}",
+                connect_type=connection,
+                power_rating=float(row["S_rated_kVA"]),
+                primary_voltage=V_nom[start] * sqrt(3),
+                secondary_voltage=V_nom[end] * sqrt(3),
+                impedance=complex(float(row["R_percent"]), float(row["X_percent"])) / 100,
+            )
+        )
+        blocks.append(
+            block(
+                "transformer",
+                name=f"t{name}",
+                from_=f"n{start}",
+                to=f"n{end}",
+                phases=phases,
                 configuration=f"c{name}",
             )
         )

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
 from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, shortened
-from bench.validation.gridlabd.impedance import with_impedances
 from plant.equipment import InverterRow
 from plant.feeder import Plant
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
 from plant.plant_config import PlantConfig, SwitchEvent
 from plant.plant_interface import PlantLike

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gridpeers.cli.commands.feeder_glm_command import glm
 from gridpeers.cli.commands.grow_command import grow
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
 
 if TYPE_CHECKING:
     from gridpeers.feeder import Feeder
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve and draw feeders.")
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Import, check, solve, draw and export feeders.")
 
 FeederName = Annotated[
     str,
@@ -153,6 +154,9 @@ def plot(
     except OSError as error:
         fail([refusal(out, error)], BAD_INPUT)
     typer.echo(f"Figure: {shown(out)}")
+
+
+app.command()(glm)
 
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:

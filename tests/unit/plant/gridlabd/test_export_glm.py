@@ -1,0 +1,110 @@
+"""A feeder as a model that GridLAB-D runs without us."""
+
+import csv
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from plant.equipment import Feeder, Load
+from plant.feeder import Plant
+from plant.gridlabd.export_glm import export_glm
+from plant.gridlabd.impedance import with_impedances
+from plant.inverter_parameters import GfmParameters
+from plant.network import Network, solve_power_flow
+from plant.plant_config import PlantSettings
+from plant.tables import FeederError, read_feeder
+
+TOLERANCE = 1e-8
+"""Largest difference (pu); GridLAB-D writes 1e-6 V, which is 4e-10 pu."""
+
+RUN = """import gridlabd
+model = gridlabd.DirectGridLabD()
+model.load_glm(["model.glm"])
+model.setup_after_load()
+assert model.run() == gridlabd.GLDErrorCode.SUCCESS
+"""
+
+
+def voltages(text: str, folder: Path) -> dict[str, list[complex]]:
+    """Run a model in the stock wheel; return the phasors A, B, C (V) of its nodes at the start."""
+    pytest.importorskip("gridlabd", reason="GridLAB-D comes with the extra gridlabd")
+    (folder / "model.glm").write_text(text)
+    subprocess.run([sys.executable, "-c", RUN], cwd=folder, check=True, capture_output=True, timeout=100)
+    with (folder / "voltages.csv").open(newline="") as stream:
+        rows = [row for row in csv.reader(stream) if len(row) == 7][1:]
+    return {name: [complex(float(a), float(b)) for a, b in list(pairwise(values))[::2]] for name, *values in rows}
+
+
+def largest_difference(feeder: Feeder, theirs: dict[str, list[complex]]) -> float:
+    """Largest difference (pu) over all nodes of a power flow; behind a delta winding, over phase to phase."""
+    network = Network(with_impedances(feeder))
+    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    floating = {row.to_bus for row in feeder.transformers if row.connection == "D-D"}
+    gaps = []
+    for bus in feeder.buses:
+        index = [network.index(bus.name, phase) for phase in bus.phases]
+        gap = V[index] - [theirs[f"n{bus.name}"]["ABC".index(phase)] for phase in bus.phases]
+        gaps.append(np.abs(gap - gap.mean() if bus.name in floating else gap).max() / bus.V_nom)
+    assert len(gaps) == len(feeder.buses) > 100
+    return float(max(gaps))
+
+
+def test_an_exported_power_flow_has_our_voltages(tmp_path: Path) -> None:
+    """Every node of the IEEE 123-node feeder, run by GridLAB-D from the exported model, has the voltage it has here."""
+    feeder = read_feeder("standard123")
+
+    theirs = voltages(export_glm(feeder, PlantSettings(), 1, "voltages.csv"), tmp_path)
+
+    assert largest_difference(feeder, theirs) < TOLERANCE
+
+
+def test_transformers_and_regulators_of_any_ratio_are_exported(tmp_path: Path) -> None:
+    """A loaded grounded transformer, and regulators between two taps, one ratio a phase, give the same voltages."""
+    feeder = read_feeder("standard123")
+    ratios = {"reg1": 1.0321, "reg2": 0.9875}
+    feeder = replace(
+        feeder,
+        transformers=tuple(replace(row, connection="Yg-Yg") for row in feeder.transformers),
+        regulators=tuple(replace(row, ratio=ratios.get(row.name, row.ratio)) for row in feeder.regulators),
+        loads=(*feeder.loads, Load(bus="610", connection="Y", model="P", S=(40e3 + 1e4j, 2e4 + 0j, 3e4 + 2e4j))),
+    )
+
+    theirs = voltages(export_glm(feeder, PlantSettings(), 1, "voltages.csv"), tmp_path)
+
+    assert largest_difference(feeder, theirs) < TOLERANCE
+
+
+def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None:
+    """GridLAB-D begins with the terminal voltages that our plant has with the same parameters and set-points."""
+    feeder = read_feeder("microgrid123", "event2")
+    settings = PlantSettings(P_set0=0.5, gfm=GfmParameters(X_f=0.2))
+
+    text = export_glm(feeder, settings, 1, "voltages.csv")
+    theirs = voltages(text, tmp_path)
+
+    assert text.count("Xfilter 0.2;") == 3
+    ours = Plant(Network(with_impedances(feeder)), settings, settings.h, settings.h).measure()
+    for row in feeder.inverters:
+        V = sum(abs(phasor) for phasor in theirs[f"n{row.bus}"]) / 3.0
+        assert abs(V - ours[row.name].V) / row.V_nom < TOLERANCE, row.name
+
+
+def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
+    """No substation, another frequency and a name that GridLAB-D does not take are three problems of one error."""
+    feeder = read_feeder("microgrid123")
+    first, *others = feeder.inverters
+    feeder = replace(feeder, source=None, f_nom=50.0, inverters=(replace(first, name="1st"), *others))
+
+    with pytest.raises(FeederError) as error:
+        export_glm(feeder, PlantSettings(), 1, "voltages.csv")
+
+    assert error.value.problems == (
+        "microgrid123 has no source.csv; GridLAB-D needs a substation as its swing bus",
+        "microgrid123 has 50 Hz; the model is written for 60 Hz",
+        'inverter "1st": GridLAB-D takes letters, digits, _ . and -, a letter first; rename it',
+    )
