@@ -130,9 +130,10 @@ class Dynamics:
         network.note()
         return out
 
-    def _advance(self, begin: int, steps: int, out: Real) -> int:
-        units, network = self.inverters, self.network
-        arrays = Units(
+    def arrays(self) -> Units:
+        """Return the state of all inverters as the compiled passes take it; they write into it."""
+        units = self.inverters
+        return Units(
             units.f_nom,
             units.gfm,
             units.gfm_at,
@@ -144,15 +145,18 @@ class Dynamics:
             units.gfl_state,
             self._gfl_0,
             self._gfl_d,
-            network.reduction.online,
+            self.network.reduction.online,
             units.set_points,
             units.J,
             self._J_0,
             units.V,
             units.I,
         )
-        tolerance = TOLERANCE * float(units.V_b.max(initial=1.0))
-        return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
+
+    def _advance(self, begin: int, steps: int, out: Real) -> int:
+        network = self.network
+        tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))
+        return run_steps(begin, steps, self.h, tolerance, network.net, self.arrays(), network.x, out)
 
     def _return(self) -> None:
         """Go back to the start of the step that failed."""

@@ -1,4 +1,4 @@
-"""Small circuits for the plant's checks: a stiff bus, a lone inverter, two inverters, the autotest system."""
+"""Small circuits for the plant's checks: a stiff bus, a lone inverter, two inverters."""
 
 from __future__ import annotations
 
@@ -96,48 +96,3 @@ def pair(first: GfmParameters, second: GfmParameters, load: float) -> Dynamics:
     dynamics = Dynamics(network, (inverter(first), inverter(second)), 0.002)
     dynamics.start(np.full(2, load / 2.0), np.zeros(2))
     return dynamics
-
-
-LINES = (
-    ("Meter1", "Load1", 0.01 + 0.01j, 0.0106 + 0.0103j),
-    ("Load1", "Load2", 0.0035 + 0.0034j, 0.0035 + 0.0034j),
-    ("Load2", "Load3", 0.0279 + 0.0115j, 0.0279 + 0.0115j),
-    ("Meter1", "Meter3", 0.0189 + 0.0968j, 0.0189 + 0.0968j),
-    ("Meter3", "Load4", 0.0350 + 0.0116j, 0.0350 + 0.0116j),
-)
-"""GridLAB-D's test_inverter_dyn_GFM_GFL: from, to, ohm of phase A, ohm of phases B and C."""
-
-
-def autotest_circuit(z_load4: complex) -> Circuit:
-    """Make the autotest system with Load4 at this impedance (ohm)."""
-    buses = ("Meter1", "Load1", "Load2", "Load3", "Meter3", "Load4")
-    start = {bus: 3 * i for i, bus in enumerate(buses)}
-    Y = np.zeros((18, 18), complex)
-    for first, second, z_A, z_BC in LINES:
-        for phase in range(3):
-            y = 1.0 / (z_A if phase == 0 else z_BC)
-            i, j = start[first] + phase, start[second] + phase
-            Y[i, i] += y
-            Y[j, j] += y
-            Y[i, j] -= y
-            Y[j, i] -= y
-    for phase in range(3):
-        Y[start["Load1"] + phase, start["Load1"] + phase] += 1.0 / 2.42
-        Y[start["Load4"] + phase, start["Load4"] + phase] += 1.0 / z_load4
-    terminals = [[start[bus] + phase for phase in range(3)] for bus in ("Meter1", "Load2")]
-    return circuit(Y, terminals)
-
-
-def autotest(gfl: GflParameters) -> Dynamics:
-    """Start the autotest system: its swing phasors are those of its file, of which B and C are rounded."""
-    gfm = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
-    # its mp is 3.77 rad/s per pu, not 1 % to the last digit
-    former = inverter(gfm, m_p=3.77 / (2.0 * np.pi * 60.0))
-    dynamics = Dynamics(autotest_circuit(5.76), (former, inverter(gfl)), 0.002)
-    swing = np.array([277.1363, -138.5682 - 240.0j, -138.5682 + 240.0j]) / V_B
-    dynamics.start(np.array([0.3, 0.3]), np.array([0.0, 0.05]), swing_voltage=swing)
-    return dynamics
-
-
-AUTOTEST_GFL = GflParameters(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)
-"""Inverter A2 of the autotest."""

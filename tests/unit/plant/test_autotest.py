@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.unit.plant.circuits import AUTOTEST_GFL, autotest, autotest_circuit
+from bench.validation.autotests.gfm_gfl_case import GFL, Z_LOAD4, gfm_gfl_circuit, gfm_gfl_dynamics
 
 # t label (s): published P_A (W, loose initial convergence), tight P_A (W), tight f (Hz)
 TRAJECTORY = {
@@ -31,7 +31,7 @@ TRAJECTORY = {
 
 def test_the_autotest_starts_where_gridlabd_starts() -> None:
     """Row 25: initial power, P_set and V_set are those of GridLAB-D with tight tolerances."""
-    units = autotest(AUTOTEST_GFL).inverters
+    units = gfm_gfl_dynamics().inverters
 
     S = units.V[0] * np.conj(units.J[0] - units.y_f[0] * units.V[0])
 
@@ -43,17 +43,17 @@ def test_the_autotest_starts_where_gridlabd_starts() -> None:
 
 def test_the_autotest_trajectory_is_gridlabds() -> None:
     """Row 25: power of phase A and frequency follow GridLAB-D through two load steps, to 1e-4 W and 1e-6 Hz."""
-    plant = autotest(AUTOTEST_GFL)
+    plant = gfm_gfl_dynamics()
     units = plant.inverters
     seen = {}
     first_solution = None
     for step in range(999, 3000):
         t = round(step * plant.h, 3)
         if t == 2.0:
-            plant.connect(autotest_circuit(2.304 + 4.608j))
+            plant.connect(gfm_gfl_circuit(Z_LOAD4[1]))
             first_solution = (units.V[0, 0] * np.conj(units.J[0, 0] - units.y_f[0] * units.V[0, 0])).real
         elif t == 4.0:
-            plant.connect(autotest_circuit(2.304))
+            plant.connect(gfm_gfl_circuit(Z_LOAD4[2]))
         f = plant.run(1)[0, 0, 0]
         seen[t] = ((units.V[0, 0] * np.conj(units.I[0, 0])).real, f)
 
@@ -67,7 +67,7 @@ def test_the_autotest_trajectory_is_gridlabds() -> None:
 @pytest.mark.parametrize("model", ["voltage_source", "current_source"])
 def test_an_equilibrium_stays(model: str) -> None:
     """Row 2: without an event nothing moves for 10 s, in both representations of the GFL."""
-    plant = autotest(replace(AUTOTEST_GFL, model=model))
+    plant = gfm_gfl_dynamics(replace(GFL, model=model))
     start = plant.readings()
 
     out = plant.run(5000)
@@ -80,8 +80,8 @@ def test_both_representations_of_the_gfl_settle_alike() -> None:
     """The current source and the voltage source differ in the first milliseconds, not in where they end."""
     ends = []
     for model in ("voltage_source", "current_source"):
-        plant = autotest(replace(AUTOTEST_GFL, model=model))
-        plant.connect(autotest_circuit(2.304 + 4.608j))
+        plant = gfm_gfl_dynamics(replace(GFL, model=model))
+        plant.connect(gfm_gfl_circuit(Z_LOAD4[1]))
         ends.append(plant.run(5000)[-1])
 
     assert ends[0][:, 1:3] == pytest.approx(ends[1][:, 1:3], abs=0.1)

@@ -1,0 +1,1 @@
+"""Cases of GridLAB-D's own autotests, written anew from their parameters: for its delta mode, and for our plant."""

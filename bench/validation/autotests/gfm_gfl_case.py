@@ -1,0 +1,90 @@
+"""GridLAB-D's autotest of a grid-forming and a grid-following inverter, `test_inverter_dyn_GFM_GFL`: its parameters.
+
+Six buses of 480 V; the GFM at Meter1, the GFL at Load2. The load at Load4 changes twice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from plant.dynamics import Circuit, Dynamics, Inverter
+from plant.dynamics.load_law import LoadLaw
+from plant.inverter_parameters import GflParameters, GfmParameters
+
+H = 0.002
+"""Step (s)."""
+
+S_B = 200e3
+"""Rating of either inverter (VA)."""
+
+V_B = 277.1363
+"""Nominal voltage (V, line-to-neutral)."""
+
+SWING = (277.1363 + 0j, -138.5682 - 240j, -138.5682 + 240j)
+"""Phasors at Meter1 at the start (V), of which the autotest has B and C rounded."""
+
+M_P = 3.77 / (2.0 * np.pi * 60.0)
+"""Droop of the GFM (pu): its mp is 3.77 rad/s per pu, not 1 % to the last digit."""
+
+BUSES = ("Meter1", "Load1", "Load2", "Load3", "Meter3", "Load4")
+
+LINES = (
+    ("Meter1", "Load1", 0.01 + 0.01j, 0.0106 + 0.0103j),
+    ("Load1", "Load2", 0.0035 + 0.0034j, 0.0035 + 0.0034j),
+    ("Load2", "Load3", 0.0279 + 0.0115j, 0.0279 + 0.0115j),
+    ("Meter1", "Meter3", 0.0189 + 0.0968j, 0.0189 + 0.0968j),
+    ("Meter3", "Load4", 0.0350 + 0.0116j, 0.0350 + 0.0116j),
+)
+"""From, to, ohm of phase A, ohm of phases B and C."""
+
+Z_LOAD1 = 2.42
+"""Each phase (ohm)."""
+
+Z_LOAD4 = (5.76, 2.304 + 4.608j, 2.304)
+"""Each phase (ohm): at the start, and after each change."""
+
+TERMINALS = {"GFM": "Meter1", "GFL": "Load2"}
+"""Bus of each inverter."""
+
+START_POWER = {"GFM": 60e3 + 0j, "GFL": 60e3 + 10e3j}
+"""What they deliver at the start (VA); the GFM's, which holds the voltage, is a first guess."""
+
+GFM = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
+GFL = GflParameters(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)
+
+
+def gfm_gfl_circuit(z_load4: complex) -> Circuit:
+    """Return the network with Load4 at this impedance (ohm)."""
+    start = {bus: 3 * i for i, bus in enumerate(BUSES)}
+    Y = np.zeros((18, 18), complex)
+    for first, second, z_A, z_BC in LINES:
+        for phase, z in enumerate((z_A, z_BC, z_BC)):
+            i, j = start[first] + phase, start[second] + phase
+            Y[[i, j], [i, j]] += 1.0 / z
+            Y[[i, j], [j, i]] -= 1.0 / z
+    for bus, z in (("Load1", Z_LOAD1), ("Load4", z_load4)):
+        own = np.arange(start[bus], start[bus] + 3)
+        Y[own, own] += 1.0 / z
+    none = np.zeros(0, complex)
+    return Circuit(
+        Y=sp.csc_array(Y),
+        sources=np.arange(0),
+        source_voltage=none,
+        terminals=np.array([[start[bus] + phase for phase in range(3)] for bus in TERMINALS.values()], np.int64),
+        C=sp.csc_array((18, 0)),
+        loads=LoadLaw(S=none, I0=none),
+        V_branch=none,
+    )
+
+
+def gfm_gfl_dynamics(gfl: GflParameters = GFL) -> Dynamics:
+    """Return our plant of the case at rest, perhaps with another GFL."""
+    units = (
+        Inverter(name="GFM", kind="GFM", S_b=S_B, V_b=V_B, m_p=M_P, m_q=0.05, parameters=GFM),
+        Inverter(name="GFL", kind="GFL", S_b=S_B, V_b=V_B, m_p=0.01, m_q=0.05, parameters=gfl),
+    )
+    dynamics = Dynamics(gfm_gfl_circuit(Z_LOAD4[0]), units, H)
+    start = np.array(list(START_POWER.values())) / S_B
+    dynamics.start(start.real, start.imag, swing_voltage=np.array(SWING, np.complex128) / V_B)
+    return dynamics

@@ -1,0 +1,168 @@
+"""The feeder of GridLAB-D's secondary-control autotest as tables: IEEE 123, islanded, with four inverters.
+
+The tables are those of `standard123` with what the autotest changes: conductors and distances instead of published
+impedances, no line charging, other loads and switches, and 2401.7 V as nominal voltage.
+"""
+
+from __future__ import annotations
+
+import csv
+from math import pi, sqrt
+from pathlib import Path
+
+import plant
+from bench.validation.autotests.line_constants import Conductor, Impedance, cable_impedance, overhead_impedance
+
+V_NOM = 2401.7
+"""Nominal voltage (V, line-to-neutral)."""
+
+MILE = 1.609344
+"""In km."""
+
+Row = dict[str, str]
+Tables = dict[str, list[Row]]
+
+TABLES = Path(plant.__file__).parent / "data" / "standard123"
+
+ACSR_336, ACSR_1_0, ACSR_4_0 = Conductor(0.306, 0.0244), Conductor(1.12, 0.00446), Conductor(0.592, 0.00814)
+
+AT_POLE = {"left": 5.656854, "middle": 4.272002, "right": 5.0}
+"""Distance to the neutral (ft) from the three places on the cross-arm, which are 2.5 and 4.5 ft apart."""
+
+APART = {frozenset(("left", "middle")): 2.5, frozenset(("middle", "right")): 4.5, frozenset(("left", "right")): 7.0}
+
+PLACES = {
+    "1": {"A": "left", "B": "middle", "C": "right"},
+    "2": {"A": "middle", "B": "right", "C": "left"},
+    "3": {"A": "right", "B": "left", "C": "middle"},
+    "4": {"A": "right", "B": "middle", "C": "left"},
+    "5": {"A": "middle", "B": "left", "C": "right"},
+    "6": {"A": "left", "B": "right", "C": "middle"},
+    "7": {"A": "left", "C": "right"},
+    "8": {"A": "left", "B": "right"},
+}
+"""Where each phase of a configuration hangs."""
+
+SINGLE_PHASE = {"9": ("A", ACSR_1_0), "10": ("B", ACSR_336), "11": ("C", ACSR_336)}
+"""Phase and wire, also of the neutral 5 ft away; the autotest has larger wires than IEEE in 10 and 11."""
+
+WITHOUT_LOAD = {"50", "66", "99", "102", "103", "104", "106", "107", "109", "111", "114"}
+
+BALANCED_LOADS = {"42": 20 + 10j, "101": 90.001 + 43.334j, "251": 137 + 45j}
+"""Constant power on each phase (kVA); 251 is the load that the event connects."""
+
+CAPACITOR_X = {200.0: 28.8427, 50.0: 115.7067}
+"""Reactance (ohm) of the banks, by their kvar."""
+
+INVERTERS = {
+    "Inv1": ("GFL", "18", 350.0),
+    "Inv2": ("GFM", "151", 1000.0),
+    "Inv3": ("GFL", "105", 500.0),
+    "Inv4": ("GFM", "108", 500.0),
+}
+"""Kind, bus and rating (kW)."""
+
+
+def island_tables() -> Tables:
+    """Return the tables with the load at 251 switched off; a machine stands in for the substation of `source`."""
+    tables = {path.stem: _read(path) for path in sorted(TABLES.glob("*.csv")) if path.stem != "published_voltages"}
+    tables["line_configs"] = _line_configs()
+    for line in tables["lines"]:
+        if {line["from_bus"], line["to_bus"]} == {"51", "151"}:
+            line["length_m"] = repr(700 * 0.3048)
+    for bus in tables["buses"]:
+        if float(bus["V_nom_kV_LL"]) > 1.0:
+            bus["V_nom_kV_LL"] = repr(V_NOM * sqrt(3.0) / 1e3)
+    tables["buses"].append(tables["buses"][0] | {"bus": "251", "phases": "ABC"})
+    tables["loads_main"] = _loads(tables["loads_main"])
+    for bank in tables["capacitors"]:
+        for key in ("Q_a_kvar", "Q_b_kvar", "Q_c_kvar"):
+            if Q := float(bank[key]):
+                bank[key] = repr(V_NOM**2 / CAPACITOR_X[Q] / 1e3)
+        bank["V_rated_kV_LN"] = repr(V_NOM / 1e3)
+    _set_switch(tables, "97", "197", "open")
+    _set_switch(tables, "151", "300", "closed")
+    _set_switch(tables, "250", "251", "open")
+    tables["inverters"] = [
+        {
+            "name": name,
+            "kind": kind,
+            "bus": bus,
+            "microgrid": "island",
+            "P_rated_kW": repr(kW),
+            # its mp is 3.77 rad/s per pu, not 1 % to the last digit; the GFL have no droop in use
+            "m_p_pu": repr(3.77 / (2.0 * pi * 60.0)),
+            "m_q_pu": "0.05",
+        }
+        for name, (kind, bus, kW) in INVERTERS.items()
+    ]
+    return tables
+
+
+def write_tables(tables: Tables, folder: Path) -> None:
+    """Write tables as the CSV files of a feeder."""
+    for name, rows in tables.items():
+        with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+
+
+def _read(path: Path) -> list[Row]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _set_switch(tables: Tables, first: str, second: str, state: str) -> None:
+    for switch in tables["switches"]:
+        if {switch["from_bus"], switch["to_bus"]} == {first, second}:
+            switch["state"] = state
+            return
+    given = {"from_bus": first, "to_bus": second, "phases": "ABC", "state": state}
+    tables["switches"].append(dict.fromkeys(tables["switches"][0], "") | given)
+
+
+def _loads(rows: list[Row]) -> list[Row]:
+    """Return the loads: their impedances and currents keep the values that they have at 4160 V."""
+    ratio = V_NOM * sqrt(3.0) / 4160.0
+    factor = {"P": 1.0, "I": ratio, "Z": ratio**2}
+    powers = [key for key in rows[0] if key.startswith(("P_", "Q_"))]
+    loads = []
+    for row in rows:
+        if row["bus"] not in WITHOUT_LOAD | set(BALANCED_LOADS):
+            load = row | {key: repr(float(row[key]) * factor[row["model"]]) for key in powers}
+            loads.append(load | {"Q_c_kvar": "25"} if row["bus"] == "49" else load)
+    for bus, S in BALANCED_LOADS.items():
+        power = {key: repr(S.real if key.startswith("P_") else S.imag) for key in powers}
+        loads.append(rows[0] | {"bus": bus, "connection": "Y", "model": "P"} | power)
+    return loads
+
+
+def _line_configs() -> list[Row]:
+    rows = []
+    for name, (phases, Z) in _impedances().items():
+        for i, first in enumerate(phases):
+            for j, second in enumerate(phases[i:], i):
+                per_km = complex(Z[i, j]) / MILE
+                numbers = {"R_ohm_per_km": per_km.real, "X_ohm_per_km": per_km.imag, "B_uS_per_km": 0.0}
+                ends = {"config": name, "phase_1": first, "phase_2": second}
+                rows.append(ends | {key: repr(number) for key, number in numbers.items()})
+    return rows
+
+
+def _impedances() -> dict[str, tuple[str, Impedance]]:
+    """Return phases and impedance (ohm per mile) of each configuration."""
+    impedances = {}
+    for name, place in PLACES.items():
+        phases = "".join(sorted(place))
+        between = [[APART.get(frozenset((place[i], place[j])), 0.0) for j in phases] for i in phases]
+        to_neutral = [AT_POLE[place[phase]] for phase in phases]
+        if name == "2":  # the autotest has A and B of this configuration the other way round, to the neutral alone
+            to_neutral[0], to_neutral[1] = to_neutral[1], to_neutral[0]
+        impedances[name] = phases, overhead_impedance(between, to_neutral, ACSR_336, ACSR_4_0)
+    for name, (phase, wire) in SINGLE_PHASE.items():
+        impedances[name] = phase, overhead_impedance([[0.0]], [5.0], wire, wire)
+    core = Conductor(0.97, 0.0111)
+    radius = (1.06 - 0.0640837) / 24.0
+    impedances["12"] = "ABC", cable_impedance((0.0, 0.5, 1.0), core, core, 6, radius)
+    return impedances
