@@ -1,64 +1,52 @@
-"""A grid of somebody else, as a HELICS federate: it imports nothing of gridpeers, which controls its inverters.
+"""A grid of somebody else, as a HELICS federate: it imports nothing of gridpeers, whose agents control its inverters.
 
-Nine inverters share one bus by droop. The substation carries what they do not, until it is lost at 1 s; at 4 s the
-load drops. Start a broker (helics_broker -f 2), this, and: gridpeers run examples/helics_islanding.toml --plant helics
+Nine inverters share one bus by droop. The substation is lost at 1 s, and the load falls at 4 s (docs/helics.md).
 """
 
 import sys
 
-import helics
+import helics as h
 
 BROKER = sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:23404"
-END, STEP, ISLANDED, DROPPED = 7.0, 0.01, 1.0, 4.0  # s
-S = {f"inv{i}": 600e3 if i in (1, 4, 7) else 350e3 for i in range(1, 10)}  # VA
+END = float(sys.argv[2]) if len(sys.argv) > 2 else 7.0  # s
+STEP, ISLANDED, FALLS = 0.01, 1.0, 4.0  # s
+RATING = {f"inv{i}": 600e3 if i in (1, 4, 7) else 350e3 for i in range(1, 10)}  # VA
 M_P, M_Q, F_NOM, V_NOM = 0.01, 0.05, 60.0, 2401.8  # droops in pu, Hz, V
-SENSORS = (("f", "Hz"), ("P", "W"), ("Q", "var"), ("V", "V"))
 
-info = helics.helicsCreateFederateInfo()
-helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
-helics.helicsFederateInfoSetCoreInitString(info, f"--federates=1 --broker_address={BROKER}")
-helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
-fed = helics.helicsCreateValueFederate("somebody", info)
-double = helics.HELICS_DATA_TYPE_DOUBLE
-sensors = {
-    name: [helics.helicsFederateRegisterGlobalPublication(fed, f"grid/{name}/{x}", double, u) for x, u in SENSORS]
-    for name in S
-}
-P_sets = {name: helics.helicsFederateRegisterSubscription(fed, f"grid/{name}/P_set", "W") for name in S}
-V_sets = {name: helics.helicsFederateRegisterSubscription(fed, f"grid/{name}/V_set", "V") for name in S}
-fed_by_grid = {
-    name: helics.helicsFederateRegisterGlobalPublication(
-        fed, f"grid/{name}/grid_connected", helics.HELICS_DATA_TYPE_BOOLEAN, ""
-    )
-    for name in S
-}
-for name in S:  # until the first set-points come
-    helics.helicsInputSetDefaultDouble(P_sets[name], 0.647 * S[name])
-    helics.helicsInputSetDefaultDouble(V_sets[name], V_NOM * (1.0 + 0.001 * S[name] / 350e3))
+info = h.helicsCreateFederateInfo()
+h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+h.helicsFederateInfoSetCoreInitString(info, f"--federates=1 --broker_address={BROKER}")
+h.helicsFederateInfoSetFlagOption(info, h.HELICS_FLAG_UNINTERRUPTIBLE, True)  # set-points must not wake it early
+me = h.helicsCreateValueFederate("their-grid", info)
+out, in_ = {}, {}
+for name, rating in RATING.items():
+    for what, unit in {"f": "Hz", "P": "W", "Q": "var", "V": "V"}.items():
+        key = f"grid/{name}/{what}"
+        out[name, what] = h.helicsFederateRegisterGlobalPublication(me, key, h.HELICS_DATA_TYPE_DOUBLE, unit)
+    key = f"grid/{name}/grid_connected"
+    out[name, "fed"] = h.helicsFederateRegisterGlobalPublication(me, key, h.HELICS_DATA_TYPE_BOOLEAN, "")
+    for what, unit, first in (("P_set", "W", 0.647 * rating), ("V_set", "V", V_NOM)):
+        in_[name, what] = h.helicsFederateRegisterSubscription(me, f"grid/{name}/{what}", unit)
+        h.helicsInputSetDefaultDouble(in_[name, what], first)
 
 
-def publish(t: float) -> None:
-    """Solve the droops with the set-points of now, and publish what the sensors show at t."""
-    P = {name: helics.helicsInputGetDouble(topic) for name, topic in P_sets.items()}
-    V = {name: helics.helicsInputGetDouble(topic) / V_NOM for name, topic in V_sets.items()}
-    load = 2.4e6 if t < DROPPED else 2.0e6
-    surplus = (sum(P.values()) - load) / sum(S.values()) if t > ISLANDED else 0.0  # pu
-    V_bus = sum(V.values()) / len(V)
-    for name, rating in S.items():
-        values = (
-            F_NOM * (1.0 + M_P * surplus),
-            P[name] - surplus * rating,
-            (V[name] - V_bus) / M_Q * rating,
-            V_bus * V_NOM,
-        )
-        for topic, value in zip(sensors[name], values, strict=True):
-            helics.helicsPublicationPublishDouble(topic, value)
-        helics.helicsPublicationPublishBoolean(fed_by_grid[name], int(t <= ISLANDED))
+def solve_and_publish(t: float) -> None:
+    """Find the common frequency and voltage under the set-points of now, and publish what the sensors show at t."""
+    got = {key: h.helicsInputGetDouble(topic) for key, topic in in_.items()}
+    load = 2.0e6 if t > FALLS else 2.4e6
+    surplus = (sum(got[n, "P_set"] for n in RATING) - load) / sum(RATING.values()) if t > ISLANDED else 0.0  # pu
+    V = sum(got[n, "V_set"] for n in RATING) / len(RATING)
+    for n, rating in RATING.items():
+        h.helicsPublicationPublishDouble(out[n, "f"], F_NOM * (1.0 + M_P * surplus))
+        h.helicsPublicationPublishDouble(out[n, "P"], got[n, "P_set"] - surplus * rating)
+        h.helicsPublicationPublishDouble(out[n, "Q"], (got[n, "V_set"] - V) / V_NOM / M_Q * rating)
+        h.helicsPublicationPublishDouble(out[n, "V"], V)
+        h.helicsPublicationPublishBoolean(out[n, "fed"], int(t <= ISLANDED))
 
 
-helics.helicsFederateEnterExecutingMode(fed)
-publish(0.0)
+h.helicsFederateEnterExecutingMode(me)
+solve_and_publish(0.0)
 for k in range(1, round(END / STEP) + 1):
-    helics.helicsFederateRequestTime(fed, k * STEP)
-    publish(k * STEP)
-helics.helicsFederateDisconnect(fed)
+    h.helicsFederateRequestTime(me, k * STEP)
+    solve_and_publish(k * STEP)
+h.helicsFederateDisconnect(me)

@@ -26,11 +26,11 @@ def start_plant(config: PlantConfig) -> LivePlant:
 
         return HelicsPlant(config, _feeder(config))
     plant = build_plant(config)
-    if config.bridged:
-        from plant.helics.bridged_plant import BridgedPlant
+    if not config.bridged:
+        return plant
+    from plant.helics.bridged_plant import BridgedPlant
 
-        return BridgedPlant(plant, config)
-    return plant
+    return BridgedPlant(plant, config)
 
 
 def build_plant(config: PlantConfig) -> Plant:

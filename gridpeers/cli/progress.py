@@ -19,7 +19,7 @@ COMPILING = "still starting: the first run ever compiles the plant's inner loop,
 
 
 @contextmanager
-def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
+def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[Tell]:
     """Yield the function that takes the progress of each case; its first call for a case, at t = 0, is the start.
 
     Parameters
@@ -28,8 +28,10 @@ def progress(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
         Where to.
     cases : tuple[str, ...]
         Names of the cases, in the order in which they run.
+    explanation : str, optional
+        Why a start may take long.
     """
-    with explained(lambda: console.print(COMPILING, highlight=False, soft_wrap=True)) as started:
+    with explained(lambda: console.print(explanation, highlight=False, soft_wrap=True)) as started:
         if console.is_terminal:
             with _bars(console, cases) as tell:
                 yield _both(started, tell)

@@ -23,10 +23,12 @@ MISSING = "HELICS is not installed; install it: pip install 'gridpeers[helics]'"
 IMPORT = 60.0
 """Longest time (s) until the process has imported HELICS, on a machine that is busy."""
 
-FAREWELL = 5.0
+FAREWELL = 3.0
 """Longest wait (s) for the process to leave the federation."""
 
-ASK = 2.0
+BEFORE = "before t = 0"
+
+ASK = 1.5
 """Longest wait (s) for the answer where the others are."""
 
 
@@ -60,7 +62,9 @@ class HelicsFederate:
         deadline: float,
     ) -> None:
         self._settings, self._deadline = settings, deadline
-        self._when = "before t = 0"
+        self._when = BEFORE
+        self._others = "nobody"
+        """Names of the other federates."""
         self._rest = b""
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
         self._process = subprocess.Popen(
@@ -73,27 +77,24 @@ class HelicsFederate:
         assert self._process.stdout is not None
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._process.stdout, selectors.EVENT_READ)
-        try:
-            if "error" in self._take(IMPORT, f"its process did not start within {IMPORT:g} s"):
-                raise HelicsError(MISSING)
-            host, port = endpoint(settings.broker)
-            self._ask(
-                {
-                    "do": "join",
-                    "name": settings.name,
-                    "host": host,
-                    "port": port,
-                    "federates": settings.federates,
-                    "wait": 0.9 * deadline,
-                    "publications": publications,
-                    "subscriptions": subscriptions,
-                },
-                f"{settings.broker} does not answer as a HELICS broker within {deadline:g} s; "
-                "is it one, of core type ZMQ?",
-            )
-        except HelicsError:
-            self.abort("it could not join")
-            raise
+        if "error" in self._take(IMPORT, f"its process did not start within {IMPORT:g} s"):
+            self.abort(MISSING)
+            raise HelicsError(MISSING)
+        host, port = endpoint(settings.broker)
+        late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
+        self._ask(
+            {
+                "do": "join",
+                "name": settings.name,
+                "host": host,
+                "port": port,
+                "federates": settings.federates,
+                "wait": 0.9 * deadline,
+                "publications": publications,
+                "subscriptions": subscriptions,
+            },
+            late,
+        )
 
     def begin(self, publish: Mapping[str, Value]) -> dict[str, Any]:
         """Publish what holds at t = 0 and wait for the federation; return who publishes what we need.
@@ -106,18 +107,20 @@ class HelicsFederate:
         settings = self._settings
         wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
         late = f"the federation at {settings.broker} did not begin within {self._deadline:g} s ({wanted})"
-        return self._ask({"do": "begin", "publish": publish}, late)
+        federation = self._ask({"do": "begin", "publish": publish}, late)
+        self._others = " or ".join(federation["others"]) or "the broker"
+        return federation
 
-    def step(self, publish: Mapping[str, Value], t: float) -> dict[str, Value]:
-        """Publish, go to a time (s), and return the values that were published since the last step, by key."""
-        late = f"no grant of t = {t:g} s within {self._deadline:g} s"
-        answer = self._ask({"do": "step", "publish": publish, "time": t}, late)
+    def step(self, publish: Mapping[str, Value], t: float, after: float = 0.0) -> dict[str, Value]:
+        """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key."""
+        late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
+        answer = self._ask({"do": "step", "publish": publish, "time": t + after}, late)
         if answer["gone"]:
             raise HelicsError(
                 f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
                 "let it run at least as long as the scenario"
             )
-        self._when = f"t = {answer['granted']:g} s"
+        self._when = f"t = {t:g} s"
         values: dict[str, Value] = answer["values"]
         return values
 
@@ -131,7 +134,9 @@ class HelicsFederate:
             self.abort("")
 
     def abort(self, reason: str) -> None:
-        """End the process; if it is in a federation still, the others get the reason."""
+        """End the process, unless it has ended; if it is in a federation still, the others get the reason."""
+        if self._log.closed:
+            return
         if self._process.poll() is None:
             self._send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
         try:
@@ -146,9 +151,13 @@ class HelicsFederate:
 
     def _ask(self, request: Mapping[str, Any], late: str) -> dict[str, Any]:
         self._send(request)
-        answer = self._take(self._deadline, late)
-        if "error" in answer:
-            raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'])}")
+        try:
+            answer = self._take(self._deadline, late)
+            if "error" in answer:
+                raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'], request['do'])}")
+        except HelicsError as error:
+            self.abort(str(error))
+            raise
         return answer
 
     def _send(self, request: Mapping[str, Any]) -> None:
@@ -171,7 +180,8 @@ class HelicsFederate:
             if "stand" in answer:
                 stand = answer["stand"]
                 break
-        where = f": {', '.join(stand)}" if stand else ""
+        silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
+        where = f": {', '.join(stand)}" if stand else silent
         raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise processes.deadline_s")
 
     def _answer(self, until: float) -> dict[str, Any] | None:
@@ -190,7 +200,7 @@ class HelicsFederate:
         answer: dict[str, Any] = json.loads(line)
         return answer
 
-    def _explained(self, error: str) -> str:
+    def _explained(self, error: str, doing: str) -> str:
         """Return an error of HELICS with what it means."""
         broker = self._settings.broker
         if error.startswith("no broker"):
@@ -200,5 +210,5 @@ class HelicsFederate:
         if "lost comms" in error:
             return f"a federate at {broker} died without leaving ({error})"
         if "duplicate" in error.lower():
-            return f'{error}; the name "{self._settings.name}" is taken at {broker}: choose another with --name'
-        return error
+            return f'{error}; the name "{self._settings.name}" is taken at {broker}: choose another plant.helics.name'
+        return error if doing == "join" else f"the federation ended: {error}"

@@ -34,6 +34,9 @@ BROKER_LEAVES = 3000
 FAREWELL = 0.3
 """Time (s) for the word of an abort to reach the others."""
 
+NOBODY = "any"
+"""Type of a topic that nobody publishes."""
+
 PROBE = 0.1
 """Time (s) between two attempts to reach a broker."""
 
@@ -56,7 +59,7 @@ class Federate:
         self.name = ""
         self.publications: dict[str, tuple[Any, str]] = {}
         self.subscriptions: dict[str, tuple[Any, str]] = {}
-        self.publishers: set[str] = set()
+        self.publishers: list[str] = []
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         """Start the broker if asked for, connect to it, and register all topics."""
@@ -98,15 +101,13 @@ class Federate:
         self.helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
         self.helics.helicsFederateEnterExecutingMode(self.fed)
-        topics: set[str] = set()
-        others = [name for name in self._query("root", "federates") if name != self.name]
-        for name in others:
-            theirs = set(self._query(name, "publications"))
-            if theirs & self.subscriptions.keys():
-                self.publishers.add(name)
-                topics |= theirs
-        missing = [key for key in self.subscriptions if key not in topics]
-        return {"others": others, "publishers": sorted(self.publishers), "missing": missing}
+        others = [name for name in self._names("root", "federates") if name != self.name]
+        # a federate that does not wait for our values may have left by now: then nobody knows what it published
+        named = [name for name in others if self.subscriptions.keys() & set(self._names(name, "publications"))]
+        self.publishers = named or others
+        kind = self.helics.helicsInputGetPublicationType
+        missing = [key for key, (topic, _) in self.subscriptions.items() if kind(topic) == NOBODY]
+        return {"others": others, "missing": missing}
 
     def step(self, request: dict[str, Any]) -> dict[str, Any]:
         """Publish, go to a time, and return what was published since the last step."""
@@ -123,7 +124,8 @@ class Federate:
             for key, (topic, kind) in self.subscriptions.items()
             if helics.helicsInputIsUpdated(topic)
         }
-        gone = [] if values else [who for who in sorted(self.publishers) if self._query(who, "state") in _GONE]
+        gone = [] if values else [who for who in self.publishers if self._query(who, "state") in _GONE]
+        gone = gone if len(gone) == len(self.publishers) else []
         return {"granted": granted, "values": values, "gone": gone}
 
     def end(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -165,6 +167,11 @@ class Federate:
         for key, value in values.items():
             topic, kind = self.publications[key]
             write[kind](topic, value)
+
+    def _names(self, target: str, what: str) -> list[str]:
+        """Return the names in the answer to a query; none if HELICS has no answer, as of a federate that has left."""
+        answer = self._query(target, what)
+        return answer if isinstance(answer, list) else []
 
     def _query(self, target: str, what: str) -> Any:
         query = self.helics.helicsCreateQuery(target, what)

@@ -102,8 +102,12 @@ class HelicsPlant:
 
     def advance(self) -> None:
         """Publish the set-points, and go on to the next tick."""
-        for k in range(1, self._rows_a_tick + 1):
-            self._hear(self.tick * self._rows_a_tick + k)
+        try:
+            for k in range(1, self._rows_a_tick + 1):
+                self._hear(self.tick * self._rows_a_tick + k)
+        except HelicsError as error:
+            self._federate.abort(str(error))
+            raise
         self.tick += 1
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
@@ -126,7 +130,7 @@ class HelicsPlant:
     def _hear(self, row: int) -> None:
         """Publish what is due, go on to a record time, and take its values."""
         t = time_of(row, self._record)
-        came = self._federate.step(self._outgoing, t + ACT)
+        came = self._federate.step(self._outgoing, t, ACT)
         self._outgoing = {}
         self._check(came, t)
         self._values |= came
@@ -155,7 +159,7 @@ class HelicsPlant:
     def _check(self, came: Mapping[str, Value], t: float) -> None:
         for key, value in came.items():
             if not isinstance(value, bool | str) and not math.isfinite(number(value)):
-                raise HelicsError(f"HELICS, t = {t:g} s: {key} is {number(value):g}, no number; correct its publisher")
+                raise HelicsError(f"HELICS, t = {t:g} s: {key} is not a finite number; correct its publisher")
 
     def _decoded(self, text: str, t: float) -> tuple[PlantEvent, ...]:
         try:

@@ -78,6 +78,8 @@ def run(
 
     changes = {"plant.simulator": plant, "plant.helics.broker": broker}
     spec, feeder = load(scenario, {key: value for key, value in changes.items() if value is not None})
+    if broker is not None and spec.plant.simulator != "helics":
+        fail(["--broker: goes with a plant in a HELICS federation; add --plant helics"], BAD_INPUT)
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
     carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check)
 
@@ -104,13 +106,14 @@ def carry_out(
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
     require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
-    if outside is not None or spec.plant.simulator == "helics":
+    federate = outside is not None or spec.plant.simulator == "helics"
+    if federate:
         require({"helics": "a HELICS federate"}, "install it: pip install 'gridpeers[helics]'")
 
     from rich.console import Console
 
     from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.progress import progress
+    from gridpeers.cli.progress import COMPILING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.report import show
     from scenarios.results.run_files import FolderError, new_folder, shown
@@ -125,11 +128,13 @@ def carry_out(
         fail([str(error)], BAD_INPUT)
 
     console = Console()
+    broker = spec.plant.helics.broker
+    explanation = f"still starting: waiting for the HELICS federation at {broker} ..." if federate else COMPILING
     request = Request(
         scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
     )
     try:
-        with interruptible(), progress(console, tuple(spec.cases)) as tell:
+        with interruptible(), progress(console, tuple(spec.cases), explanation) as tell:
             report = run_scenario(request, tell)
     except BrokenRunError as error:
         kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []

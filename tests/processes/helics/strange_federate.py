@@ -1,0 +1,59 @@
+"""A federate of somebody else that does one thing wrong at t = 0.1 s: ``strange_federate.py BROKER WHAT``.
+
+It imports helics alone. Its nine inverters show the same all the time.
+"""
+
+import math
+import os
+import sys
+import threading
+
+STEP, WRONG, END = 0.01, 0.1, 0.2  # s
+SHOWN = {"f": 60.0, "P": 300e3, "Q": 10e3, "V": 2400.0}
+
+
+def main(broker: str, what: str) -> None:
+    """Publish until the end, or until something is wrong."""
+    import helics as h
+
+    info = h.helicsCreateFederateInfo()
+    h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+    h.helicsFederateInfoSetCoreInitString(info, f"--federates=1 --broker_address={broker} --loglevel=no_print")
+    h.helicsFederateInfoSetFlagOption(info, h.HELICS_FLAG_UNINTERRUPTIBLE, True)
+    me = h.helicsCreateValueFederate("strange", info)
+    kind = h.HELICS_DATA_TYPE_STRING if what == "text" else h.HELICS_DATA_TYPE_DOUBLE
+    out = {
+        (i, x): h.helicsFederateRegisterGlobalPublication(me, f"grid/inv{i}/{x}", kind, "")
+        for i in range(1, 10)
+        for x in SHOWN
+        if (what, i, x) != ("lacks a topic", 3, "V")
+    }
+    h.helicsFederateRegisterSubscription(me, "grid/inv1/P_set", "W")  # so that its time waits for the controller's
+    if what == "not beginning":
+        threading.Event().wait()
+    h.helicsFederateEnterExecutingMode(me)
+    for k in range(round(END / STEP) + 1):
+        wrong = k * STEP >= WRONG
+        if wrong and what == "leaves":
+            break
+        if wrong and what == "dies":
+            os._exit(1)
+        if wrong and what == "hangs":
+            threading.Event().wait()
+        if wrong and what == "error":
+            h.helicsFederateGlobalError(me, 7, "no solution of my power flow")
+            break
+        for (i, x), topic in out.items():
+            third = i == 3 and x == "V"
+            if what == "text":
+                h.helicsPublicationPublishString(topic, "a text")
+            elif not (third and what == "never publishes"):
+                nan = third and wrong and what == "not a number"
+                h.helicsPublicationPublishDouble(topic, math.nan if nan else SHOWN[x])
+        if k < round(END / STEP):
+            h.helicsFederateRequestTime(me, (k + 1) * STEP)
+    h.helicsFederateDisconnect(me)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,178 @@
+"""HELICS: a real broker, and federates of others in processes of their own; all on the loopback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gridpeers
+from gridpeers import Result, Scenario
+from plant.helics import topics
+from plant.helics.bridged_plant import BridgedPlant
+from plant.helics.federate import HelicsError, HelicsFederate
+from plant.helics.helics_settings import HelicsSettings
+from plant.plant_config import PlantConfig, PlantSettings
+from scenarios.drivers.free_endpoint import free_endpoint
+from scenarios.run import BrokenRunError
+from tests.toy.toy_plant import ToyPlant
+
+pytest.importorskip("helics", reason="needs HELICS: pip install 'gridpeers[helics]'")
+
+HERE = Path(__file__).parent
+EXAMPLE = Path(__file__).parents[3] / "examples" / "helics_federate.py"
+STRANGE = HERE / "strange_federate.py"
+
+
+def free_broker() -> str:
+    """Address at which a broker can be started."""
+    return free_endpoint("tcp/127.0.0.1:0").replace("/", "://")
+
+
+def short(end: float, broker: str, deadline: float = 30.0, **changes: Any) -> Scenario:
+    """The islanding scenario, sooner and shorter; the broker is the run's."""
+    events = [{"label": "islanding", "t_s": 0.1, "open": ["13-152"]}]
+    helics = {"broker": broker, "federates": 2}
+    common = {"time.end_s": end, "event": events, "paper": "", "processes.deadline_s": deadline, "plant.helics": helics}
+    return gridpeers.load("islanding").replace(common | changes)
+
+
+@contextmanager
+def federate(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """A process of somebody else that is gone afterwards."""
+    with subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as one:
+        try:
+            yield one
+        finally:
+            one.kill()
+
+
+def test_plant_and_agents_that_meet_over_helics_give_the_bytes_of_one_run(tmp_path: Path) -> None:
+    """Doubles travel unchanged, and set-points are in force from the tick of their measurement on."""
+    broker = free_broker()
+    scenario = short(0.3, broker)
+    file = tmp_path / "short.toml"
+    file.write_text(scenario.to_toml(), encoding="utf-8")
+    words = ["-m", "gridpeers", "bridge", "helics", file, "--case", "IV", "--out", tmp_path / "bridge"]
+    outside = scenario.replace({"plant.simulator": "helics", "plant.helics": {"broker": broker}})
+
+    with federate(*words) as bridge:
+        agents = outside.run("IV")
+        said = bridge.communicate(timeout=60)[0]
+    alone = scenario.run("IV")
+
+    assert bridge.returncode == 0, said
+    plant = gridpeers.read(tmp_path / "bridge")
+    assert isinstance(plant, Result)
+    assert plant.sha256 == agents.sha256 == alone.sha256
+    assert plant.events.equals(alone.events)
+    assert agents.events.equals(alone.events)
+
+
+def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -> None:
+    """A federate that imports helics alone: sharing is equal at the end, and the bytes are the same."""
+    results = []
+    for driver in ("inprocess", "processes"):
+        broker = free_broker()
+        scenario = short(1.5, broker, **{"plant.simulator": "helics", "event[0].t_s": 1.0})
+        with federate(EXAMPLE, broker, "1.5") as grid:
+            results.append(scenario.run("IV", driver=driver))
+            assert grid.wait(timeout=30) == 0
+
+    assert results[0].sha256 == results[1].sha256
+    assert results[0].metrics.loc["islanding", "MPSI"] < 0.01
+    assert results[0].metrics.loc["islanding", "f_error_Hz"] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("what", "said", "deadline"),
+    [
+        ("lacks a topic", "nobody publishes grid/inv3/V (in the federation: strange)", 30.0),
+        ("never publishes", "t = 0 s: no value yet of grid/inv3/V", 30.0),
+        ("text", "t = 0 s: grid/inv1/f is not a finite number", 30.0),
+        ("not a number", "t = 0.1 s: grid/inv3/V is not a finite number", 30.0),
+        ("leaves", "t = 0.09 s: strange left the federation before the end", 30.0),
+        ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0),
+        ("hangs", "strange did not let time go on to 0.1 s within 4 s: strange stands at t = 0.1 s", 4.0),
+        ("dies", "strange did not let time go on to 0.1 s within 4 s", 4.0),
+        ("not beginning", "did not begin within 2 s (the broker waits for 2 federates)", 2.0),
+    ],
+)
+def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(what: str, said: str, deadline: float) -> None:
+    """It names the topic or the federate and the time, within the deadline of the scenario; nothing hangs."""
+    broker = free_broker()
+    scenario = short(0.2, broker, deadline, **{"plant.simulator": "helics"})
+
+    with federate(STRANGE, broker, what), pytest.raises(BrokenRunError) as error:
+        scenario.run("IV")
+
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_broker_that_is_missing_is_one_line() -> None:
+    """The line has its address, and the command that starts one."""
+    broker = free_broker()
+    scenario = short(0.2, broker, 1.0, **{"plant.simulator": "helics", "plant.helics": {"broker": broker}})
+
+    with pytest.raises(BrokenRunError, match=f"no broker at {broker} within 0.9 s .*helics_broker -f 2"):
+        scenario.run("IV")
+
+
+def test_a_wheel_that_is_missing_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says what to install."""
+    (tmp_path / "helics.py").write_text("raise ImportError('none')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+
+    with pytest.raises(HelicsError, match=r"not installed; install it: pip install 'gridpeers\[helics\]'"):
+        HelicsFederate(HelicsSettings(), (), (), 5.0)
+
+
+class Controller(threading.Thread):
+    """A controller of others in the federation of a bridged plant: it wants the same of inv2 at every tick but one."""
+
+    def __init__(self, settings: HelicsSettings, ticks: int) -> None:
+        super().__init__()
+        self.settings, self.ticks, self.seen = settings, ticks, []
+
+    def run(self) -> None:
+        """Act a microsecond after each tick."""
+        P_set, V_set = topics.set_points("grid", "inv2")
+        me = HelicsFederate(self.settings, [P_set, V_set], topics.sensors("grid", "inv2"), 30.0)
+        me.begin({})
+        publish: dict[str, float] = {}
+        for k in range(self.ticks):
+            self.seen.append(me.step(publish, 0.02 * k, topics.ACT))
+            publish = {P_set.key: 1e3 * (k + 1), V_set.key: 280.0}
+        me.end(publish)
+
+
+def test_a_bridged_plant_takes_set_points_from_the_tick_on_in_which_they_are_decided() -> None:
+    """What a controller publishes after t_k holds from t_k to t_(k+1); inverters of nobody stay, and are named."""
+    broker = free_broker()
+    settings = PlantSettings(feeder="toy2", helics=HelicsSettings(broker=broker, name="plant", federates=2))
+    config = PlantConfig(
+        run="toy", settings=settings, agents=(), T_c=0.02, end=0.06, record_step=0.02, deadline=30.0, listen=()
+    )
+    controller = Controller(HelicsSettings(broker=broker, name="controller"), 3)
+    controller.start()
+    plant = BridgedPlant(ToyPlant(config), config)
+    held = []
+    for _ in range(3):
+        plant.advance()
+        held.append(plant.measure()["inv2"].P_set)
+    events = plant.take_events()
+    plant.close()
+    controller.join(30.0)
+
+    assert held == [1e3, 2e3, 3e3]
+    assert [seen["grid/inv2/P"] for seen in controller.seen] == [64700.0, 1e3, 2e3]
+    assert [event.text for event in events] == [
+        "nobody publishes set-points of inv1: it stays on primary droop at its first ones"
+    ]
