@@ -80,6 +80,8 @@ class Agent:
         """Run time (s) of the last state for the neighbours."""
         self.nameplate = nameplate_of(config)
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
+        self._neighbours: tuple[Iterable[str], tuple[str, ...]] = (), ()
+        """The last roster, and the in-neighbours on it; forgotten when the known agents change."""
         self._heard: dict[str, State] = {}
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.acts(config.name, config.kind)
@@ -110,10 +112,12 @@ class Agent:
         if known is not None and known.epoch != nameplate.epoch:
             self._drop(nameplate.sender)
         self._known[nameplate.sender] = nameplate
+        self._neighbours = (), ()
 
     def forget(self, name: str) -> None:
         """Forget the nameplate and the states of an agent whose process is gone."""
         self._known.pop(name, None)
+        self._neighbours = (), ()
         self._drop(name)
 
     def _drop(self, name: str) -> None:
@@ -144,7 +148,12 @@ class Agent:
         return state.island in self._islands
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
-        """Return the in-neighbours among the known agents of a roster by the run's rule; none if the rule fails."""
+        """Return the in-neighbours among the known agents of a roster by the run's rule; none if the rule fails.
+
+        The same roster object gives the same neighbours without another evaluation, until the known agents change.
+        """
+        if roster is self._neighbours[0] and not self._graph_error:
+            return self._neighbours[1]
         members = {name: self._known[name] for name in roster if name in self._known}
         name = self.config.name
         if name not in members:
@@ -155,6 +164,7 @@ class Agent:
             self._graph_error = str(error)
             return ()
         self._graph_error = ""
+        self._neighbours = roster, neighbours
         return neighbours
 
     def hear(self, state: State) -> None:

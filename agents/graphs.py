@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from wire.plugins.anybody import ANYTHING, named
@@ -68,6 +70,7 @@ class GraphError(ValueError):
     """A rule that failed, or returned no graph."""
 
 
+@lru_cache(maxsize=8192)
 def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
     """Sort key in which inv2 comes before inv10.
 
@@ -82,22 +85,22 @@ def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
 
 def full(members: Members) -> Mapping[str, Iterable[str]]:
     """Let every agent listen to all others."""
-    return _pairwise(members, lambda a, b: True)
+    return _pairwise(members, _any_pair)
 
 
 def none(members: Members) -> Mapping[str, Iterable[str]]:
     """Let no agent listen to any other."""
-    return _pairwise(members, lambda a, b: False)
+    return _pairwise(members, _no_pair)
 
 
 def GFM_only(members: Members) -> Mapping[str, Iterable[str]]:
     """Let the grid-forming inverters listen to each other."""
-    return _pairwise(members, lambda a, b: a.kind == b.kind == "GFM")
+    return _pairwise(members, _both_forming)
 
 
 def clustered(members: Members) -> Mapping[str, Iterable[str]]:
     """Let the inverters of a microgrid listen to each other, and all grid-forming ones too."""
-    return _pairwise(members, lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM")
+    return _pairwise(members, _same_microgrid_or_both_forming)
 
 
 def ring(members: Members) -> Mapping[str, Iterable[str]]:
@@ -120,11 +123,38 @@ class EdgeList:
         return {name: {b for a, b in both if a == name and b in members} for name in members}
 
 
+def _any_pair(a: Member, b: Member) -> bool:
+    return True
+
+
+def _no_pair(a: Member, b: Member) -> bool:
+    return False
+
+
+def _both_forming(a: Member, b: Member) -> bool:
+    return a.kind == b.kind == "GFM"
+
+
+def _same_microgrid_or_both_forming(a: Member, b: Member) -> bool:
+    return a.microgrid == b.microgrid or a.kind == b.kind == "GFM"
+
+
+_PAIRWISE: dict[Any, Callable[[Member, Member], bool]] = {
+    full: _any_pair,
+    none: _no_pair,
+    GFM_only: _both_forming,
+    clustered: _same_microgrid_or_both_forming,
+}
+"""Rules by pairs: an agent evaluates its own pairs alone, so that its cost grows with the roster and not its square."""
+
+
 def _pairwise(members: Members, linked: Callable[[Member, Member], bool]) -> dict[str, list[str]]:
-    return {
-        name: [other for other in members if other != name and linked(members[name], members[other])]
-        for name in members
-    }
+    return {name: _linked_to(name, members, linked) for name in members}
+
+
+def _linked_to(name: str, members: Members, linked: Callable[[Member, Member], bool]) -> list[str]:
+    own = members[name]
+    return [other for other, nameplate in members.items() if other != name and linked(own, nameplate)]
 
 
 GRAPHS: Registry[Any] = Registry(
@@ -174,12 +204,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
         ...
     agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents are inv1, ...
     """
-    ordered = {one: members[one] for one in sorted(members, key=natural_order)}
-    try:
-        result = rule(ordered)
-        heard_by = {one: frozenset(result[one]) for one in result}
-    except ANYTHING as error:  # a rule is foreign code
-        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
+    heard_by = _evaluated(rule, members, name)
     for one, heard in heard_by.items() if strict else ():
         if one not in members:
             raise GraphError(f"graph {name} names {_shown(one)}, {_unknown(one, members)}")
@@ -191,6 +216,25 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     return {
         one: tuple(other for other in members if other != one and other in heard_by.get(one, ())) for one in members
     }
+
+
+def own_neighbours_by(rule: Graph, members: Members, name: str, own: str) -> tuple[str, ...]:
+    """Return one agent's in-neighbours by a rule, in the order of `members`; see `neighbours_by`."""
+    linked = _PAIRWISE.get(rule) if isinstance(rule, FunctionType) else None
+    if linked is not None:
+        return tuple(_linked_to(own, members, linked))
+    heard = _evaluated(rule, members, name).get(own, frozenset())
+    return tuple(other for other in members if other != own and other in heard)
+
+
+def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[str]]:
+    """Return each agent's in-neighbours as the rule has them."""
+    ordered = {one: members[one] for one in sorted(members, key=natural_order)}
+    try:
+        result = rule(ordered)
+        return {one: frozenset(result[one]) for one in result}
+    except ANYTHING as error:  # a rule is foreign code
+        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
 
 
 def make_graph(plugin: Plugin) -> Graph:

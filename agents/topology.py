@@ -19,8 +19,8 @@ from agents.graphs import (
     full,
     make_graph,
     natural_order,
-    neighbours_by,
     none,
+    own_neighbours_by,
     ring,
 )
 
@@ -89,7 +89,7 @@ def in_neighbours(
     ('inv2', 'inv3')
     """
     missing = {pair[0] if pair[1] == name else pair[1] for pair in control.without if name in pair}
-    heard = neighbours_by(rule_of(control) if rule is None else rule, members, control.graph)[name]
+    heard = own_neighbours_by(rule_of(control) if rule is None else rule, members, control.graph, name)
     return tuple(other for other in heard if other not in missing)
 
 
