@@ -118,13 +118,15 @@ def _islanding_switch(feeder: Feeder) -> tuple[str, frozenset[str]]:
     if feeder.source is None:
         raise NoProposalError("the feeder has no substation to island from")
     graph, load = Connectivity(feeder), feeder.load_by_bus()
+    if sum(load.values()) <= 0.0:
+        raise NoProposalError("the feeder has no load, which inverters are rated by")
     best, beyond, most = "", frozenset[str](), (0.0, 0)
     for switch in feeder.switches:
         buses = graph.cut_off(switch) if switch.closed else frozenset()
         weight = sum(load.get(bus, 0.0) for bus in buses), len(buses)
         if weight > most:
             best, beyond, most = switch.alias or switch.name, buses, weight
-    if most[0] < ENOUGH * sum(load.values()) or most[0] <= 0.0:
+    if most[0] < ENOUGH * sum(load.values()):
         raise NoSwitchError(heads(feeder))
     return best, beyond
 

@@ -338,8 +338,6 @@ def main() -> None:
     model, result = sys.argv[1], Path(sys.argv[2])
     try:
         answer = PowerFlowModel(model, result.parent).solve()
-    except ImportError:
-        answer = {"missing": True}
     except Exception as error:
         answer = {"error": f"{type(error).__name__}: {error}"}
     result.write_text(json.dumps(answer), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -43,6 +44,8 @@ def solved_model(path: Path) -> dict[str, Any]:
     FeederError
         With GridLAB-D's own messages, each with its file and line, if it refuses the model or cannot solve it.
     """
+    if importlib.util.find_spec("gridlabd") is None:
+        raise FeederError(path.name, (MISSING,))
     with TemporaryDirectory(prefix="gridpeers-") as folder:
         result = Path(folder) / "result.json"
         command = [sys.executable, "-P", "-c", PROGRAM, path.name, str(result)]
@@ -65,8 +68,6 @@ def solved_model(path: Path) -> dict[str, Any]:
             ended = f"GridLAB-D's process ended with code {done.returncode} and said nothing"
             raise FeederError(path.name, tuple(messages(printed)) or (ended,))
         answer: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
-    if "missing" in answer:
-        raise FeederError(path.name, (MISSING,))
     if "error" in answer:
         raise FeederError(path.name, tuple(messages(printed)) or (f"GridLAB-D: {printable(answer['error'])}",))
     if not answer.get("solved", True):

@@ -1,5 +1,6 @@
 """What cannot be imported from a model is refused by name, several mistakes at once, each in one line."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -141,3 +142,12 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     path = tmp_path / "x.glm"
     path.write_bytes(bytes(range(256)) * 200)
     assert len(problems(path)) <= 4
+
+
+def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without GridLAB-D one line says what to install."""
+    monkeypatch.setitem(sys.modules, "gridlabd", None)
+
+    assert problems(write(tmp_path, HEAD + LOAD)) == (
+        "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'",
+    )

@@ -1,5 +1,6 @@
 """What cannot be imported is refused by name, several mistakes at once, each in one line that tells what to do."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -160,3 +161,25 @@ def test_switches_and_frequency_that_are_wrong_are_told(tmp_path: Path) -> None:
         read_opendss(path, f_nom=50.0, switches=["Line.hed"])
 
     assert len(refused.value.problems) == 2
+
+
+def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the engine one line says what to install."""
+    monkeypatch.setitem(sys.modules, "dss", None)
+
+    assert problems(write(tmp_path, LINE)) == (
+        "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'",
+    )
+
+
+def test_a_folder_is_no_script(tmp_path: Path) -> None:
+    """A folder, an empty file and a model for another program end in few lines."""
+    (tmp_path / "folder.dss").mkdir()
+    assert "there is no such file" in problems(tmp_path / "folder.dss")[0]
+
+    path = tmp_path / "x.dss"
+    path.write_text("")
+    assert problems(path) == ("x.dss: makes no circuit; a script has a line New Circuit.name",)
+
+    path.write_text("module powerflow;\nobject node { name a; phases ABCN; nominal_voltage 2400; }\n")
+    assert len(problems(path)) <= 4
