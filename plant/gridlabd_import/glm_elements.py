@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import Bus, Switch
+from plant.gridlabd_import.glm_classes import SWITCHES
 from plant.imported_equipment import LinearElement
 
 Complex = NDArray[np.complex128]
@@ -19,13 +20,6 @@ SPLIT = 0x80
 
 STIFF = 1e7
 """Admittance (S) between the substation's unbalanced voltages and the balanced ones that they are made of."""
-
-SWITCHES = frozenset({"switch", "recloser", "sectionalizer"})
-"""Classes that open and close: ideal switches before what they have of impedance."""
-
-LINES = frozenset({"overhead_line", "underground_line", "triplex_line", "line"})
-LINEAR = LINES | {"transformer", "regulator", "fuse", "series_reactor"}
-"""Classes that an admittance matrix describes."""
 
 
 def letters_of(phases: int) -> str:

@@ -31,7 +31,7 @@ LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")
 FOLLOWING = re.compile(
     r"load failed at or near|#include failed|unable to load '|failed to load model file|model initialization failed"
     r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
-    r"|initialization failed$|dump complete to|environment startup failed"
+    r"|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
 )
 """Messages that only repeat that something failed."""
 
@@ -65,7 +65,9 @@ def solved_model(path: Path) -> dict[str, Any]:
             raise FeederError(path.name, (f"GridLAB-D did not end within {LONGEST:g} s; simplify the model",)) from None
         printed = done.stdout.decode("utf-8", errors="replace")
         if not result.is_file():
-            ended = f"GridLAB-D's process ended with code {done.returncode} and said nothing"
+            ended = (
+                f"GridLAB-D's process ended with code {done.returncode} and said nothing; run the model in GridLAB-D"
+            )
             raise FeederError(path.name, tuple(messages(printed)) or (ended,))
         answer: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     if "error" in answer:

@@ -14,50 +14,15 @@ from typing import Any
 import numpy as np
 
 from plant.equipment import Feeder, Source
-from plant.gridlabd_import.glm_elements import LINEAR, SPLIT, SWITCHES, GlmElements, letters_of
+from plant.gridlabd_import.glm_classes import CHILD_OF_BUS, CONTROLS, DATA, GENERATION, LINEAR, SWITCHES, WATCHING
+from plant.gridlabd_import.glm_elements import SPLIT, GlmElements, letters_of
 from plant.gridlabd_import.glm_loads import BusLoads
 from plant.gridlabd_import.glm_text import GlmText
-from plant.gridlabd_import.gridlabd_power_flow import CHILD_OF_BUS, SWING
+from plant.gridlabd_import.gridlabd_power_flow import PV, SWING
 from plant.gridlabd_import.gridlabd_process import solved_model
 from plant.import_checks import left_out_by, refuse_if, report_unconnected, report_undetermined
 from plant.imported_equipment import LinearElement, LoadPart
 from plant.network import Network, solve_power_flow
-
-DATA = frozenset(
-    [
-        "line_configuration",
-        "line_spacing",
-        "overhead_line_conductor",
-        "underground_line_conductor",
-        "triplex_line_conductor",
-        "triplex_line_configuration",
-        "transformer_configuration",
-        "regulator_configuration",
-    ]
-)
-"""Classes that others refer to."""
-
-WATCHING = frozenset(
-    [
-        *("recorder", "multi_recorder", "group_recorder", "collector", "histogram", "violation_recorder"),
-        *("voltdump", "currdump", "impedance_dump", "jsondump", "billdump", "load_tracker", "emissions"),
-        *("assert", "double_assert", "complex_assert", "enum_assert", "int_assert", "string_assert"),
-        *("metrics", "power_metrics", "metrics_collector", "metrics_collector_writer"),
-        *("climate", "weather", "csv_reader", "fault_check", "eventgen", "restoration"),
-    ]
-)
-"""Classes that measure, or act only later or on what is refused anyway: they have no part in the network."""
-
-CONTROLS = frozenset({"volt_var_control"})
-"""Controls that may have acted at the first moment; afterwards what they control stays."""
-
-GENERATION = frozenset(
-    [
-        *("inverter", "inverter_dyn", "inverter_DYN", "solar", "battery", "energy_storage", "diesel_dg"),
-        *("windturb_dg", "rectifier", "sync_ctrl", "controller_dg", "dc_dc_converter", "central_dg", "microturbine"),
-    ]
-)
-"""Classes whose place an inverter of ours can take."""
 
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
@@ -216,10 +181,10 @@ class _GlmReader:
 
     def _source(self, elements: GlmElements) -> Source | None:
         """Return the substation: the bus whose voltage is given."""
-        swings = [bus for bus in self._model["buses"] if bus["type"] >= 1 and bus["name"] not in self._left_out]
-        given = [bus for bus in swings if bus["type"] == SWING]
-        for bus in swings:
-            if bus["type"] != SWING or bus is not given[0]:
+        # a SWING_PQ takes over only where no SWING is
+        given = [bus for bus in self._model["buses"] if bus["type"] == SWING and bus["name"] not in self._left_out]
+        for bus in self._model["buses"]:
+            if bus["type"] == PV or bus in given[1:]:
                 self._problems.append(f"{self._called(bus['name'])}: a second source; make its bustype PQ")
         if not given:
             self._problems.append("no bus with bustype SWING: a feeder has one, its substation")
