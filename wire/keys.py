@@ -7,6 +7,7 @@ session. The keys by which agents find each other contain it, so that two proces
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import msgspec
 
@@ -149,9 +150,14 @@ class Keys:
         >>> Keys("demo").parts("gridpeers/demo/alive/agent/inv3/a1")
         ('alive', 'agent', 'inv3', 'a1')
         """
-        root = self._root + "/"
-        parts = tuple(key[len(root) :].split("/")) if key.startswith(root) else ()
-        return parts if all(map(is_name, parts)) else ()
+        return _parts(self._root, key)
+
+
+@lru_cache(maxsize=8192)
+def _parts(root: str, key: str) -> tuple[str, ...]:
+    """Split a key; cached, because in one process every node sees the same tokens."""
+    parts = tuple(key[len(root) + 1 :].split("/")) if key.startswith(f"{root}/") else ()
+    return parts if all(map(is_name, parts)) else ()
 
 
 def epoch_of(part: str) -> int | None:

@@ -138,12 +138,14 @@ class InprocessBus:
                 self._subscribers[action.key].append(side)
 
     def _end_the_stopped(self) -> None:
-        for agent in [agent for agent in self._agents if agent.finished]:
-            self._agents.remove(agent)
+        stopped = [agent for agent in self._agents if agent.finished]
+        if not stopped:
+            return
+        self._agents = [agent for agent in self._agents if not agent.finished]
+        for receivers in self._subscribers.values():
+            receivers[:] = [node for node in receivers if node not in stopped]
+        for agent in stopped:
             self._nameplates.pop(agent.nameplate[0])
-            for receivers in self._subscribers.values():
-                if agent in receivers:
-                    receivers.remove(agent)
             self._plant.vanished(agent.token, 0.0)
             for other in self._agents:
                 other.vanished(agent.token, 0.0)
