@@ -25,7 +25,13 @@ def start_plant(config: PlantConfig) -> LivePlant:
         from plant.helics.helics_plant import HelicsPlant  # only who uses it needs the wheel
 
         return HelicsPlant(config, _feeder(config))
-    plant = build_plant(config)
+    plant: LivePlant
+    if config.settings.simulator == "gridlabd":
+        from plant.gridlabd.start import start_gridlabd
+
+        plant = start_gridlabd(config, _feeder(config))
+    else:
+        plant = build_plant(config)
     if not config.bridged:
         return plant
     from plant.helics.bridged_plant import BridgedPlant

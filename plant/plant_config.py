@@ -108,8 +108,8 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Changes by inverter."""
 
 
-Simulator = Literal["gridpeers", "helics"]
-"""What simulates the plant: our own, or a federate of a HELICS co-simulation."""
+Simulator = Literal["gridpeers", "gridlabd", "helics"]
+"""What simulates the plant: our own, GridLAB-D (docs/plant.md), or a federate of a HELICS co-simulation."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -12,9 +12,9 @@ from scenarios.schema.configs import configs
 def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
     """Why the plant has no operating point at t = 0, or cannot have its switches as an event wants them; "" if it has.
 
-    All cases start from the same one. Another simulator finds its own.
+    All cases start from the same one, GridLAB-D too. Another simulator finds its own.
     """
-    if scenario.plant.simulator != "gridpeers":
+    if scenario.plant.simulator not in ("gridpeers", "gridlabd"):
         return ""
     plant, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     try:

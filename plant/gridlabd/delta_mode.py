@@ -10,10 +10,11 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
     {"load": path, "inverters": [[name, bus, kind], ...]}   {"version": ...}; the first step of delta mode is done
     {"write": [[object, property, value], ...]}             {}; acts from the next step on
     {"phasors": bus}                                        {"phasors": [real, imaginary] (V) of its phases A, B, C}
-    {"advance": n}                                          {"steps": n lists of a reading per inverter}
+    {"write": ..., "advance": n}                            {"steps": n lists of a reading per inverter}
 
-A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), and the set-points as GridLAB-D holds them: `Pset` (pu)
-of a GFM or `Pref` (W) of a GFL, and `Vset` (pu). What goes wrong is answered as {"error": text}.
+A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), the set-points as GridLAB-D holds them: `Pset` (pu)
+of a GFM or `Pref` (W) of a GFL, and `Vset` (pu); then the lowest and the highest phase voltage (V). What goes wrong is
+answered as {"error": text}. The process ends with standard input, and with its parent, whose id is its argument.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import ctypes
 import importlib
 import json
 import os
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -34,7 +36,10 @@ STAY = 0
 SWITCH_STATES = {"open": 0, "close": 1}
 """Values of a switch's property `status`."""
 
-Reading = tuple[float, float, float, float, float, float]
+PR_SET_PDEATHSIG = 1
+"""Request of Linux's prctl: a signal to this process when its parent has ended."""
+
+Reading = tuple[float, float, float, float, float, float, float, float]
 
 
 class Module(ctypes.Structure):
@@ -113,8 +118,9 @@ class GridlabdInverter:
 
     def read(self) -> Reading:
         """Give its reading."""
-        V = sum(abs(complex(*phase)) for phase in self._V) / 3.0
-        return self._f[0], self._S[0], self._S[1], V, self._P_set[0], self._V_set[0]
+        V = [abs(complex(*phase)) for phase in self._V]
+        set_points = self._P_set[0], self._V_set[0]
+        return self._f[0], self._S[0], self._S[1], sum(V) / 3.0, *set_points, min(V), max(V)
 
 
 class Simulation:
@@ -133,7 +139,7 @@ class Simulation:
         self.version = str(gridlabd.__version__)
         self._gridlabd = gridlabd.DirectGridLabD()
         if self._gridlabd.load_glm([model]) != gridlabd.GLDErrorCode.SUCCESS:
-            raise RuntimeError("the model was not loaded")
+            raise RuntimeError("it refuses the model")
         self.core = GridlabdCore()
         self._hook(self.core.module("tape"))
         self._gridlabd.setup_after_load()
@@ -159,7 +165,7 @@ class Simulation:
 
     def _run(self) -> None:
         self._gridlabd.run()
-        self._error = self._error or RuntimeError("the simulation ended before its time")
+        self._error = self._error or RuntimeError("it ended its simulation before its time")
         self._done.release()
 
     def _hook(self, module: Any) -> None:
@@ -194,26 +200,33 @@ def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     simulation = Simulation(first["load"], first["inverters"])
     yield {"version": simulation.version}
     for request in requests:
-        if "advance" in request:
-            yield {"steps": simulation.advance(request["advance"])}
-        elif "phasors" in request:
+        if "phasors" in request:
             phases = (simulation.core.doubles(request["phasors"], f"voltage_{phase}", 2) for phase in "ABC")
             yield {"phasors": [list(phase) for phase in phases]}
-        else:
-            for name, key, value in request["write"]:
-                simulation.core.write(name, key, value)
-            yield {}
+            continue
+        for name, key, value in request.get("write", ()):
+            simulation.core.write(name, key, value)
+        yield {"steps": simulation.advance(request["advance"])} if "advance" in request else {}
+
+
+def end_with(parent: int) -> None:
+    """Let the kernel end this process when its parent has, which standard input tells only between two requests."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it has ended already
+        os._exit(0)
 
 
 def main() -> None:
     """Serve until standard input ends."""
+    end_with(int(sys.argv[1]))
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # GridLAB-D prints to standard output
     try:
         for answer in answers(json.loads(line) for line in sys.stdin):
             print(json.dumps(answer), file=out, flush=True)
     except Exception as error:
-        print(json.dumps({"error": f"{type(error).__name__}: {error}"}), file=out, flush=True)
+        text = str(error) if isinstance(error, RuntimeError) else f"{type(error).__name__}: {error}"
+        print(json.dumps({"error": text}), file=out, flush=True)
     os._exit(0)  # GridLAB-D's thread still waits inside a step
 
 

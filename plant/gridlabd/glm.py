@@ -78,14 +78,15 @@ def _header(h: float, seconds: int, bus: str) -> str:
     """
     step = round(h * 1e9)
     year, month = START[:4], START[5:7]
-    return f"""#set deltamode_forced_always=true
+    return f"""#set show_progress=false
+#set deltamode_forced_always=true
 #set deltamode_timestep={step}
 #set deltamode_iteration_limit=20
 #set minimum_timestep=1
 clock {{
 	timezone UTC0;
 	starttime '{START}';
-	stoptime '{year}-{month}-01 00:00:{seconds + 2:02d}';
+	stoptime '{year}-{month}-01 {_clock(seconds + 2)}';
 }}
 module tape;
 module powerflow {{
@@ -120,3 +121,14 @@ object recorder {{
 	interval 1;
 	file "/dev/null";
 }}"""
+
+
+def _clock(seconds: int) -> str:
+    """Return the time of day after midnight.
+
+    Examples
+    --------
+    >>> _clock(3725)
+    '01:02:05'
+    """
+    return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"

@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import tempfile
+import sys
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.switch_state import SwitchState
 from plant.feeder import Plant
+from plant.feeder.circuits import Circuits
+from plant.feeder.islands import Islands
 from plant.feeder.plant import Reading
+from plant.feeder.protection import Relays
+from plant.feeder.set_points import SetPointLimits
+from plant.feeder.switchboard import Switchboard
 from plant.inverter_parameters import GflParameters
-from plant.plant_config import PlantSettings
+from plant.network import Network
+from plant.plant_config import PlantSettings, PowerLimit
 from wire.messages import PlantEvent
+from wire.timing.clock import time_of
 
 from .glm import write_glm
+from .gridlabd_process import GridlabdError, GridlabdProcess
 
-DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 FEEDERS = Path(__file__).parents[1] / "data"
 
 REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
 
-MISSING = """GridLAB-D is not there: {python} is no interpreter that has the package "gridlabd".
-Install its wheel (Linux, x86-64): pip install 'gridpeers[gridlabd]'"""
-
-
-class GridlabdError(RuntimeError):
-    """GridLAB-D is missing, or it ended."""
+Write = tuple[str, str, Any]
+"""A value for GridLAB-D: object, property, value."""
 
 
 class GridlabdPlant:
@@ -37,8 +43,9 @@ class GridlabdPlant:
     Parameters
     ----------
     ours
-        Our plant of the same run, at its start. GridLAB-D begins its initial power flow from the powers found there;
-        what comes out after `REST` is its own.
+        Our plant of the same run, at its start. GridLAB-D's initialisation takes the powers of the inverters and
+        chooses set-points that give them; a scenario gives the set-points. So GridLAB-D begins its initial power flow
+        from the powers that our plant has found; what comes out after `REST` is its own.
     settings
         Everything that decides the numbers. Inverters that come and go have no counterpart in GridLAB-D.
     T_c
@@ -47,6 +54,12 @@ class GridlabdPlant:
         Duration of the run (s).
     python
         Interpreter that has the wheel `gridlabd`.
+    record_step
+        Distance of the recorded rows (s); None for every step.
+    deadline
+        Longest wait for GridLAB-D's next control period (s).
+    network
+        The feeder's network as events and islands name it; that of our plant when left out.
 
     Raises
     ------
@@ -54,44 +67,63 @@ class GridlabdPlant:
         If the wheel is missing or the model does not run.
     """
 
-    def __init__(self, ours: Plant, settings: PlantSettings, T_c: float, end: float, python: str) -> None:
+    def __init__(
+        self,
+        ours: Plant,
+        settings: PlantSettings,
+        T_c: float,
+        end: float,
+        python: str = sys.executable,
+        *,
+        record_step: float | None = None,
+        deadline: float = 60.0,
+        network: Network | None = None,
+    ) -> None:
         self.inverters = ours.inverters
         self.tick = 0
-        self._h, self._steps, self._python = settings.h, round(T_c / settings.h), python
-        self._network = ours.network
-        self._units = {unit.name: unit for unit in ours.network.inverters}
+        """k: the plant is at k T_c."""
+        self._T_c, self._h = T_c, settings.h
+        self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
+        self._network = network = network or ours.network
+        self._units = {unit.name: unit for unit in network.inverters}
         self._parameters = {
-            unit.name: ours.network.feeder.parameters_of(unit, settings.gfm, settings.gfl)
-            for unit in ours.network.inverters
+            unit.name: network.feeder.parameters_of(unit, settings.gfm, settings.gfl) for unit in network.inverters
         }
-        self._closed = ours.network.closed0
-        self._writes = self._scheduled(settings)
-        self._folder = tempfile.TemporaryDirectory()
-        model, self._log = (Path(self._folder.name) / name for name in ("feeder.glm", "gridlabd.log"))
+        self._V_nom = np.array([unit.V_nom for unit in network.inverters])
+        self._switches = Switchboard(network, settings.events, self._h)
+        self._circuits, self._islands = Circuits(network), Islands(network)
+        self._state = self._switch_state()
+        self._limits: dict[int, list[PowerLimit]] = {}
+        for limit in settings.limits:
+            self._limits.setdefault(round(limit.t / self._h), []).append(limit)
+        self._set_points = SetPointLimits()
+        self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
+        self._events = self._islands.report_dead(0.0, self._switches.closed, self._state)
+        self._writes: list[Write] = []
+        """What GridLAB-D is given before its next step."""
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
-        seconds = round(REST + end + 2.0)
-        model.write_text(
-            write_glm(FEEDERS / settings.feeder, settings.load_set, start, self._parameters, settings.h, seconds),
-            encoding="utf-8",
+        model = write_glm(
+            FEEDERS / settings.feeder,
+            settings.load_set,
+            start,
+            self._parameters,
+            self._h,
+            round(REST + end + 2.0),
+            settings.changes,
         )
-        with self._log.open("w") as log:
-            try:
-                self._process = subprocess.Popen(
-                    [python, str(DELTA_MODE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
-                )
-            except OSError:
-                raise GridlabdError(MISSING.format(python=python)) from None
-        units = [(unit.name, f"n{unit.bus}", unit.kind) for unit in self._units.values()]
+        self.process = GridlabdProcess(python, deadline)
+        """GridLAB-D."""
         try:
-            self.version = self._ask(load=str(model), inverters=units)["version"]
+            units = [(unit.name, f"n{unit.bus}", unit.kind) for unit in self._units.values()]
+            self.version = self.process.load(model, units)
             # GridLAB-D chose set-points that give the powers it was started with; now the run's own take over
             for name, unit in self._units.items():
                 self.hold(name, settings.P_set0 * unit.P_rated, settings.V_set0 * unit.V_nom)
                 if unit.kind == "GFL":
-                    self._ask(write=[(name, "Qref", 0.0)])
-            self._now = self._ask(advance=round(REST / self._h))["steps"][-1]
-        except GridlabdError:
-            self.__exit__(None, None, None)
+                    self._writes.append((name, "Qref", 0.0))
+            self._now = self._run(round(REST / self._h))[-1]
+        except BaseException:
+            self.close()
             raise
         self._rows = [self._as_row(0, self._now)]
 
@@ -107,105 +139,160 @@ class GridlabdPlant:
 
     def close(self) -> None:
         """End GridLAB-D's process."""
-        self._process.kill()
-        self._process.communicate()
-        self._folder.cleanup()
+        self.process.close()
+
+    # ---------------------------------------------------------------- for agents
 
     def measure(self) -> dict[str, Reading]:
         """Read every inverter's sensors at t = tick * T_c."""
-        source = self._network.feeder.source
-        islands = self._network.islands(self._closed)
-        first: dict[frozenset[str], str] = {}
+        island, fed = self._islands.names(self._state)
         readings = {}
-        for (name, unit), reading in zip(self._units.items(), self._now, strict=True):
-            buses = next(island for island in islands if unit.bus in island)
-            fed = source is not None and source.bus in buses
-            f, P, Q, V, P_set, V_set = self._in_units(name, reading)
-            readings[name] = Reading(P, Q, V, f, P_set, V_set, fed, "grid" if fed else first.setdefault(buses, name))
+        for i, name in enumerate(self.inverters):
+            f, P, Q, V, P_set, V_set = self._in_units(name, self._now[i])
+            readings[name] = Reading(P, Q, V, f, P_set, V_set, fed[i], island[i])
         return readings
 
     def phasors(self, bus: str) -> tuple[complex, ...]:
         """Return the voltages (V) of phases A, B and C at a bus."""
-        return tuple(complex(*phase) for phase in self._ask(phasors=f"n{bus}")["phasors"])
+        return tuple(complex(*phase) for phase in self.process.ask(phasors=f"n{bus}")["phasors"])
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Take set-points (W, V), in force from the next step on."""
-        unit = self._units[name]
-        P = ("Pset", P_set / unit.P_rated) if unit.kind == "GFM" else ("Pref", P_set)
-        self._ask(write=[(name, *P), (name, "Vset", V_set / unit.V_nom)])
+        """Take set-points (W, V), in force from the next step on, within the inverter's bounds.
+
+        A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell.
+        """
+        t = time_of(self.tick, self._T_c)
+        if not (isfinite(P_set) and isfinite(V_set)):
+            self._events += self._set_points.refused(name, t)
+            return
+        unit, own = self._units[name], self._parameters[name]
+        P = min(max(P_set / unit.P_rated, -own.P_set_lim), own.P_set_lim)
+        V = min(max(V_set / unit.V_nom, own.V_set_min), own.V_set_max)
+        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * unit.P_rated / 1e3)
+        self._events += self._set_points.held(name, t, "V_set", V_set, V * unit.V_nom)
+        if not isinstance(own, GflParameters):
+            self._writes.append((name, "Pset", P))
+        else:  # GridLAB-D bounds it at S_max itself
+            self._writes.append((name, "Pref", P_set if own.P_set_lim == own.S_max else P * unit.P_rated))
+        self._writes.append((name, "Vset", V))
+
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
+        """Operate a switch ("open" or "close") at the next step; return whether it was in that state already."""
+        if synchronised:
+            raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
+        known = self._network.switch_name(name)
+        self._switches.put(self.tick * self._steps, known, action)
+        return (known in self._switches.closed) == (action == "close")
 
     def connect(self, name: str, on: bool) -> None:
-        """Refuse: an inverter that comes or goes has no counterpart in GridLAB-D's delta mode."""
-        raise NotImplementedError(f"{name} comes or goes: GridLAB-D's delta mode has nothing like it")
+        """Do nothing if an inverter comes that is there; RuntimeError if it goes: GridLAB-D's inverters stay."""
+        if not on:
+            raise GridlabdError(f"{name} leaves, and GridLAB-D's delta mode cannot disconnect an inverter")
 
     def advance(self) -> None:
-        """Go to the next tick; what is scheduled happens on the way."""
-        first, last = self.tick * self._steps, (self.tick + 1) * self._steps
-        step = first
-        for stop in sorted({at for at in self._writes if first < at < last} | {last}):
-            if step in self._writes:
-                self._operate(step)
-            steps = self._ask(advance=stop - step)["steps"]
-            self._rows += [self._as_row(step + k + 1, readings) for k, readings in enumerate(steps)]
+        """Go to the next tick; what is scheduled happens on the way.
+
+        Raises
+        ------
+        GridlabdError
+            If GridLAB-D has ended or diverges, or if an inverter would trip, which GridLAB-D's cannot.
+        """
+        step, last = self.tick * self._steps, (self.tick + 1) * self._steps
+        while step < last:
+            self._happen(step)
+            coming = [s for s in (*self._switches.steps, *self._limits) if s > step]
+            stop = min(last, step + self._relays.quiet, *coming)
+            try:
+                steps = self._run(stop - step)
+            except GridlabdError as error:
+                raise GridlabdError(f"plant after t = {self._time(step):g} s: {error}") from error
+            for k in range(stop - step):
+                if (step + k + 1) % self._record == 0:
+                    self._rows.append(self._as_row(step + k + 1, steps[k]))
             self._now = steps[-1]
+            self._watch(stop, steps)
             step = stop
         self.tick += 1
 
+    # ---------------------------------------------------------------- for the recorder
+
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows of every step since the last call, laid out as those of `Plant.take_rows`."""
+        """Return the rows since the last call, laid out as those of `Plant.take_rows`."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Give none; our plant tells them."""
-        return ()
+        """Return the events since the last call."""
+        events, self._events = tuple(self._events), []
+        return events
 
-    def _scheduled(self, settings: PlantSettings) -> dict[int, list[tuple[str, str, Any]]]:
-        """Writes by step: (switch, "status", action) or (inverter, "Pref_max", pu)."""
-        writes: dict[int, list[tuple[str, str, Any]]] = {}
-        for event in settings.events:
-            name = self._network.switch_name(event.switch)
-            writes.setdefault(round(event.t / settings.h), []).append((name, "status", event.action))
-        for limit in settings.limits:
-            parameters = self._parameters[limit.inverter]
-            assert isinstance(parameters, GflParameters), "the plant limits the power of a GFL alone"
-            P_max = limit.P_max / (self._units[limit.inverter].P_rated * parameters.S_max)
-            writes.setdefault(round(limit.t / settings.h), []).append((limit.inverter, "Pref_max", P_max))
-        return writes
+    def _time(self, step: int) -> float:
+        """Return the time of a step (s)."""
+        return time_of(step, self._h)
 
-    def _operate(self, step: int) -> None:
-        writes = []
-        for name, key, value in self._writes[step]:
-            if key == "status":
-                self._closed = self._closed - {name} if value == "open" else self._closed | {name}
-            writes.append((f"s{name}" if key == "status" else name, key, value))
-        self._ask(write=writes)
-
-    def _in_units(self, name: str, reading: list[float]) -> tuple[float, ...]:
+    def _in_units(self, name: str, reading: NDArray[np.float64]) -> tuple[float, ...]:
         """Convert a reading to Hz, W, var, V, W, V."""
-        unit, (*measured, P_set, V_set) = self._units[name], reading
-        return (*measured, P_set * (unit.P_rated if unit.kind == "GFM" else 1.0), V_set * unit.V_nom)
+        unit, (f, P, Q, V, P_set, V_set, *_) = self._units[name], reading.tolist()
+        return f, P, Q, V, P_set * (unit.P_rated if unit.kind == "GFM" else 1.0), V_set * unit.V_nom
 
-    def _as_row(self, step: int, readings: list[list[float]]) -> tuple[float, ...]:
+    def _as_row(self, step: int, readings: NDArray[np.float64]) -> tuple[float, ...]:
         values = [
             value
             for name, reading in zip(self.inverters, readings, strict=True)
             for value in self._in_units(name, reading)
         ]
-        return (round(step * self._h, 9), *values)
+        return (self._time(step), *values)
 
-    def _ask(self, **request: Any) -> dict[str, Any]:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        try:
-            self._process.stdin.write(json.dumps(request) + "\n")
-            self._process.stdin.flush()
-            line = self._process.stdout.readline()
-        except BrokenPipeError:
-            line = ""
-        answer: dict[str, Any] = json.loads(line or '{"error": "its process ended"}')
-        if "error" not in answer:
-            return answer
-        if "No module named 'gridlabd'" in answer["error"]:
-            raise GridlabdError(MISSING.format(python=self._python))
-        raise GridlabdError(f"GridLAB-D: {answer['error']}. Its last words:\n{self._log.read_text()[-1500:]}")
+    # ---------------------------------------------------------------- steps
+
+    def _run(self, steps: int) -> NDArray[np.float64]:
+        """Give GridLAB-D what it is to take, and return its readings after each step: steps x inverters x values."""
+        writes, self._writes = self._writes, []
+        readings = np.array(self.process.ask(write=writes, advance=steps)["steps"])
+        if not np.isfinite(readings).all():
+            k, i = np.argwhere(~np.isfinite(readings).all(axis=2))[0].tolist()
+            raise GridlabdError(
+                f"GridLAB-D diverges: {self.inverters[i]} has no finite values {(k + 1) * self._h:g} s later"
+            )
+        return readings
+
+    def _happen(self, step: int) -> None:
+        """Operate the switches of a step and limit the power that inverters have, from this step on.
+
+        GridLAB-D loses an island if two switches that part it open in one step: each after the first comes a step later.
+        """
+        due = self._switches.due(step)
+        for operation in due[1:]:
+            self._switches.drop(step, operation)
+            self._switches.put(step + 1, operation.switch, operation.action)
+            shown = self._switches.shown(operation.switch)
+            text = f"GridLAB-D operates one switch a step: {shown} follows {self._h * 1e3:g} ms later"
+            self._events.append(PlantEvent(t=self._time(step), kind="warning", subject=operation.switch, text=text))
+        if due:
+            self._writes.append((f"s{due[0].switch}", "status", due[0].action))
+            self._events += self._switches.operate(step)
+            self._state = self._switch_state()
+            self._events += self._islands.report(self._time(step), self._switches.closed, self._state)
+        for limit in self._limits.pop(step, ()):
+            unit, own = self._units[limit.inverter], self._parameters[limit.inverter]
+            assert isinstance(own, GflParameters), "a scenario limits the power of a GFL alone"
+            self._writes.append((limit.inverter, "Pref_max", limit.P_max / (unit.P_rated * own.S_max)))
+            text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
+            self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))
+
+    def _switch_state(self) -> SwitchState:
+        """Return the islands with the switches that are closed now; all inverters are on the network."""
+        circuit = self._circuits.of(self._switches.closed)
+        forming = np.array([unit.kind == "GFM" for unit in self._units.values()])
+        return SwitchState(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
+
+    def _watch(self, step: int, steps: NDArray[np.float64]) -> None:
+        """End the run where protection of ours would trip an inverter, because GridLAB-D's goes on."""
+        f, low, high = steps[:, :, 0], steps[:, :, 6] / self._V_nom, steps[:, :, 7] / self._V_nom
+        trips = self._relays.watch(f, low, high, np.ones(len(self.inverters), bool))
+        if trips:
+            names = "; ".join(f"{self.inverters[trip.inverter]}: {trip}" for trip in trips)
+            raise GridlabdError(
+                f"plant at t = {self._time(step):g} s: protection trips {names}. GridLAB-D's inverter has none, so the "
+                'run ends here; write [protection] category = "off", or simulator = "gridpeers"'
+            )

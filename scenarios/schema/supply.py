@@ -15,7 +15,7 @@ _SHOWN = 6
 """So many buses of a dead part are named."""
 
 
-class _State(NamedTuple):
+class SupplyState(NamedTuple):
     """Who feeds what from some time on."""
 
     event: Event | None
@@ -32,7 +32,7 @@ class _State(NamedTuple):
 
 def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note as a problem what a run would begin with and nothing feeds: load, and inverters without a leader."""
-    start = next(_states(scenario, feeder))
+    start = next(supply_states(scenario, feeder))
     if what := _what(start.dead, start.inverters, feeder):
         problems.add(
             "plant.feeder",
@@ -47,7 +47,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
     Switches and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where it is.
     """
     notes, rows = [], inverters_of(scenario, feeder)
-    for state in _states(scenario, feeder):
+    for state in supply_states(scenario, feeder):
         event = state.event
         when = f'event "{event.label}" at {event.t_s:g} s' if event else "the start"
         if event and (what := _what(state.new, state.inverters, feeder)):
@@ -67,7 +67,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_State]:
+def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplyState]:
     """Who feeds what at t = 0 and after each event."""
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()
@@ -84,7 +84,7 @@ def _states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[_State]:
         fed, dead = graph.fed(closed, (bus for name, bus in forming.items() if name in present))
         nodes = frozenset(node for part in dead for node in part)
         islands = tuple(part for part in fed if source not in part)
-        yield _State(event, nodes, nodes - before, islands, present)
+        yield SupplyState(event, nodes, nodes - before, islands, present)
         before = nodes
 
 

@@ -44,7 +44,7 @@ def run(
         bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
     ] = False,
     plant: Annotated[
-        Literal["gridpeers", "helics"] | None,
+        Literal["gridpeers", "gridlabd", "helics"] | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
     processes: Annotated[
@@ -106,6 +106,8 @@ def carry_out(
         refuse(error)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
     require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    if spec.plant.simulator == "gridlabd":
+        require({"gridlabd": 'the plant of simulator "gridlabd"'}, "install it: pip install 'gridpeers[gridlabd]'")
     federate = outside is not None or spec.plant.simulator == "helics"
     if federate:
         require({"helics": "a HELICS federate"}, "install it: pip install 'gridpeers[helics]'")
