@@ -17,6 +17,8 @@ PATIENCE = 4.0
 
 COMPILING = "still starting: the first run ever compiles the plant's inner loop, which takes some seconds ..."
 
+RESTING = "still starting: GridLAB-D solves the feeder and comes to rest before t = 0, which takes some seconds ..."
+
 
 @contextmanager
 def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[Tell]:

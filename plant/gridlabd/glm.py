@@ -98,6 +98,7 @@ module powerflow {{
 	line_limits false;
 	default_maximum_voltage_error 1e-11;
 	NR_island_fail_method true;
+	NR_iteration_limit 50;
 }}
 module generators {{
 	enable_subsecond_models true;

@@ -259,7 +259,7 @@ class GridlabdPlant:
     def _happen(self, step: int) -> None:
         """Operate the switches of a step and limit the power that inverters have, from this step on.
 
-        GridLAB-D loses an island if two switches that part it open in one step: each after the first comes a step later.
+        GridLAB-D loses an island if two switches that part it open in one step: the others wait for the next steps.
         """
         due = self._switches.due(step)
         for operation in due[1:]:

@@ -9,6 +9,7 @@ import select
 import signal
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -74,7 +75,7 @@ class GridlabdProcess:
         """Process id."""
         return self._process.pid
 
-    def load(self, model: str, inverters: list[tuple[str, str, str]]) -> str:
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str]]) -> str:
         """Load a model and take its first step; return GridLAB-D's version.
 
         Parameters

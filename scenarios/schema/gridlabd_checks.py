@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from plant.equipment import F_NOM, Feeder
@@ -24,7 +25,10 @@ def check_gridlabd(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
         problems.add("plant.feeder", f"{text}; choose another feeder, {_OTHERWISE}")
     if feeder.f_nom != F_NOM:
         path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
-        problems.add(path, f"GridLAB-D's inverters are written for {F_NOM:g} Hz, got {feeder.f_nom:g} Hz; {_OTHERWISE}")
+        problems.add(
+            path,
+            f"GridLAB-D's inverters are written for {F_NOM:g} Hz, got {feeder.f_nom:g} Hz; take that, {_OTHERWISE}",
+        )
     steps = 1.0 / scenario.time.h_s if scenario.time.h_s else 0.0
     if abs(steps - round(steps)) > 1e-6 and not problems.touch("time.h_s"):
         problems.add(
@@ -47,12 +51,13 @@ def _of_feeder(feeder: Feeder) -> Iterator[str]:
         yield f'feeder "{feeder.name}" comes from another program, with elements that are not written for GridLAB-D'
     elif feeder.source is None:
         yield f'feeder "{feeder.name}" has no substation, and GridLAB-D begins with a swing bus'
-    busy = [bus for branch in (*feeder.branches(), *((s.from_bus, s.to_bus) for s in feeder.switches)) for bus in branch]
+    switches = ((switch.from_bus, switch.to_bus, 3) for switch in feeder.switches)
+    branches = Counter(bus for one, other, _ in (*feeder.branches(), *switches) for bus in (one, other))
     used = {load.bus for load in feeder.loads} | {bank.bus for bank in feeder.capacitors}
     used |= {unit.bus for unit in feeder.inverters}
     for unit in feeder.transformers:
         ends = (unit.from_bus, unit.to_bus)
-        if not any(bus not in used and busy.count(bus) == 1 for bus in ends):
+        if not any(bus not in used and branches[bus] == 1 for bus in ends):
             yield f"the transformer from {ends[0]} to {ends[1]} feeds something, and none is written for GridLAB-D"
 
 
@@ -64,7 +69,7 @@ def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problem
         if isinstance(own, GfmParameters):
             path, default = "plant.gfm.V_lim_pu", GfmParameters().V_lim
             wrong = own.V_lim != default
-            text = f"GridLAB-D does not bound the Q limiters, got {own.V_lim:g} pu at {row.name}; leave it at {default:g}"
+            text = f"GridLAB-D has no such bound, got {own.V_lim:g} pu at {row.name}; leave it at {default:g}"
         else:
             path, wrong = "plant.gfl.P_set_lim_pu", own.P_set_lim > own.S_max
             text = (
@@ -84,6 +89,6 @@ def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
         if state.event and idle:
             problems.add(
                 f"event[{index[state.event.label]}]",
-                f'event "{state.event.label}" de-energises {", ".join(idle)}, and GridLAB-D\'s inverters need a voltage; '
-                f"leave a GFM connected to them, {_OTHERWISE}",
+                f'event "{state.event.label}" de-energises {", ".join(idle)}, and an inverter of GridLAB-D needs a '
+                f"voltage; leave a GFM connected to it, {_OTHERWISE}",
             )

@@ -115,7 +115,7 @@ def carry_out(
     from rich.console import Console
 
     from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.progress import COMPILING, progress
+    from gridpeers.cli.progress import COMPILING, RESTING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.report import show
     from scenarios.results.run_files import FolderError, new_folder, shown
@@ -132,6 +132,8 @@ def carry_out(
     console = Console()
     broker = spec.plant.helics.broker
     explanation = f"still starting: waiting for the HELICS federation at {broker} ..." if federate else COMPILING
+    if spec.plant.simulator == "gridlabd":
+        explanation = RESTING
     request = Request(
         scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
     )

@@ -1,0 +1,188 @@
+"""GridLAB-D's process ends with the run, and a run that loses GridLAB-D ends with one clear error."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from plant.gridlabd.gridlabd_process import GridlabdError, GridlabdProcess
+from plant.plant_config import PlantConfig, Protection
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.outcome import Outcome
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+from tests.command_line import invoke
+from tests.toy.toy_runs import ProcessRun
+from wire.messages import Telemetry
+
+pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
+
+
+def run_of(**changes: object) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Islanding at 0.04 s on GridLAB-D, with some settings of the plant changed."""
+    plant, agents = configs(*load_scenario("islanding"), "IV")
+    event = replace(plant.settings.events[0], t=0.04)
+    return replace(
+        plant, end=20.0, settings=replace(plant.settings, simulator="gridlabd", events=(event,), **changes)
+    ), agents
+
+
+def in_one_process(**changes: object) -> Outcome:
+    """Run it without other processes than GridLAB-D's."""
+    return run_inprocess(*run_of(**changes), lambda telemetry: None)
+
+
+def gridlabd_of(pid: int) -> int:
+    """Process id of GridLAB-D that a process has started."""
+    (found,) = all_of(pid)
+    return found
+
+
+def all_of(pid: int) -> list[int]:
+    """Process ids of GridLAB-D whose argument is the process that started it."""
+    return [int(path.parent.name) for path in Path("/proc").glob("[0-9]*/cmdline") if is_of(path, pid)]
+
+
+def is_of(path: Path, pid: int) -> bool:
+    """Whether a command line is GridLAB-D's of a process."""
+    try:
+        words = path.read_bytes().split(b"\0")
+    except OSError:  # it has just ended
+        return False
+    return any(word.endswith(b"delta_mode.py") for word in words) and str(pid).encode() in words
+
+
+@pytest.fixture
+def gridlabd() -> Iterator[GridlabdProcess]:
+    """GridLAB-D without a model, and without patience."""
+    process = GridlabdProcess(sys.executable, deadline=0.2)
+    yield process
+    process.close()
+
+
+def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
+    """After kill -9 of GridLAB-D the run breaks at once, and says when and how."""
+
+    def kill(telemetry: Telemetry) -> None:
+        for pid in all_of(os.getpid()):
+            os.kill(pid, signal.SIGKILL)
+
+    outcome = run_inprocess(*run_of(), kill)
+
+    assert outcome.broke.startswith("plant after t = 0 s: GridLAB-D's process was killed by SIGKILL")
+    assert all_of(os.getpid()) == []
+
+
+def test_agents_end_when_gridlabd_is_killed(tmp_path: Path) -> None:
+    """With processes the plant tells the reason, and no process is left."""
+    run = ProcessRun(*run_of(), tmp_path)
+    run.at(0.1, lambda: os.kill(gridlabd_of(run.child("plant").pid), signal.SIGKILL))
+
+    outcome = run(plant_command=())
+
+    assert "GridLAB-D's process was killed by SIGKILL" in outcome.broke
+    assert [line for line in outcome.notes if "Traceback" in line] == []
+
+
+def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
+    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does."""
+    run = ProcessRun(*run_of(), tmp_path)
+    watched: list[int] = []
+
+    def kill() -> None:
+        plant = run.child("plant").pid
+        watched.append(os.pidfd_open(gridlabd_of(plant)))
+        os.kill(plant, signal.SIGKILL)
+
+    run.at(0.1, kill)
+    outcome = run(plant_command=())
+
+    assert "plant was killed by SIGKILL" in outcome.broke
+    assert select.select(watched, [], [], 10.0)[0] == watched
+    os.close(watched[0])
+
+
+def test_ctrl_c_ends_gridlabd(tmp_path: Path) -> None:
+    """Ctrl-C of the command is one line and exit code 130, and leaves no GridLAB-D."""
+    text = (
+        'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n'
+        '[case.one]\nsecondary = "none"\ngraph = "none"\n[case.other]\nsecondary = "none"\ngraph = "none"\n'
+    )
+    (tmp_path / "two.toml").write_text(text.format(end=0.04))
+    words = ["run", "two.toml", "--driver", "inprocess", "--out", "here"]
+    command = [sys.executable, "-c", "from gridpeers.cli.app import main; main()", *words]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None
+        assert any(line.startswith("case one: ") for line in running.stdout)
+        running.send_signal(signal.SIGINT)
+        _, errors = running.communicate(timeout=60)
+
+    assert running.returncode == 130, errors
+    assert errors.endswith("gridpeers: interrupted; what came until then is in here/\n")
+    assert all_of(running.pid) == []
+
+
+def test_a_trip_ends_the_run_by_name() -> None:
+    """GridLAB-D's inverters go on where ours would trip, so the run breaks and says which, when and by what."""
+    outcome = in_one_process(protection=Protection(trips={"UF1": (59.9, 0.02), "UF2": (59.0, 0.02)}))
+
+    assert outcome.broke.startswith("plant at t = 0.0")
+    assert "inv2: underfrequency 59." in outcome.broke
+    assert outcome.broke.endswith('write [protection] category = "off", or simulator = "gridpeers"')
+
+
+def test_a_network_without_solution_ends_the_run_with_gridlabds_words() -> None:
+    """An island with twice the load that it can feed diverges; the error has GridLAB-D's own lines."""
+    plant, _ = run_of()
+    outcome = in_one_process(
+        changes=replace(plant.settings.changes, load_factor=2.0), protection=Protection(category="off")
+    )
+
+    assert outcome.broke.startswith("plant after t = 0.04 s: GridLAB-D: it ended its simulation before its time")
+    assert "Newton-Raphson failed to converge" in outcome.broke
+
+
+def test_a_model_that_gridlabd_refuses_is_an_error_with_its_words(gridlabd: GridlabdProcess) -> None:
+    """What GridLAB-D says of a GLM is passed on."""
+    with pytest.raises(GridlabdError, match=r"(?s)GridLAB-D: it refuses the model.*nonsense"):
+        gridlabd.load("module nonsense;\n", [])
+
+
+def test_gridlabd_that_does_not_answer_is_named(gridlabd: GridlabdProcess) -> None:
+    """A process that stands still does not hold up the run for ever."""
+    os.kill(gridlabd.pid, signal.SIGSTOP)
+
+    with pytest.raises(GridlabdError, match=r"GridLAB-D has not answered for 0\.2 s, so it was ended"):
+        gridlabd.ask(advance=1)
+
+
+def test_without_the_wheel_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command refuses before it starts anything, and so does the plant."""
+    find = find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name, *rest: None if name == "gridlabd" else find(name, *rest)
+    )
+    code, text = invoke("run", "islanding", "--plant", "gridlabd", "--driver", "inprocess")
+
+    assert code == 2
+    assert text.splitlines()[-1] == "gridpeers: install it: pip install 'gridpeers[gridlabd]'"
+    with pytest.raises(GridlabdError, match=r"/nowhere/python has no package gridlabd; .*pip install 'gridpeers"):
+        GridlabdProcess("/nowhere/python", deadline=1.0)
+
+
+def test_gridlabd_keeps_no_real_time() -> None:
+    """A second of it takes more than a second, so real time is refused in one line."""
+    code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "wall")
+
+    assert code == 2
+    assert text == 'gridpeers: --clock wall: the plant of "gridlabd" keeps no real time; use --clock simulated\n'
