@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -15,11 +14,9 @@ from plant.tables import FeederError
 from plant.tables.write import TAP_STEP, write_feeder
 
 from .glm import START, read_table, write_glm
-from .glm_network import F_NOM, TableRow, network_blocks
+from .glm_network import TableRow, network_blocks
 from .impedance import with_impedances
-
-GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
-"""Names that GridLAB-D takes for an object."""
+from .unrepresentable import unrepresentable
 
 POWER_FLOW_HEADER = f"""clock {{
 	timezone UTC0;
@@ -63,8 +60,7 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
         raise FeederError(feeder.name, tuple(problems))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_feeder(feeder, folder)
-        _write_regulators(feeder.regulators, folder)
+        write_tables(feeder, folder)
         if feeder.inverters:
             text = _in_delta_mode(feeder, settings, seconds, folder)
         else:
@@ -75,29 +71,10 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
     return f'{head}{text}\nobject voltdump {{\n\tfilename "{voltages}";\n\tmode RECT;\n}}\n'
 
 
-def unrepresentable(feeder: Feeder) -> list[str]:
-    """Return a sentence for everything that the model cannot represent."""
-    if feeder.elements or feeder.load_parts:
-        return [
-            f"{feeder.name} was imported: its elements are admittance matrices, which no object of GridLAB-D takes; "
-            "a feeder of our own tables can be written"
-        ]
-    problems = []
-    if feeder.source is None:
-        problems.append(f"{feeder.name} has no source.csv; GridLAB-D needs a substation as its swing bus")
-    if feeder.f_nom != F_NOM:
-        problems.append(f"{feeder.name} has {feeder.f_nom:g} Hz; the model is written for {F_NOM:g} Hz")
-    fixed = (
-        {f"n{bus.name}" for bus in feeder.buses} | {f"l{line.name}" for line in feeder.lines} | {"islands", "ticker"}
-    )
-    own = [("inverter", row.name) for row in feeder.inverters]
-    own += [("regulator", name) for name in dict.fromkeys(row.name for row in feeder.regulators)]
-    for kind, name in own:
-        if not GLM_NAME.fullmatch(name):
-            problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ . and -, a letter first; rename it')
-        if name in fixed or name in [other for at, other in own if at != kind]:
-            problems.append(f'{kind} "{name}": another object of the model has that name; rename it')
-    return problems
+def write_tables(feeder: Feeder, folder: Path) -> None:
+    """Write the tables of a feeder, with its regulators' ratios as whole taps, for `write_glm`."""
+    write_feeder(feeder, folder)
+    _write_regulators(feeder.regulators, folder)
 
 
 def _in_delta_mode(feeder: Feeder, settings: PlantSettings, seconds: int, folder: Path) -> str:

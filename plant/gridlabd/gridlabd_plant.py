@@ -109,7 +109,6 @@ class GridlabdPlant:
             self._parameters,
             self._h,
             round(REST + end + 2.0),
-            settings.changes,
         )
         self.process = GridlabdProcess(python, deadline)
         """GridLAB-D."""

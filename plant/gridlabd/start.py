@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
+from msgspec.structs import replace
+
 from plant.equipment import Feeder
 from plant.feeder import Plant
 from plant.network import Network
-from plant.plant_config import PlantConfig
+from plant.plant_config import FeederChanges, PlantConfig
 
+from .export_glm import write_tables
 from .gridlabd_plant import GridlabdPlant
 from .impedance import with_impedances
 
@@ -20,13 +26,18 @@ def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:
         If there is no operating point, the wheel is missing, or GridLAB-D refuses the model.
     """
     assert config.end is not None, "a scenario in simulated time has an end"
-    ours = Plant(Network(with_impedances(feeder)), config.settings, config.T_c, config.record_step)
-    return GridlabdPlant(
-        ours,
-        config.settings,
-        config.T_c,
-        config.end,
-        record_step=config.record_step,
-        deadline=config.deadline,
-        network=Network(feeder),
-    )
+    settings = config.settings
+    ours = Plant(Network(with_impedances(feeder)), settings, config.T_c, config.record_step)
+    with tempfile.TemporaryDirectory() as name:
+        if settings.changes != FeederChanges():  # else GridLAB-D's model is written from the tables as they stand
+            write_tables(feeder, Path(name))
+            settings = replace(settings, feeder=name)
+        return GridlabdPlant(
+            ours,
+            settings,
+            config.T_c,
+            config.end,
+            record_step=config.record_step,
+            deadline=config.deadline,
+            network=Network(feeder),
+        )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
+from itertools import pairwise
 
-from plant.equipment import F_NOM, Feeder
+from plant.equipment import Feeder
+from plant.gridlabd.unrepresentable import unrepresentable
 from plant.inverter_parameters import GfmParameters
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.supply import supply_states
+
+_SHOWN = 4
+"""So many buses of a part are named."""
 
 _OTHERWISE = 'or use simulator = "gridpeers"'
 
@@ -21,14 +24,9 @@ def check_gridlabd(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
     """
     if scenario.plant.simulator != "gridlabd":
         return
-    for text in _of_feeder(feeder):
-        problems.add("plant.feeder", f"{text}; choose another feeder, {_OTHERWISE}")
-    if feeder.f_nom != F_NOM:
+    for text in unrepresentable(feeder):
         path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
-        problems.add(
-            path,
-            f"GridLAB-D's inverters are written for {F_NOM:g} Hz, got {feeder.f_nom:g} Hz; take that, {_OTHERWISE}",
-        )
+        problems.add(path, f"{text}; change it, {_OTHERWISE}")
     steps = 1.0 / scenario.time.h_s if scenario.time.h_s else 0.0
     if abs(steps - round(steps)) > 1e-6 and not problems.touch("time.h_s"):
         problems.add(
@@ -43,22 +41,6 @@ def check_gridlabd(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
             )
     _check_parameters(scenario, feeder, problems)
     _check_supply(scenario, feeder, problems)
-
-
-def _of_feeder(feeder: Feeder) -> Iterator[str]:
-    """Yield what of a feeder is not written for GridLAB-D."""
-    if feeder.elements or feeder.load_parts:
-        yield f'feeder "{feeder.name}" comes from another program, with elements that are not written for GridLAB-D'
-    elif feeder.source is None:
-        yield f'feeder "{feeder.name}" has no substation, and GridLAB-D begins with a swing bus'
-    switches = ((switch.from_bus, switch.to_bus, 3) for switch in feeder.switches)
-    branches = Counter(bus for one, other, _ in (*feeder.branches(), *switches) for bus in (one, other))
-    used = {load.bus for load in feeder.loads} | {bank.bus for bank in feeder.capacitors}
-    used |= {unit.bus for unit in feeder.inverters}
-    for unit in feeder.transformers:
-        ends = (unit.from_bus, unit.to_bus)
-        if not any(bus not in used and branches[bus] == 1 for bus in ends):
-            yield f"the transformer from {ends[0]} to {ends[1]} feeds something, and none is written for GridLAB-D"
 
 
 def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
@@ -82,13 +64,24 @@ def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problem
 
 
 def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note events that leave an inverter without voltage: GridLAB-D's does not come back from there."""
+    """Note events that leave an inverter without voltage, or give it back to a part that had none.
+
+    An inverter of GridLAB-D does not return from there, and its power flow finds no solution from 0 V.
+    """
     index = {event.label: i for i, event in enumerate(scenario.events)}
-    for state in supply_states(scenario, feeder):
-        idle = [row.name for row in feeder.inverters if (row.bus, "A") in state.new]
-        if state.event and idle:
+    for before, state in pairwise(supply_states(scenario, feeder)):
+        assert state.event is not None, "the first state alone has none"
+        path, event = f"event[{index[state.event.label]}]", f'event "{state.event.label}"'
+        if idle := [row.name for row in feeder.inverters if (row.bus, "A") in state.new]:
             problems.add(
-                f"event[{index[state.event.label]}]",
-                f'event "{state.event.label}" de-energises {", ".join(idle)}, and an inverter of GridLAB-D needs a '
-                f"voltage; leave a GFM connected to it, {_OTHERWISE}",
+                path,
+                f"{event} de-energises {', '.join(idle)}, and an inverter of GridLAB-D needs a voltage; "
+                f"leave a GFM connected to it, {_OTHERWISE}",
+            )
+        if again := sorted({bus for bus, _ in before.dead - state.dead}):
+            some = ", ".join(again[:_SHOWN]) + (", ..." if len(again) > _SHOWN else "")
+            problems.add(
+                path,
+                f"{event} energises {len(again)} de-energised buses again ({some}), for which GridLAB-D finds no "
+                f"solution; leave their switch open, {_OTHERWISE}",
             )
