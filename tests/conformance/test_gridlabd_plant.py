@@ -38,11 +38,15 @@ def case_IV(islanding: gp.Scenario) -> Result:
 
 @pytest.fixture(scope="module")
 def three_islands() -> gp.Scenario:
-    """A grid that falls apart, and a cloud."""
+    """A grid that falls apart, with other loads and another inverter than the tables have, and a cloud."""
     return gp.Scenario(
         name="apart",
         time={"end_s": 0.2},
-        plant={"simulator": "gridlabd"},
+        plant={
+            "simulator": "gridlabd",
+            "load_factor": 0.9,
+            "inverter": {"inv3": {"P_rated_kW": 300.0, "m_q_pu": 0.04}},
+        },
         event=[
             {"label": "islanding", "t_s": 0.04, "open": ["13-152"]},
             {"label": "apart", "t_s": 0.1, "open": ["sw1_2", "sw2_3"], "P_max_kW": {"inv2": 150.0}},
