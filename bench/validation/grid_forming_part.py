@@ -1,0 +1,208 @@
+"""Part (d): OpenDSS's grid-forming storage and ours, on the same island."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from bench.validation.opendss.grid_forming_island import (
+    AT,
+    BUS,
+    EMF,
+    ISLANDING,
+    S_RATED,
+    SHEDDING,
+    STATES,
+    V_LL,
+    Z_GFM,
+    behind_inverter,
+    behind_source,
+    delivered,
+    island_script,
+)
+from bench.validation.opendss.opendss_engines import ENGINES, SolvedStates, solve_scripts
+from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from plant.dynamics import Circuit, Dynamics, Inverter
+from plant.dynamics.phasors import aligned_sum
+from plant.equipment import Feeder
+from plant.feeder.circuits import circuit_of
+from plant.inverter_parameters import GfmParameters
+from plant.network import Network, solve_power_flow
+from plant.tables import read_feeder
+
+LIMIT = 1e-6
+"""Largest difference of a phasor (pu of nominal voltage) and of the storage's power (pu of its rating)."""
+
+M_Q = 0.05
+
+TEXT = f"""
+The microgrid feeder, islanded at {ISLANDING} with 3.4 MW of load, behind one grid-forming storage of 4 MVA
+(`ControlMode=GFM`) in both OpenDSS engines, and behind one GFM in ours. Every node's phasor and the storage's power are
+within {LIMIT:g} pu.
+
+- `snapshot`: OpenDSS holds 1 pu behind the impedance that it derives from the rating; so does our power flow.
+- `settled`: in its dynamics mode OpenDSS starts from zero voltage and has settled after 1 s. Our GFM, with that
+  impedance as its filter, starts from its equilibrium at OpenDSS's terminal voltage, and rests there for 1 s.
+- `shed`: {SHEDDING} opens and sheds 1.2 MW. The internal voltage does not jump: OpenDSS's is looked at 2 us later,
+  ours in the first network solution.
+- `regulated`: 1 s later in OpenDSS; ours after 5 s, with the V_set whose droop leads to OpenDSS's terminal voltage.
+  Ours turns at its own frequency, so its phasors are turned back to OpenDSS's at the terminal.
+
+OpenDSS's model goes no further. Its source stays at nominal frequency and angle zero: it has no P-f droop, so it cannot
+share power with a second one. It has no Q-V droop; phase A alone sets the magnitude, up to the limit of the rating. Its
+impedance follows from the rating, near 0.001 pu; it has no filter of its own. Before the controls settle, its voltage
+follows a law that has no counterpart here. With `conn=wye` the impedance of its source is wrong in both engines, and of
+zero sequence the engines have different ones: so the storage has `conn=delta`, behind a delta-wye transformer.
+"""
+
+CASES = {
+    "snapshot": "power flow, 1 pu behind the source's impedance",
+    "settled": "dynamics mode, settled",
+    "shed": "a zone is shed, internal voltage held",
+    "regulated": "the same, our GFM settled under its own control",
+}
+
+RIVAL_STATE = {name: number for number, name in enumerate(CASES)}
+"""Which of `STATES` a case is compared with."""
+
+
+class GridFormingIsland:
+    """Our island in the cases, beside one engine's states.
+
+    Parameters
+    ----------
+    feeder
+        The microgrid feeder.
+    theirs
+        An engine's voltages in `STATES`.
+    """
+
+    def __init__(self, feeder: Feeder, theirs: SolvedStates) -> None:
+        self._feeder, self._theirs = feeder, theirs
+        self.network = Network(behind_inverter(feeder))
+        self._islanded = self.network.closed0 - {ISLANDING}
+        island = next(buses for buses in self.network.islands(self._islanded) if BUS in buses)
+        self.nodes = [i for i, (bus, _) in enumerate(self.network.nodes) if bus in island]
+
+    def rival(self, state: int) -> NDArray[np.complex128]:
+        """Return the engine's phasors (V) at `nodes`."""
+        found = self._theirs.state(state)
+        names = [self.network.nodes[i] for i in self.nodes]
+        return np.array([found[f"{bus}.{'ABC'.index(phase) + 1}"] for bus, phase in names])
+
+    def power(self, V: NDArray[np.complex128]) -> complex:
+        """Return the power (VA) that the storage delivers at phasors of `nodes` (V)."""
+        by_node = dict(zip(self.nodes, V.tolist(), strict=True))
+        low, high = (np.array([by_node[self.network.index(bus, phase)] for phase in "ABC"]) for bus in (BUS, AT))
+        return delivered(self._feeder, low, high)
+
+    def terminal(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return the storage's phasors (V) from those of `nodes`."""
+        by_node = dict(zip(self.nodes, V.tolist(), strict=True))
+        return np.array([by_node[self.network.index(BUS, phase)] for phase in "ABC"])
+
+    def snapshot(self) -> NDArray[np.complex128]:
+        """Return our phasors (V) behind a source of 1 pu."""
+        network = Network(behind_source(self._feeder))
+        V = solve_power_flow(network, network.closed0 - {ISLANDING}, tolerance=1e-12).V
+        kept = [i for i, (bus, _) in enumerate(network.nodes) if bus != EMF]
+        ours: NDArray[np.complex128] = V[kept][self.nodes]
+        return ours
+
+    def dynamics(self, case: str) -> tuple[NDArray[np.complex128], float]:
+        """Return our phasors (V) and frequency (Hz) in a case of the dynamics."""
+        dynamics = self._start(self.terminal(self.rival(RIVAL_STATE["settled"])))
+        f = float(dynamics.run(500)[-1, 0, 0])
+        if case == "settled":
+            return self._phasors(dynamics, self._islanded), f
+        shed = self._islanded - {SHEDDING}
+        dynamics.connect(self._circuit(shed))
+        if case == "shed":
+            return self._phasors(dynamics, shed), f
+        aim = self.rival(RIVAL_STATE[case])
+        V_b = V_LL / sqrt(3.0)
+        v, q = float(np.abs(self.terminal(aim)).mean()) / V_b, self.power(aim).imag / S_RATED
+        dynamics.inverters.hold(0, float(dynamics.inverters.set_points[0, 0]), v + M_Q * q)
+        f = float(dynamics.run(2500)[-1, 0, 0])
+        V = self._phasors(dynamics, shed)
+        turn = complex(aligned_sum(self.terminal(aim)) / aligned_sum(self.terminal(V)))
+        return V * (turn / abs(turn)), f
+
+    def _circuit(self, closed: frozenset[str]) -> Circuit:
+        return circuit_of(self.network, closed, self.network.loads())
+
+    def _start(self, V: NDArray[np.complex128]) -> Dynamics:
+        """Return our plant at rest at these terminal phasors (V)."""
+        V_b = V_LL / sqrt(3.0)
+        parameters = GfmParameters(R_f=Z_GFM.real, X_f=Z_GFM.imag)
+        unit = Inverter(name="gfm", kind="GFM", S_b=S_RATED, V_b=V_b, m_p=0.01, m_q=M_Q, parameters=parameters)
+        dynamics = Dynamics(self._circuit(self._islanded), (unit,), 0.002)
+        dynamics.start(np.zeros(1), np.zeros(1), swing_voltage=V / V_b)
+        return dynamics
+
+    def _phasors(self, dynamics: Dynamics, closed: frozenset[str]) -> NDArray[np.complex128]:
+        ours: NDArray[np.complex128] = self.network.merge(closed).expand(dynamics.voltages())[self.nodes]
+        return ours
+
+
+def _run(case: str) -> CaseResult:
+    feeder = read_feeder("microgrid123", "main")
+    measured, curves, facts = [], {}, {}
+    for engine in ENGINES:
+        island = GridFormingIsland(feeder, _solved(engine))
+        V, f = (island.snapshot(), 60.0) if case == "snapshot" else island.dynamics(case)
+        theirs = island.rival(RIVAL_STATE[case])
+        gap = np.abs(V - theirs) / island.network.V_nom[island.nodes]
+        S, S_theirs = island.power(V), island.power(theirs)
+        measured += [
+            Measured(f"V, pu, {engine}", float(gap.max()), LIMIT),
+            Measured(f"S, pu, {engine}", abs(S - S_theirs) / S_RATED, LIMIT),
+        ]
+        live = np.abs(V) > 0.0  # the zone that is shed has no voltage, here or there
+        curves[engine] = gap[live]
+        curves[f"V {engine}"] = (np.abs(theirs) / island.network.V_nom[island.nodes])[live]
+        facts = {
+            "nodes with voltage": f"{live.sum()} of {gap.size}",
+            "P + jQ": f"{S.real / 1e3:.1f} kW + {S.imag / 1e3:.1f} kvar",
+            "f, ours": f"{f:.4f} Hz",
+        }
+    return CaseResult(case, tuple(measured), facts, curves)
+
+
+@cache
+def _solved(engine: str) -> SolvedStates:
+    """Return an engine's voltages in all states; they are the same for all cases."""
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder) / "island.dss"
+        script.write_text(island_script(read_feeder("microgrid123", "main")), encoding="utf-8")
+        return solve_scripts(engine, [(script, STATES)])[0]
+
+
+def _draw(results: Sequence[CaseResult]) -> Figure:
+    """Draw the voltages of the nodes, and the differences there, nodes in the order of their voltage."""
+    figure = Figure(figsize=(8.0, 2.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    engine = ENGINES[0]
+    for result in results:
+        order = np.argsort(result.curves[f"V {engine}"])
+        left.plot(result.curves[f"V {engine}"][order], linewidth=1.0, label=result.case)
+        right.semilogy(np.maximum(result.curves[engine][order], 1e-12), ".", markersize=2.0)
+    right.axhline(LIMIT, color="black", linestyle=":", linewidth=1.0)
+    left.set_ylabel("|V| (pu)")
+    right.set_ylabel(f"difference from {engine} (pu)")
+    for axes in (left, right):
+        axes.set_xlabel("node, by voltage")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside right upper")
+    return figure
+
+
+GRID_FORMING = ValidationPart(
+    "grid-forming", "A grid-forming source, beside OpenDSS", TEXT, ENGINES, CASES, _run, _draw
+)
