@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from plant.equipment import Feeder, Line, Switch
 from plant.imported_equipment import LinearElement
+from wire.bounds import MOST
 
 TIE_LENGTH = 0.3
 """Length (km) of the line of a tie."""
@@ -53,13 +54,14 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
     Raises
     ------
     ValueError
-        If the feeder has no substation, the number is below 1, or `joint` is no bus of three phases.
+        If the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
     """
     bus = next((each for each in feeder.buses if each.name == joint), None)
     if feeder.source is None:
         raise ValueError(f'feeder "{feeder.name}" has no substation for its copies to share')
-    if copies < 1:
-        raise ValueError(f"copies: must be at least 1, got {copies}")
+    most = MOST // max(len(feeder.inverters), 1)
+    if not 1 <= copies <= most:
+        raise ValueError(f"copies: must be from 1 to {most}, as a run has at most {MOST} inverters; got {copies}")
     if bus is None or not set("ABC") <= set(bus.phases):
         raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
     fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")

@@ -27,6 +27,9 @@ from wire.actions import Action, Fetch, Listen, Log, Publish
 from wire.codec import decode
 from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 
+SHOWN = 5
+"""Missing messages that an error names."""
+
 
 class _Delivery(NamedTuple):
     """One message on its way to one receiver."""
@@ -85,7 +88,7 @@ class InprocessBus:
             self._end_the_stopped()
             self._start_the_awaited()
             if not (plant.finished or plant.work(0.0) or self._queue):
-                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages())
+                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:SHOWN])
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
         self._do(plant, plant.take_actions())
 

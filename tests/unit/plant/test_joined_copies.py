@@ -50,7 +50,12 @@ def test_imported_feeders_can_be_copied(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("copies", "joint", "text"),
-    [(0, "450", "must be at least 1, got 0"), (2, "nope", "needs a bus"), (2, "32", "A, B")],
+    [
+        (0, "450", "from 1 to 111, .*got 0"),
+        (112, "450", "at most 1000 inverters"),
+        (2, "nope", "needs a bus"),
+        (2, "32", "A, B"),
+    ],
 )
 def test_what_cannot_be_joined_is_told(copies: int, joint: str, text: str) -> None:
     """Numbers below one and buses without three phases."""
