@@ -257,7 +257,9 @@ def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
 
 
 def _as_run(request: Request) -> dict[str, Any]:
-    return {"driver": request.driver} | versions()
+    simulator = request.scenario.plant.simulator
+    own = {simulator: _version(simulator)} if simulator != "gridpeers" else {}
+    return {"driver": request.driver} | versions() | own
 
 
 def versions() -> dict[str, str]:

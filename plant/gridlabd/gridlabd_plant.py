@@ -25,8 +25,8 @@ from plant.plant_config import PlantSettings, PowerLimit
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of
 
+from .delta_mode_process import DeltaModeProcess, GridlabdError
 from .glm import write_glm
-from .gridlabd_process import GridlabdError, GridlabdProcess
 
 FEEDERS = Path(__file__).parents[1] / "data"
 
@@ -110,7 +110,7 @@ class GridlabdPlant:
             self._h,
             round(REST + end + 2.0),
         )
-        self.process = GridlabdProcess(python, deadline)
+        self.process = DeltaModeProcess(python, deadline)
         """GridLAB-D."""
         try:
             units = [(unit.name, f"n{unit.bus}", unit.kind) for unit in self._units.values()]

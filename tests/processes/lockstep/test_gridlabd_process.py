@@ -15,7 +15,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
-from plant.gridlabd.gridlabd_process import GridlabdError, GridlabdProcess
+from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.plant_config import PlantConfig, Protection
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome
@@ -26,6 +26,12 @@ from tests.toy.toy_runs import ProcessRun
 from wire.messages import Telemetry
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
+
+TWO_CASES = (
+    'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n'
+    '[case.one]\nsecondary = "none"\ngraph = "none"\n[case.other]\nsecondary = "none"\ngraph = "none"\n'
+)
+"""A scenario of two short cases."""
 
 
 def run_of(**changes: object) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
@@ -63,9 +69,9 @@ def is_of(path: Path, pid: int) -> bool:
 
 
 @pytest.fixture
-def gridlabd() -> Iterator[GridlabdProcess]:
+def gridlabd() -> Iterator[DeltaModeProcess]:
     """GridLAB-D without a model, and without patience."""
-    process = GridlabdProcess(sys.executable, deadline=0.2)
+    process = DeltaModeProcess(sys.executable, deadline=0.2)
     yield process
     process.close()
 
@@ -114,11 +120,7 @@ def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
 
 def test_ctrl_c_ends_gridlabd(tmp_path: Path) -> None:
     """Ctrl-C of the command is one line and exit code 130, and leaves no GridLAB-D."""
-    text = (
-        'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n'
-        '[case.one]\nsecondary = "none"\ngraph = "none"\n[case.other]\nsecondary = "none"\ngraph = "none"\n'
-    )
-    (tmp_path / "two.toml").write_text(text.format(end=0.04))
+    (tmp_path / "two.toml").write_text(TWO_CASES.format(end=0.04))
     words = ["run", "two.toml", "--driver", "inprocess", "--out", "here"]
     command = [sys.executable, "-c", "from gridpeers.cli.app import main; main()", *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
@@ -152,13 +154,13 @@ def test_a_network_without_solution_ends_the_run_with_gridlabds_words() -> None:
     assert "Newton-Raphson failed to converge" in outcome.broke
 
 
-def test_a_model_that_gridlabd_refuses_is_an_error_with_its_words(gridlabd: GridlabdProcess) -> None:
+def test_a_model_that_gridlabd_refuses_is_an_error_with_its_words(gridlabd: DeltaModeProcess) -> None:
     """What GridLAB-D says of a GLM is passed on."""
     with pytest.raises(GridlabdError, match=r"(?s)GridLAB-D: it refuses the model.*nonsense"):
         gridlabd.load("module nonsense;\n", [])
 
 
-def test_gridlabd_that_does_not_answer_is_named(gridlabd: GridlabdProcess) -> None:
+def test_gridlabd_that_does_not_answer_is_named(gridlabd: DeltaModeProcess) -> None:
     """A process that stands still does not hold up the run for ever."""
     os.kill(gridlabd.pid, signal.SIGSTOP)
 
@@ -177,12 +179,17 @@ def test_without_the_wheel_one_line_says_what_to_install(monkeypatch: pytest.Mon
     assert code == 2
     assert text.splitlines()[-1] == "gridpeers: install it: pip install 'gridpeers[gridlabd]'"
     with pytest.raises(GridlabdError, match=r"/nowhere/python has no package gridlabd; .*pip install 'gridpeers"):
-        GridlabdProcess("/nowhere/python", deadline=1.0)
+        DeltaModeProcess("/nowhere/python", deadline=1.0)
 
 
-def test_gridlabd_keeps_no_real_time() -> None:
+def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:
     """A second of it takes more than a second, so real time is refused in one line."""
+    (tmp_path / "mine.toml").write_text(TWO_CASES.format(end=1.0))
     code, text = invoke("run", "islanding", "--plant", "gridlabd", "--clock", "wall")
 
     assert code == 2
     assert text == 'gridpeers: --clock wall: the plant of "gridlabd" keeps no real time; use --clock simulated\n'
+    for live in ("plant", "up"):
+        code, text = invoke(live, str(tmp_path / "mine.toml"), "--listen", "tcp/127.0.0.1:0")
+        assert (code, text.count("\n")) == (2, 1)
+        assert 'plant.simulator = "gridlabd": keeps no real time' in text

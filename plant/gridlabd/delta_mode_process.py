@@ -35,7 +35,7 @@ class GridlabdError(RuntimeError):
     """GridLAB-D is missing, refuses its model, diverges, or has ended."""
 
 
-class GridlabdProcess:
+class DeltaModeProcess:
     """GridLAB-D in a process of its own, which ends with this one.
 
     Parameters
