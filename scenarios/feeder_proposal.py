@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from itertools import accumulate
+from math import ceil
 from typing import NamedTuple
 
 from plant.connectivity import Connectivity, by_bus
 from plant.equipment import Feeder, InverterRow
+from plant.tables.feeder_columns import RATED_CURRENT, power_of
+from scenarios.feeder_walk import cut_off_sums, depth_first, neighbours
 
 RATING = 1.3
 """Rating of all inverters of a section beside its load at nominal voltage."""
 IMPORTED = 0.1
 """Part of the load that comes over the islanding switch before it opens."""
 LEADER = 0.4
-"""Part of a section's rating that its leader, the grid-forming inverter, has."""
-FOLLOWERS = 2
-"""Grid-following inverters of a section."""
+"""Part of a group's rating that its leader, the grid-forming inverter, has."""
+GROUP = 3
+"""Inverters of a group, a microgrid of its own: one leader and its followers. A section has one group or several."""
 ENOUGH = 0.5
 """Part of the feeder's load that the switch must cut off, to be worth islanding."""
 SMALLEST = 20e3
@@ -24,8 +29,10 @@ DROOPS = 0.01, 0.05
 """P-f and Q-V droop (pu)."""
 LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "underground_line"}
 """Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
-MOST_SECTIONS = 12
-"""Sections that have inverters, those of most load first."""
+GROUP_LOAD = 2e6
+"""Load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder."""
+MOST_GROUPS = 12
+"""Groups that are proposed without being told how many inverters, those of most load first."""
 
 
 class Proposal(NamedTuple):
@@ -55,116 +62,228 @@ class NoSwitchError(NoProposalError):
 
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = tuple(lines)
-        hint = f"name a line to be one, such as {', '.join(lines)}" if lines else "it has no three-phase line to be one"
+        hint = (
+            f"name a line to be one, such as {', '.join(lines)}" if lines else "no single three-phase line does either"
+        )
         super().__init__(f"no switch cuts half of the load off the substation; {hint}")
 
 
-def propose(feeder: Feeder) -> Proposal:
+def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
-    rated by its load and spread over its three-phase buses.
+    rated by its load and spread over it in equal parts of the load.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        The feeder; its own inverters are not considered.
+    count : int, optional
+        Inverters to propose; by default one group for each section. Sections of more load have more groups.
 
     Raises
     ------
     NoProposalError
         If no switch cuts off half of the load, or no section beyond it has a three-phase bus for each inverter.
     """
-    switch, beyond = _islanding_switch(feeder)
+    switch, head, beyond = _islanding_switch(feeder)
     everywhere = feeder.load_by_bus()
     load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
     total = sum(load.values())
-    phases = {bus.name: bus.phases for bus in feeder.buses}
+    near = {bus: [other for other in others if other in beyond] for bus, others in neighbours(feeder).items()}
+    along = depth_first(near, [head, *(bus.name for bus in feeder.buses if bus.name in beyond)])
+    known = set(_three_phase(feeder))
     sections = [
-        section
+        _Section(sum(load[bus] for bus in buses), [bus for bus in along if bus in buses])
         for part in by_bus(Connectivity(feeder).parts(closed=()))
-        if (section := {bus for bus, _ in part} & beyond) and _places(feeder, section, phases)
+        if len(buses := {bus for bus, _ in part} & beyond) > 1 and buses & known
     ]
-    sections.sort(key=lambda section: -sum(load[bus] for bus in section))
-    chosen = [s for s in sections if sum(load[bus] for bus in s) >= SMALLEST][:MOST_SECTIONS] or sections[:1]
+    sections.sort(key=lambda section: -section.load)
+    chosen = [section for section in sections if section.load >= SMALLEST][:MOST_GROUPS] or sections[:1]
     if not chosen:
         raise NoProposalError(f'beyond switch "{switch}" no bus has phases A, B and C, which an inverter needs')
-    carried = sum(load[bus] for section in chosen for bus in section) or 1.0
-    inverters: list[InverterRow] = []
+    room = [max(len(_places(feeder, section.along, 0.0, GROUP)) // GROUP, 1) for section in chosen]
+    groups = _groups([section.load for section in chosen], room, count)
+    chosen = chosen[: len(groups)]
+    carried = sum(section.load for section in chosen) or 1.0
     V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
-    for number, section in enumerate(chosen, start=1):
-        own = sum(load[bus] for bus in section)
-        rating = RATING * total * (own / carried if carried > 1.0 else 1.0 / len(chosen))
-        places = _spread(_places(feeder, section, phases), 1 + FOLLOWERS)
-        middle = len(places) // 2  # a leader at one end of a long line does not hold the other
-        follower = (1.0 - LEADER) / max(len(places) - 1, 1)
-        for k, bus in enumerate(places):
-            share = LEADER if k == middle else follower
-            inverters.append(
-                InverterRow(
-                    name=f"inv{len(inverters) + 1}",
-                    kind="GFM" if k == middle else "GFL",
-                    bus=bus,
-                    microgrid=f"MG{number}",
-                    P_rated=max(round(rating * share, -4), 10e3),
-                    V_nom=V_nom[bus],
-                    m_p=DROOPS[0],
-                    m_q=DROOPS[1],
+    inverters: list[InverterRow] = []
+    microgrid = 0
+    for section, sizes in zip(chosen, groups, strict=True):
+        rating = RATING * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
+        places = _places(feeder, section.along, LEADER * rating / len(sizes), sum(sizes))
+        places = _spread(section.along, set(places), sum(sizes), load)
+        sizes = _fitting(sizes, len(places))
+        for size in sizes:
+            microgrid += 1
+            own, places = places[:size], places[size:]
+            middle = size // 2  # a leader at one end of a long line does not hold the other
+            follower = (1.0 - LEADER) / max(size - 1, 1)
+            for k, bus in enumerate(own):
+                share = (LEADER if k == middle else follower) if size > 1 else 1.0
+                inverters.append(
+                    InverterRow(
+                        name=f"inv{len(inverters) + 1}",
+                        kind="GFM" if k == middle else "GFL",
+                        bus=bus,
+                        microgrid=f"MG{microgrid}",
+                        P_rated=max(round(rating / len(sizes) * share, -4), 10e3),
+                        V_nom=V_nom[bus],
+                        m_p=DROOPS[0],
+                        m_q=DROOPS[1],
+                    )
                 )
+    for row in inverters:
+        if row.P_rated > (most := _most_rated(row.V_nom)):
+            raise NoProposalError(
+                f"the load of {total / 1e3:.0f} kW needs an inverter of {row.P_rated / 1e3:.0f} kW at bus {row.bus}, "
+                f"where {most / 1e3:.0f} kW are plausible; give more --inverters, or another --switch"
             )
-    rated = sum(row.P_rated for row in inverters)
-    generated = sum(P for bus, P in feeder.generation_by_bus().items() if bus in beyond)
-    P_set0 = max(round(((1.0 - IMPORTED) * total - generated) / rated, 3), 0.0)
-    return Proposal(switch, tuple(inverters), P_set0, total)
+    total_rated = sum(row.P_rated for row in inverters)
+    return Proposal(switch, tuple(inverters), round((1.0 - IMPORTED) * total / total_rated, 3), total)
 
 
-def _islanding_switch(feeder: Feeder) -> tuple[str, frozenset[str]]:
-    """Return the closed switch that cuts most load off the substation, and the buses beyond it."""
+class _Section(NamedTuple):
+    """Buses between switches."""
+
+    load: float
+    """Their load (W)."""
+    along: Sequence[str]
+    """The buses, along the network."""
+
+
+def _spread(along: Sequence[str], places: Collection[str], count: int, load: Mapping[str, float]) -> list[str]:
+    """Return so many places, if there are, with equal parts of the load (W, by bus) around them, along a section."""
+    until = list(accumulate((load[bus] for bus in along), initial=0.0))[1:]
+    if not until[-1] > 0.0:
+        until = [float(k) for k, _ in enumerate(along, start=1)]
+    there = [(bus, upto) for bus, upto in zip(along, until, strict=True) if bus in places]
+    count = min(count, len(there))
+    found: list[str] = []
+    at = 0
+    for k in range(count):
+        middle = (k + 0.5) / count * until[-1]
+        last = len(there) - (count - k)  # one is left for each of the others
+        while at < last and there[at][1] < middle:
+            at += 1
+        found.append(there[at][0])
+        at += 1
+    return found
+
+
+def _groups(loads: Sequence[float], room: Sequence[int], count: int | None) -> list[list[int]]:
+    """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit.
+
+    Parameters
+    ----------
+    loads
+        Load of each section (W), in falling order.
+    room
+        Groups for which each has places.
+    count
+        Inverters, or None for as many as the load needs.
+    """
+    whole = ceil(count / GROUP) if count else MOST_GROUPS
+    number = [1 for _ in loads[:whole]]
+    while sum(number) < whole:  # the next group goes where a group has most load
+        k = max(range(len(number)), key=lambda k: (number[k] < room[k], loads[k] / number[k]))
+        if number[k] >= room[k] or (count is None and loads[k] / number[k] <= GROUP_LOAD):
+            break
+        number[k] += 1
+    whole = sum(number)
+    sizes = [GROUP] * whole if count is None else [count // whole + (k < count % whole) for k in range(whole)]
+    return [[min(sizes.pop(0), GROUP) for _ in range(many)] for many in number]
+
+
+def _fitting(sizes: list[int], places: int) -> list[int]:
+    """Return sizes of groups of this sum at most, the last groups smaller or left out."""
+    fitting = list[int]()
+    for size in sizes:
+        fitting.append(min(size, places - sum(fitting)))
+    return [size for size in fitting if size > 0]
+
+
+def _islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
+    """Return the closed switch that cuts most load off the substation, its far bus, and the buses beyond it."""
     if feeder.source is None:
         raise NoProposalError("the feeder has no substation to island from")
     graph, load = Connectivity(feeder), feeder.load_by_bus()
     if sum(load.values()) <= 0.0:
         raise NoProposalError("the feeder has no load, which inverters are rated by")
-    best, beyond, most = "", frozenset[str](), (0.0, 0)
+    places = set(_three_phase(feeder))
+    best, head, beyond, most = "", "", frozenset[str](), (False, 0.0, 0)
     for switch in feeder.switches:
         buses = graph.cut_off(switch) if switch.closed else frozenset()
-        weight = sum(load.get(bus, 0.0) for bus in buses), len(buses)
+        # a lumped load beside the feeder is no island, however large
+        weight = len(buses & places) >= GROUP, sum(load.get(bus, 0.0) for bus in buses), len(buses)
         if weight > most:
             best, beyond, most = switch.alias or switch.name, buses, weight
-    if most[0] < ENOUGH * sum(load.values()):
-        raise NoSwitchError(heads(feeder))
-    return best, beyond
+            head = switch.to_bus if switch.to_bus in buses else switch.from_bus
+    large, cut_off, _ = most
+    if not large or cut_off < ENOUGH * sum(load.values()):
+        lines = heads(feeder, more_than=1.01 * cut_off, small=not large)
+        if lines or cut_off <= 0.0:
+            raise NoSwitchError(lines)
+    return best, head, beyond
 
 
-def heads(feeder: Feeder, count: int = 3) -> list[str]:
-    """Return three-phase lines near the substation, which would make switches."""
+def _three_phase(feeder: Feeder) -> list[str]:
+    """Return the buses that have phases A, B and C."""
+    return [bus.name for bus in feeder.buses if set("ABC") <= set(bus.phases)]
+
+
+def heads(feeder: Feeder, more_than: float, *, small: bool, count: int = 3) -> list[str]:
+    """Return three-phase lines that would make switches, the best first.
+
+    They cut off more than so much load (W): half of all load or more as near to the substation as possible, else
+    as much as possible. Lines that cut off a lumped load come last, and only with `small`.
+    """
     if feeder.source is None:
         return []
-    reached: set[str] = {feeder.source.bus}
-    found: list[str] = []
-    rest = [row for row in feeder.elements if len({bus for bus, _ in row.nodes}) > 1]
-    for _ in range(len(rest)):
-        near = [row for row in rest if any(bus in reached for bus, _ in row.nodes)]
-        if not near or len(found) >= count:
-            break
-        for row in near:
-            reached |= {bus for bus, _ in row.nodes}
-            kind, _, name = row.name.partition(".")
-            if kind in LINES and len(row.nodes) >= 6:
-                found.append(f"{LINES[kind]}.{name}")
-        rest = [row for row in rest if row not in near]
-    return found[:count]
+    load, near = feeder.load_by_bus(), neighbours(feeder)
+    total = sum(load.values())
+    where = {bus: place for place, bus in enumerate(depth_first(near, [feeder.source.bus]))}
+    number = defaultdict[frozenset[str], int](int)
+    for one, other, _ in feeder.branches():
+        number[frozenset((one, other))] += 1
+    below = cut_off_sums(near, feeder.source.bus, load)
+    places = cut_off_sums(near, feeder.source.bus, dict.fromkeys(_three_phase(feeder), 1.0))
+    found: list[tuple[bool, bool, float, int, str]] = []
+    for row in feeder.elements:
+        kind, _, name = row.name.partition(".")
+        buses = {bus for bus, _ in row.nodes}
+        if kind in LINES and len(row.nodes) >= 6 and len(buses) == 2 and number[frozenset(buses)] == 1:
+            one, other = sorted(buses, key=lambda bus: where.get(bus, -1))
+            weight = below.get((one, other), 0.0)
+            if weight > more_than:
+                enough = weight >= ENOUGH * total
+                nearness = where[one] if enough else -weight
+                lumped = places.get((one, other), 0.0) < GROUP
+                if small or not lumped:
+                    found.append((lumped, not enough, nearness, where[one], f"{LINES[kind]}.{name}"))
+    return [name for *_, name in sorted(found)[:count]]
 
 
-def _places(feeder: Feeder, section: Collection[str], phases: dict[str, str]) -> list[str]:
-    """Return the buses of a section at which an inverter can stand, of the section's most frequent voltage."""
-    rows = [bus for bus in feeder.buses if bus.name in section and set("ABC") <= set(phases[bus.name])]
+def _places(feeder: Feeder, section: Collection[str], rating: float, count: int) -> list[str]:
+    """Return the buses of a section at which inverters of this rating (W) can stand.
+
+    They are of the highest voltage that has as many as `count`, else of the most frequent one: behind a customer's
+    transformer an inverter that carries its neighbours, too, raises the voltage beyond all bounds.
+    """
+    within, known = set(section), set(_three_phase(feeder))
+    rows = [bus for bus in feeder.buses if bus.name in within and bus.name in known]
     rows = [bus for bus in rows if "~" not in bus.name] or rows
+    rows = [bus for bus in rows if rating <= _most_rated(bus.V_nom)] or rows
     if not rows:
         return []
-    voltages = [round(bus.V_nom) for bus in rows]
-    usual = max(set(voltages), key=voltages.count)
     ends = {bus for switch in feeder.switches for bus in (switch.from_bus, switch.to_bus)}
-    named = [bus.name for bus in rows if round(bus.V_nom) == usual]
-    return [bus for bus in named if bus not in ends] or named
+    rows = [bus for bus in rows if bus.name not in ends] or rows
+    number = Counter(round(bus.V_nom) for bus in rows)
+    enough = [V for V, many in number.items() if many >= count]
+    chosen = max(enough) if enough else max(number, key=lambda V: number[V])
+    return [bus.name for bus in rows if round(bus.V_nom) == chosen]
 
 
-def _spread(places: list[str], count: int) -> list[str]:
-    """Return so many places, evenly spread over a section in the order of its buses."""
-    count = min(count, len(places))
-    return [places[(2 * k + 1) * len(places) // (2 * count)] for k in range(count)]
+def _most_rated(V_nom: float) -> float:
+    """Return the largest plausible rating (W) of an inverter at this voltage (V, line-to-neutral)."""
+    return 1e3 * power_of("an inverter", V_nom, RATED_CURRENT, 3).high

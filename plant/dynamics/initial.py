@@ -53,16 +53,22 @@ class _PowerFlow:
     def voltages(self, J: Complex) -> Complex:
         """Return the terminal voltages (V) for injections J (A)."""
         m = self.V_b.size
-        x = np.concatenate([self.V_b.real, self.V_b.imag])
         I_b, V = np.empty(m, complex), np.empty(J.shape, complex)
         work = np.empty(12 * J.shape[0] + 6 * m)
         still = np.ones(self.reduction.count, complex)
         tolerance = 1e-12 * float(self.units.V_b.max())
-        if solve_network(self.net, J, still, x, I_b, V, tolerance, work) < 0:
-            raise PlantError(
-                "no initial operating point: the power flow did not converge; the load may be more than the "
-                "network can carry; try smaller loads or another P_set0"
-            )
+        for renewed in (False, True):
+            x = np.concatenate([self.V_b.real, self.V_b.imag])
+            if solve_network(self.net, J, still, x, I_b, V, tolerance, work) >= 0:
+                break
+            # the tangent does not lead there, e.g. across a limit of the loads' law: Newton's method does
+            self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
+            if renewed or failed:
+                raise PlantError(
+                    "no initial operating point: the power flow did not converge; the load may be more than the "
+                    "network can carry; try smaller loads or another P_set0"
+                )
+            self.net = self._linearise()
         self.V_b, self.I_b = x[:m] + 1j * x[m:], I_b
         return V
 

@@ -40,12 +40,21 @@ title = "droop alone"
 secondary = "none"
 graph = "none"
 
-[case.ring]
-title = "secondary control, agents in a ring"
+[case.{graph}]
+title = "secondary control, {title}"
 secondary = "all"
-graph = "ring"
+graph = "{graph}"
 """
 """Scenario file of a feeder of one's own."""
+
+GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
+"""Graphs of a proposed scenario, and their words."""
+
+PARTS = (1.0, 0.5, 0.25, 0.0)
+"""Parts of the proposed P_set0 to try, until the plant can start: voltages rise with what inverters deliver."""
+
+MOST_IN_RING = 15
+"""Inverters up to which a ring is quick enough: agreement along it takes a time that goes with their square."""
 
 
 def init(
@@ -63,6 +72,12 @@ def init(
     leave_out: Annotated[
         list[str] | None,
         typer.Option("--leave-out", metavar="ELEMENT", help="With --feeder: do without Class.name; repeat it."),
+    ] = None,
+    inverters: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=1000, metavar="N", help="With --feeder: inverters to propose; 3 a section if left out."
+        ),
     ] = None,
 ) -> None:
     """Make a project of your own, or an islanding of your feeder.
@@ -82,12 +97,12 @@ def init(
             kind = "the folder is not empty" if folder.is_dir() else "this is a file"
             fail([f"{folder}: {kind}; give a new or an empty folder"], BAD_INPUT)
         if feeder is None:
-            if switch or leave_out:
-                fail(["--switch and --leave-out go with --feeder"], BAD_INPUT)
+            if switch or leave_out or inverters:
+                fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
             shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
             following = "gridpeers run mine.toml --driver inprocess && pytest"
         else:
-            _propose(folder, feeder, switch or [], leave_out or [])
+            _propose(folder, feeder, switch or [], leave_out or [], inverters)
             following = "gridpeers run islanding.toml --driver inprocess"
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)
@@ -96,36 +111,56 @@ def init(
     typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")
 
 
-def _with_proposal(script: str, switches: list[str], leave_out: list[str]) -> tuple[Feeder, Proposal]:
+def _with_proposal(
+    script: str, switches: list[str], leave_out: list[str], count: int | None
+) -> tuple[Feeder, Proposal]:
     """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
     from gridpeers.cli.commands.feeder_commands import read_script
     from scenarios.feeder_proposal import NoSwitchError, propose
 
     feeder = read_script(script, switches, leave_out)
     try:
-        return feeder, propose(feeder)
+        return feeder, propose(feeder, count)
     except NoSwitchError as error:
         if not error.lines:
             raise
         line = error.lines[0]
     typer.echo(f"NOTE  no switch cuts half of the load off the substation; {line} is made one")
     feeder = read_script(script, [*switches, line], leave_out)
-    return feeder, propose(feeder)
+    return feeder, propose(feeder, count)
 
 
-def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str]) -> None:
+def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str], count: int | None) -> None:
     """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
     import msgspec
 
     from scenarios.feeder_proposal import NoProposalError
+    from scenarios.operating_point import start_problem
+    from scenarios.schema import load_scenario
 
     try:
-        feeder, proposal = _with_proposal(str(script), switches, leave_out)
+        feeder, proposal = _with_proposal(str(script), switches, leave_out, count)
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
     msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / feeder.name)
-    text = SCENARIO.format(feeder=feeder.name, folder=feeder.name, switch=proposal.switch, P_set0=proposal.P_set0)
-    (folder / "islanding.toml").write_text(text, encoding="utf-8")
+    graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
+    problem = ""
+    for part in PARTS:
+        text = SCENARIO.format(
+            feeder=feeder.name,
+            folder=feeder.name,
+            switch=proposal.switch,
+            P_set0=round(part * proposal.P_set0, 3),
+            graph=graph,
+            title=GRAPHS[graph],
+        )
+        (folder / "islanding.toml").write_text(text, encoding="utf-8")
+        found = start_problem(*load_scenario(str(folder / "islanding.toml")))
+        if not found:
+            break
+        problem = problem or found
+    else:
+        typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then `gridpeers check islanding.toml`")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
         f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "

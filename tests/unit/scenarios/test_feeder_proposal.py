@@ -65,7 +65,7 @@ def test_without_a_switch_lines_to_be_one_are_named() -> None:
 @pytest.mark.parametrize(
     ("small", "told"),
     [
-        (feeder("A"), "it has no three-phase line to be one"),
+        (feeder("A"), "no single three-phase line does either"),
         (feeder("A", switched=True), "no bus has phases A, B and C, which an inverter needs"),
         (feeder(P=0.0, switched=True), "the feeder has no load"),
     ],
