@@ -25,18 +25,20 @@ def start_plant(config: PlantConfig) -> LivePlant:
         from plant.helics.helics_plant import HelicsPlant  # only who uses it needs the wheel
 
         return HelicsPlant(config, _feeder(config))
-    plant: LivePlant
+    if config.bridged:
+        from plant.helics.bridged_plant import BridgedPlant
+
+        return BridgedPlant(lambda: _here(config), config)
+    return _here(config)
+
+
+def _here(config: PlantConfig) -> LivePlant:
+    """Start a plant that we run ourselves."""
     if config.settings.simulator == "gridlabd":
         from plant.gridlabd.start import start_gridlabd
 
-        plant = start_gridlabd(config, _feeder(config))
-    else:
-        plant = build_plant(config)
-    if not config.bridged:
-        return plant
-    from plant.helics.bridged_plant import BridgedPlant
-
-    return BridgedPlant(plant, config)
+        return start_gridlabd(config, _feeder(config))
+    return build_plant(config)
 
 
 def build_plant(config: PlantConfig) -> Plant:

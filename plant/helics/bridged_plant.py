@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
 
 import msgspec
@@ -26,8 +26,8 @@ class BridgedPlant:
 
     Parameters
     ----------
-    plant
-        The plant at t = 0.
+    build
+        Builds the plant at t = 0.
     config
         Agents, times and the federation.
 
@@ -37,8 +37,15 @@ class BridgedPlant:
         If the federation does not begin.
     """
 
-    def __init__(self, plant: LivePlant, config: PlantConfig) -> None:
-        self._plant, self._T_c, self._record = plant, config.T_c, config.record_step
+    def __init__(self, build: Callable[[], LivePlant], config: PlantConfig) -> None:
+        # its broker must be there at once: others give up to connect while a plant is compiled for the first time
+        self._federate = HelicsFederate(config.settings.helics, config.deadline)
+        try:
+            plant = self._plant = build()
+        except BaseException as error:
+            self._federate.abort(f"its plant cannot start: {error}")
+            raise
+        self._T_c, self._record = config.T_c, config.record_step
         self._end_tick = None if config.end is None else round(config.end / config.T_c)
         self._prefix = prefix = config.settings.helics.prefix
         self.inverters = plant.inverters
@@ -49,22 +56,23 @@ class BridgedPlant:
         self._tick = 0
         self._rows, self._events = list(plant.take_rows()), list(plant.take_events())
         self._sent: dict[str, Value] = {}
-        """Flags, names and events that were published last: they go out when they change."""
-        self._outgoing = self._measured(readings) | self._told(self._events)
+        """Flags and names that were published last: they go out when they change."""
+        self._outgoing: dict[str, Value] = {}
+        """Values to publish with the next step."""
         own = [
             topic
             for name in plant.inverters
             for topic in (*topics.sensors(prefix, name), *topics.held(prefix, name), *topics.where(prefix, name))
         ]
         asked = [topic for name in self._outside for topic in topics.set_points(prefix, name)]
-        self._federate = HelicsFederate(config.settings.helics, [*own, topics.events(prefix)], asked, config.deadline)
+        publish = self._measured(readings) | self._told(self._events)
         try:
-            federation = self._federate.begin(self._outgoing)
+            federation = self._federate.begin([*own, topics.events(prefix)], asked, publish)
             self._note_absent(federation, {topic.key for topic in asked})
         except HelicsError as error:
             self._federate.abort(str(error))
+            plant.close()
             raise
-        self._outgoing = {}
 
     def measure(self) -> Mapping[str, ReadingLike]:
         """Read all sensors now."""
@@ -85,7 +93,7 @@ class BridgedPlant:
     def advance(self) -> None:
         """Take the outside set-points of this tick, advance, and publish every row at its time."""
         first = time_of(self._tick * round(self._T_c / self._record) + 1, self._record)
-        self._take(self._federate.step(self._outgoing, first))
+        self._take(self._federate.step(self._outgoing, first, needed=bool(self._outside)))
         for name, (P_set, V_set) in self._held.items():
             self._plant.hold(name, P_set, V_set)
         self._plant.advance()
@@ -94,7 +102,7 @@ class BridgedPlant:
         self._rows += rows
         self._events += events
         for row, following in pairwise(rows):
-            self._take(self._federate.step(self._row(row), following[0]))
+            self._take(self._federate.step(self._row(row), following[0], needed=False))
         self._outgoing = self._measured(self._plant.measure()) | self._told(events)
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:

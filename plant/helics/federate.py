@@ -43,8 +43,6 @@ class HelicsFederate:
     ----------
     settings
         Its name, and its broker.
-    publications, subscriptions
-        Its topics.
     deadline
         Longest wait (s of real time) for the others.
 
@@ -54,13 +52,7 @@ class HelicsFederate:
         If the wheel is missing, the broker cannot be reached or started, or the name is taken.
     """
 
-    def __init__(
-        self,
-        settings: HelicsSettings,
-        publications: Sequence[Topic],
-        subscriptions: Sequence[Topic],
-        deadline: float,
-    ) -> None:
+    def __init__(self, settings: HelicsSettings, deadline: float) -> None:
         self._settings, self._deadline = settings, deadline
         self._when = BEFORE
         self._others = "nobody"
@@ -90,32 +82,43 @@ class HelicsFederate:
                 "port": port,
                 "federates": settings.federates,
                 "wait": 0.9 * deadline,
-                "publications": publications,
-                "subscriptions": subscriptions,
             },
             late,
         )
 
-    def begin(self, publish: Mapping[str, Value]) -> dict[str, Any]:
-        """Publish what holds at t = 0 and wait for the federation; return who publishes what we need.
+    def begin(
+        self, publications: Sequence[Topic], subscriptions: Sequence[Topic], publish: Mapping[str, Value]
+    ) -> dict[str, list[str]]:
+        """Register topics, publish what holds at t = 0, and wait until all federates are at t = 0.
 
         Returns
         -------
         dict
-            "others": names of the other federates; "missing": keys of topics that nobody publishes.
+            "others": names of the other federates; "missing": keys of the subscriptions that nobody publishes.
         """
         settings = self._settings
         wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
-        late = f"the federation at {settings.broker} did not begin within {self._deadline:g} s ({wanted})"
-        federation = self._ask({"do": "begin", "publish": publish}, late)
+        late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s ({wanted})"
+        request = {
+            "do": "begin",
+            "publications": publications,
+            "subscriptions": subscriptions,
+            "publish": publish,
+        }
+        federation = self._ask(request, late, settings.wait)
         self._others = " or ".join(federation["others"]) or "the broker"
         return federation
 
-    def step(self, publish: Mapping[str, Value], t: float, after: float = 0.0) -> dict[str, Value]:
-        """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key."""
+    def step(
+        self, publish: Mapping[str, Value], t: float, after: float = 0.0, *, needed: bool = True
+    ) -> dict[str, Value]:
+        """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key.
+
+        If none came although they are `needed`, it looks whether their publishers have left.
+        """
         late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
         answer = self._ask({"do": "step", "publish": publish, "time": t + after}, late)
-        if answer["gone"]:
+        if needed and answer["gone"]:
             raise HelicsError(
                 f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
                 "let it run at least as long as the scenario"
@@ -149,10 +152,10 @@ class HelicsFederate:
             if stream is not None and not stream.closed:
                 stream.close()
 
-    def _ask(self, request: Mapping[str, Any], late: str) -> dict[str, Any]:
+    def _ask(self, request: Mapping[str, Any], late: str, wait: float | None = None) -> dict[str, Any]:
         self._send(request)
         try:
-            answer = self._take(self._deadline, late)
+            answer = self._take(self._deadline if wait is None else wait, late)
             if "error" in answer:
                 raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'], request['do'])}")
         except HelicsError as error:
@@ -182,7 +185,8 @@ class HelicsFederate:
                 break
         silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
         where = f": {', '.join(stand)}" if stand else silent
-        raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise processes.deadline_s")
+        key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
+        raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
 
     def _answer(self, until: float) -> dict[str, Any] | None:
         """Return the next line of the process; None at a time of `monotonic` (s)."""

@@ -5,8 +5,8 @@ library cannot be ended from Python: a process can. `plant.helics.federate` star
 nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its answer;
 what HELICS prints goes to standard error.
 
-    {"do": "join", "name", "host", "port", "federates", "wait", "publications", "subscriptions"}
-    {"do": "begin", "publish": {key: value}}            enter executing mode at t = 0
+    {"do": "join", "name", "host", "port", "federates", "wait"}
+    {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}
     {"do": "step", "publish": {key: value}, "time": s}  publish, request a time, return the values that came
     {"do": "end", "publish": {key: value}}              publish, leave the federation, end
     {"do": "stand"}                                     where the others are; also in the middle of a wait
@@ -62,7 +62,7 @@ class Federate:
         self.publishers: list[str] = []
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Start the broker if asked for, connect to it, and register all topics."""
+        """Start the broker if asked for, and connect to it."""
         helics, host, port = self.helics, request["host"], request["port"]
         loopback = host in ("127.0.0.1", "localhost", "::1")
         self.name = request["name"]
@@ -86,6 +86,11 @@ class Federate:
         # a value that comes between two requested times must not wake it: its times are those of the control period
         helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
         self.fed = helics.helicsCreateValueFederate(self.name, info)
+        return {"version": helics.helicsGetVersion()}
+
+    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Register all topics, wait for the whole federation, and tell which topics nobody publishes."""
+        helics = self.helics
         for key, kind, unit in request["publications"]:
             code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
             self.publications[key] = helics.helicsFederateRegisterGlobalPublication(self.fed, key, code, unit), kind
@@ -94,19 +99,15 @@ class Federate:
             helics.helicsInputSetOption(
                 self.subscriptions[key][0], helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True
             )
-        return {"version": helics.helicsGetVersion()}
-
-    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Wait for the whole federation, and tell which topics nobody publishes."""
-        self.helics.helicsFederateEnterInitializingMode(self.fed)
+        helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
-        self.helics.helicsFederateEnterExecutingMode(self.fed)
+        helics.helicsFederateEnterExecutingMode(self.fed)
         others = [name for name in self._names("root", "federates") if name != self.name]
         # a federate that does not wait for our values may have left by now: then nobody knows what it published
         named = [name for name in others if self.subscriptions.keys() & set(self._names(name, "publications"))]
         self.publishers = named or others
-        kind = self.helics.helicsInputGetPublicationType
-        missing = [key for key, (topic, _) in self.subscriptions.items() if kind(topic) == NOBODY]
+        type_of = helics.helicsInputGetPublicationType
+        missing = [key for key, (topic, _) in self.subscriptions.items() if type_of(topic) == NOBODY]
         return {"others": others, "missing": missing}
 
     def step(self, request: dict[str, Any]) -> dict[str, Any]:

@@ -64,9 +64,9 @@ class HelicsPlant:
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
         ours = [topic for name in config.agents for topic in topics.set_points(helics.prefix, name)]
-        self._federate = HelicsFederate(helics, ours, [*needed, *optional], config.deadline)
+        self._federate = HelicsFederate(helics, config.deadline)
         try:
-            self._check_publishers(self._federate.begin({}))
+            self._check_publishers(self._federate.begin(ours, [*needed, *optional], {}))
             self._hear(0)
         except HelicsError as error:
             self._federate.abort(str(error))

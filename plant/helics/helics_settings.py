@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from wire.schema.plausible import Plausible
+from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 
 BROKER = "tcp://127.0.0.1:23404"
@@ -26,6 +26,8 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     """Name of the federate; no other of the federation has it."""
     prefix: str = "grid"
     """First part of every topic: "grid" gives grid/inv1/P."""
+    wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 120.0
+    """Longest wait (s of real time) for the other federates to begin: some are started by hand, or compile first."""
     federates: Annotated[int, Plausible("a number of federates", 0, 1000)] = 0
     """Above 0, the run starts the broker itself, and the federation waits for so many federates, this one included;
     at 0 there must be a broker."""

@@ -38,7 +38,7 @@ def free_broker() -> str:
 def short(end: float, broker: str, deadline: float = 30.0, **changes: Any) -> Scenario:
     """The islanding scenario, sooner and shorter; the broker is the run's."""
     events = [{"label": "islanding", "t_s": 0.1, "open": ["13-152"]}]
-    helics = {"broker": broker, "federates": 2}
+    helics = {"broker": broker, "federates": 2, "wait_s": deadline}
     common = {"time.end_s": end, "event": events, "paper": "", "processes.deadline_s": deadline, "plant.helics": helics}
     return gridpeers.load("islanding").replace(common | changes)
 
@@ -131,7 +131,7 @@ def test_a_wheel_that_is_missing_is_one_line(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
     with pytest.raises(HelicsError, match=r"not installed; install it: pip install 'gridpeers\[helics\]'"):
-        HelicsFederate(HelicsSettings(), (), (), 5.0)
+        HelicsFederate(HelicsSettings(), 5.0)
 
 
 class Controller(threading.Thread):
@@ -144,8 +144,8 @@ class Controller(threading.Thread):
     def run(self) -> None:
         """Act a microsecond after each tick."""
         P_set, V_set = topics.set_points("grid", "inv2")
-        me = HelicsFederate(self.settings, [P_set, V_set], topics.sensors("grid", "inv2"), 30.0)
-        me.begin({})
+        me = HelicsFederate(self.settings, 30.0)
+        me.begin([P_set, V_set], topics.sensors("grid", "inv2"), {})
         publish: dict[str, float] = {}
         for k in range(self.ticks):
             self.seen.append(me.step(publish, 0.02 * k, topics.ACT))
@@ -162,7 +162,7 @@ def test_a_bridged_plant_takes_set_points_from_the_tick_on_in_which_they_are_dec
     )
     controller = Controller(HelicsSettings(broker=broker, name="controller"), 3)
     controller.start()
-    plant = BridgedPlant(ToyPlant(config), config)
+    plant = BridgedPlant(lambda: ToyPlant(config), config)
     held = []
     for _ in range(3):
         plant.advance()
