@@ -26,7 +26,7 @@ class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     """Name of the federate; no other of the federation has it."""
     prefix: str = "grid"
     """First part of every topic: "grid" gives grid/inv1/P."""
-    wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 120.0
+    wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 180.0
     """Longest wait (s of real time) for the other federates to begin: some are started by hand, or compile first."""
     federates: Annotated[int, Plausible("a number of federates", 0, 1000)] = 0
     """Above 0, the run starts the broker itself, and the federation waits for so many federates, this one included;
@@ -50,7 +50,7 @@ def settings_problems(settings: HelicsSettings) -> dict[str, str]:
         if not _NAME.fullmatch(value):
             found[key] = f'must be up to 64 letters, digits, "_", "-" or ".", got "{value}"'
     if settings.federates == 1:
-        found["federates"] = "must be at least 2, this one and an outside one; 0 starts no broker"
+        found["federates"] = "must be at least 2, this one and an outside one, or 0 to start no broker; got 1"
     return found
 
 
