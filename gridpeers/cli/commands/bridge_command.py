@@ -33,6 +33,10 @@ def helics(
     outside: Annotated[
         str, typer.Option(metavar="NAMES", help="Inverters that others control: all, none, or e.g. inv1,inv4.")
     ] = "all",
+    plant: Annotated[
+        Literal["gridpeers", "gridlabd"] | None,
+        typer.Option(help="What simulates the plant; as the scenario says when left out."),
+    ] = None,
     broker: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="The HELICS broker, tcp://127.0.0.1:23404 when left out.")
     ] = None,
@@ -59,6 +63,8 @@ def helics(
     Example:  gridpeers bridge helics islanding --case IV --start-broker
     """
     changes: dict[str, Any] = {"plant.helics.name": name}
+    if plant is not None:
+        changes["plant.simulator"] = plant
     if broker is not None:
         changes["plant.helics.broker"] = broker
     if start_broker:
