@@ -41,6 +41,11 @@ tests go through the first six cases in a fifth of the time.
   (P_set_lim 3 pu) `set-points` differs by 0.18 pu and 0.034 Hz.
 - GridLAB-D de-energises microgrid 1 when sw1_2 and sw2_3 open in the same step, so `three-islands` opens them 4 ms
   apart.
+- It can fail. One character was changed by hand, and put back: the sign of the Q-V droop in `kernel/gfm.py` gives
+  0.06 Hz and 1.3 pu of reactive power; that of the overload limiter lets inverters trip in `set-points`; 3 pi in place
+  of 2 pi in the P-f droop of `glm_inverters.py` gives 0.2 Hz; a mile of 1.609345 instead of 1.609344 km in
+  `glm_network.py` gives 7e-8 Hz and 2e-7 pu; 0.6 in place of 0.5 of the line charging in
+  `primitives.py` gives 4e-6 pu in the power flow.
 - Not compared: inverters that join and leave, and the phase-current limit, which the GridLAB-D model has at 1000 pu.
 """
 
