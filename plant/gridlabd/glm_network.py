@@ -151,7 +151,7 @@ def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[
         blocks.append(
             block(
                 "transformer_configuration",
-                name=f"c{name}",
+                name=f"ct{name}",
                 connect_type=connection,
                 power_rating=float(row["S_rated_kVA"]),
                 primary_voltage=V_nom[start] * sqrt(3),
@@ -166,7 +166,7 @@ def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[
                 from_=f"n{start}",
                 to=f"n{end}",
                 phases=phases,
-                configuration=f"c{name}",
+                configuration=f"ct{name}",
             )
         )
     return blocks

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Iterator
 
 from plant.equipment import Feeder
 
 from .glm_network import F_NOM
 
-GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
-"""Names that GridLAB-D takes for an object."""
+GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+"""Names that GridLAB-D takes for an object: a dot would begin the name of a property."""
 
 
 def unrepresentable(feeder: Feeder) -> list[str]:
@@ -24,14 +26,25 @@ def unrepresentable(feeder: Feeder) -> list[str]:
         problems.append(f"{feeder.name} has no source.csv; GridLAB-D needs a substation as its swing bus")
     if feeder.f_nom != F_NOM:
         problems.append(f"{feeder.name} has {feeder.f_nom:g} Hz; the model is written for {F_NOM:g} Hz")
-    fixed = (
-        {f"n{bus.name}" for bus in feeder.buses} | {f"l{line.name}" for line in feeder.lines} | {"islands", "ticker"}
-    )
-    own = [("inverter", row.name) for row in feeder.inverters]
-    own += [("regulator", name) for name in dict.fromkeys(row.name for row in feeder.regulators)]
-    for kind, name in own:
-        if not GLM_NAME.fullmatch(name):
-            problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ . and -, a letter first; rename it')
-        if name in fixed or name in [other for at, other in own if at != kind]:
-            problems.append(f'{kind} "{name}": another object of the model has that name; rename it')
+    names = list(_names(feeder))
+    taken = Counter(in_model for _, _, in_model in names)
+    for kind, name, in_model in names:
+        if not GLM_NAME.fullmatch(in_model):
+            problems.append(f'{kind} "{name}": GridLAB-D takes letters, digits, _ and - for a name; rename it')
+        elif taken[in_model] > 1:
+            problems.append(f'{kind} "{name}": another object of the model has its name {in_model}; rename it')
     return problems
+
+
+def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:
+    """Yield what each object is, its name, and its name in the model (`glm_network`, `glm_inverters`)."""
+    yield from (("bus", bus.name, f"n{bus.name}") for bus in feeder.buses)
+    yield from (("line", line.name, f"l{line.name}") for line in feeder.lines)
+    yield from (("kind of line", config.name, f"c{config.name}") for config in feeder.line_configs)
+    yield from (("switch", switch.name, f"s{switch.name}") for switch in feeder.switches)
+    yield from (("transformer", row.name, f"t{row.name}") for row in feeder.transformers)
+    yield from (("transformer", row.name, f"ct{row.name}") for row in feeder.transformers)
+    for name in dict.fromkeys(row.name for row in feeder.regulators):
+        yield from (("regulator", name, in_model) for in_model in (name, f"c{name}"))
+    yield from (("inverter", row.name, row.name) for row in feeder.inverters)
+    yield from (("object", name, name) for name in ("islands", "ticker"))

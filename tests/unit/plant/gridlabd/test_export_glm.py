@@ -95,10 +95,11 @@ def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None
 
 
 def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
-    """No substation, another frequency and a name that GridLAB-D does not take are three problems of one error."""
+    """No substation, another frequency and names that GridLAB-D does not take, or twice, are problems of one error."""
     feeder = read_feeder("microgrid123")
-    first, *others = feeder.inverters
-    feeder = replace(feeder, source=None, f_nom=50.0, inverters=(replace(first, name="1st"), *others))
+    first, second, *others = feeder.inverters
+    inverters = (replace(first, name="1.st"), replace(second, name="n13"), *others)
+    feeder = replace(feeder, source=None, f_nom=50.0, inverters=inverters)
 
     with pytest.raises(FeederError) as error:
         export_glm(feeder, PlantSettings(), 1, "voltages.csv")
@@ -106,5 +107,7 @@ def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
     assert error.value.problems == (
         "microgrid123 has no source.csv; GridLAB-D needs a substation as its swing bus",
         "microgrid123 has 50 Hz; the model is written for 60 Hz",
-        'inverter "1st": GridLAB-D takes letters, digits, _ . and -, a letter first; rename it',
+        'bus "13": another object of the model has its name n13; rename it',
+        'inverter "1.st": GridLAB-D takes letters, digits, _ and - for a name; rename it',
+        'inverter "n13": another object of the model has its name n13; rename it',
     )
