@@ -108,6 +108,9 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Changes by inverter."""
 
 
+Method = Literal["first-order", "second-order"]
+"""Method of time stepping: `plant.dynamics.kernel.step`, GridLAB-D's, or `plant.dynamics.kernel.second_order_step`."""
+
 Simulator = Literal["gridpeers", "gridlabd", "helics"]
 """What simulates the plant: our own, GridLAB-D (docs/plant.md), or a federate of a HELICS co-simulation."""
 
@@ -125,6 +128,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Which load table of the feeder: "main" or "event2"."""
     h: float = 0.002
     """Integration step (s)."""
+    method: Method = "first-order"
+    """Method of time stepping."""
     P_set0: float = 0.647
     """First P_set of every inverter (pu of its rating)."""
     V_set0: float = 1.0

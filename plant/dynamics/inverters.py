@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
+from plant.dynamics.kernel.second_order_step import FeedForward
 from plant.dynamics.reduced import Real
 from plant.equipment import F_NOM
-from plant.plant_config import GflParameters, GfmParameters
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.plant_config import Method
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +48,8 @@ class Inverters:
         Description of each.
     connected
         Whether each is switched on; by default all are.
+    method
+        Of time stepping.
 
     Attributes
     ----------
@@ -62,7 +66,10 @@ class Inverters:
     S_max : float64[n]
         Apparent-power limits (pu); infinite for a GFM.
     y_f : complex128[n]
-        Filter admittances (S per phase); 0 for a current source.
+        Filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
+        "second-order", which solves its filter together with its current controller.
+    feed_forward : FeedForward
+        What that solution needs.
     connected : bool[n]
         Inverters switched on; they deliver only in a live island.
     P_set_lim, V_set_min, V_set_max : float64[n]
@@ -73,14 +80,16 @@ class Inverters:
         Norton injections (A), terminal voltages (V) and currents out of the inverters (A).
     """
 
-    def __init__(self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None) -> None:
+    def __init__(
+        self, units: tuple[Inverter, ...], connected: Sequence[bool] | None = None, method: Method = "first-order"
+    ) -> None:
         n = len(units)
         self.units = units
         self.f_nom = units[0].f_nom if units else F_NOM
         self.forming = np.array([unit.kind == "GFM" for unit in units], dtype=bool)
         self.gfm_at, self.gfl_at = np.flatnonzero(self.forming), np.flatnonzero(~self.forming)
-        self.gfm = np.array([_pack(units[i]) for i in self.gfm_at.tolist()], gfm_model.PARAMETERS)
-        self.gfl = np.array([_pack(units[i]) for i in self.gfl_at.tolist()], gfl_model.PARAMETERS)
+        self.gfm = np.array([_pack(units[i], method) for i in self.gfm_at.tolist()], gfm_model.PARAMETERS)
+        self.gfl = np.array([_pack(units[i], method) for i in self.gfl_at.tolist()], gfl_model.PARAMETERS)
         self.gfm_state = np.zeros(self.gfm_at.size, gfm_model.STATE)
         self.gfl_state = np.zeros(self.gfl_at.size, gfl_model.STATE)
         self.S_b = np.array([unit.S_b for unit in units])
@@ -94,6 +103,7 @@ class Inverters:
         self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])
         self.y_f = np.zeros(n, complex)
         self.y_f[self.gfm_at], self.y_f[self.gfl_at] = self.gfm["y_f"], self.gfl["y_f"]
+        self.feed_forward = _feed_forward(units, self.S_b, self.V_b)
         self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
         self.set_points = np.zeros((n, 3))
         self.J = np.zeros((n, 3), complex)
@@ -169,8 +179,18 @@ class Inverters:
         return np.column_stack([f, S.real, S.imag, V])
 
 
-def _pack(unit: Inverter) -> NDArray[np.void]:
+def _pack(unit: Inverter, method: Method) -> NDArray[np.void]:
     """Return the record of one unit for the compiled pass of its kind."""
+    own = unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
     if isinstance(unit.parameters, GfmParameters):
-        return gfm_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)
-    return gfl_model.pack(unit.parameters, unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom)
+        return gfm_model.pack(unit.parameters, *own)
+    return gfl_model.pack(unit.parameters, *own, method)
+
+
+def _feed_forward(units: tuple[Inverter, ...], S_b: Real, V_b: Real) -> FeedForward:
+    y, a = np.zeros(len(units), complex), np.zeros(len(units), complex)
+    for i, unit in enumerate(units):
+        if isinstance(unit.parameters, GflParameters) and unit.parameters.model == "voltage_source":
+            y[i] = gfl_model.filter_admittance(unit.parameters, unit.S_b, unit.V_b)
+            a[i] = gfl_model.own_feedback(unit.parameters)
+    return FeedForward(y, np.reciprocal(1.0 - a), S_b / (3.0 * V_b), float(V_b.max(initial=1.0)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from plant.dynamics import switching
 from plant.dynamics.circuit import Circuit
@@ -12,10 +13,12 @@ from plant.dynamics.error import NoSolutionError
 from plant.dynamics.initial import OperatingPoint, equilibrium, set_equilibrium
 from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.controller_pass import READING, Units
+from plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
 from plant.dynamics.kernel.step import FAILURES, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduced import Complex, Real
+from plant.plant_config import Method
 
 
 class Dynamics:
@@ -31,6 +34,8 @@ class Dynamics:
         Step (s).
     connected
         Whether each inverter is switched on at the start; by default all are.
+    method
+        Of time stepping.
 
     Attributes
     ----------
@@ -45,16 +50,25 @@ class Dynamics:
     """
 
     def __init__(
-        self, circuit: Circuit, inverters: tuple[Inverter, ...], h: float, connected: Sequence[bool] | None = None
+        self,
+        circuit: Circuit,
+        inverters: tuple[Inverter, ...],
+        h: float,
+        connected: Sequence[bool] | None = None,
+        method: Method = "first-order",
     ) -> None:
-        self.h = h
-        self.inverters = Inverters(inverters, connected)
+        self.h, self._method = h, method
+        self.inverters = Inverters(inverters, connected, method)
         self.network = LiveNetwork(circuit, self.inverters)
         self._trips: list[switching.Trip] = []
         units = self.inverters
         self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
         self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
         self._J_0 = units.J.copy()
+        self._slopes = Slopes(
+            *(_table(each) for each in (units.gfm_state, self._gfm_0, self._gfm_d, self._gfm_d.copy())),
+            *(_table(each) for each in (units.gfl_state, self._gfl_0, self._gfl_d, self._gfl_d.copy())),
+        )
 
     def start(
         self, P: Real, Q: Real | None = None, V_set: Real | None = None, *, swing_voltage: Complex = PHASES
@@ -154,9 +168,23 @@ class Dynamics:
         )
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
-        network = self.network
-        tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))
-        return run_steps(begin, steps, self.h, tolerance, network.net, self.arrays(), network.x, out)
+        units, network, arrays = self.inverters, self.network, self.arrays()
+        tolerance = TOLERANCE * float(units.V_b.max(initial=1.0))
+        if self._method == "first-order":
+            return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
+        return run_second_order_steps(
+            begin,
+            steps,
+            self.h,
+            tolerance,
+            network.net,
+            arrays,
+            arrays._replace(gfm_0=units.gfm_state, gfl_0=units.gfl_state),
+            self._slopes,
+            units.feed_forward,
+            network.x,
+            out,
+        )
 
     def _return(self) -> None:
         """Go back to the start of the step that failed."""
@@ -185,3 +213,8 @@ class Dynamics:
     def readings(self) -> Real:
         """Return f (Hz), P (W), Q (var), V (V) of the last solution, n_inv x 4, before the first step."""
         return self.inverters.readings(self.network.reduction.online)
+
+
+def _table(records: NDArray[np.void]) -> Real:
+    """Return records whose fields are all numbers as a table of the same memory."""
+    return records.view(np.float64).reshape(records.size, len(records.dtype.names or ()))

@@ -100,6 +100,7 @@ class Plant:
             ),
             settings.h,
             connected=connected,
+            method=settings.method,
         )
         sync = Synchronism(network, self._dynamics, settings.sync_check)
         timeout = round(settings.sync_check.timeout / settings.h)

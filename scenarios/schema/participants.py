@@ -72,8 +72,14 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note joins and leaves under another simulator, whose inverters stay, and what is wrong with its settings."""
+    """Note what another simulator has not, joins, leaves and our methods, and what is wrong with its settings."""
     simulator = scenario.plant.simulator
+    if scenario.time.method != "first-order" and simulator != "gridpeers":
+        problems.add(
+            "time.method",
+            f'"{scenario.time.method}" is a method of plant.simulator = "gridpeers"; "{simulator}" has its own time '
+            "stepping; leave time.method out",
+        )
     for key, problem in settings_problems(scenario.plant.helics).items():
         if not problems.touch(f"plant.helics.{key}"):
             problems.add(f"plant.helics.{key}", problem)

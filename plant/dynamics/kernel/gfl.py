@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.arithmetic import A120, heun, sat
 from plant.dynamics.kernel.compiled import compiled
-from plant.plant_config import GflParameters
+from plant.plant_config import GflParameters, Method
 
 PARAMETERS = np.dtype(
     [
@@ -22,7 +22,7 @@ PARAMETERS = np.dtype(
         ("I_b", "f8"),  # A
         ("f_nom", "f8"),  # Hz
         ("w_nom", "f8"),  # rad/s, speed of the common frame
-        ("y_f", "c16"),  # S, of one phase; 0 in the current-source form
+        ("y_f", "c16"),  # S, of one phase, in the network; 0 for a current source
         ("y_e", "c16"),  # S, filter admittance also in the current-source form (unused there)
         ("current_source", "b1"),
         ("frequency_watt", "b1"),
@@ -74,29 +74,41 @@ STATE = np.dtype(
 """States of a GFL and its PLL frequency."""
 
 
-def pack(par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
+def own_feedback(par: GflParameters) -> complex:
+    """Return what the current after a pass gains from the current before it, at the same voltage (dq, section 4.6)."""
+    return (1j * par.X_f * par.F_current - par.k_pc) / complex(par.R_f, par.X_f)
+
+
+def filter_admittance(par: GflParameters, S_b: float, V_b: float) -> complex:
+    """Return the admittance of one phase of the filter (S); arguments as for `pack`."""
+    return 1.0 / (complex(par.R_f, par.X_f) * V_b**2 / (S_b / 3.0))
+
+
+def pack(
+    par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float, method: Method = "first-order"
+) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.kernel.gfm.pack`.
+
+    In the method "second-order" the unit is a current source towards the network, in either model.
 
     Raises
     ------
     ValueError
         If the current controller's one-pass feedback cannot be stable (checklist row 23).
     """
-    z_f = complex(par.R_f, par.X_f)
-    if par.model == "voltage_source" and abs(1j * par.X_f * par.F_current - par.k_pc) >= abs(z_f):
-        ratio = abs(1j * par.X_f * par.F_current - par.k_pc) / abs(z_f)
+    if method == "first-order" and par.model == "voltage_source" and abs(own_feedback(par)) >= 1.0:
         raise ValueError(
-            f"gfl: abs(j X_f F_current - k_pc) / abs(R_f + j X_f) must be below 1, got {ratio:.2f} from "
-            f"F_current {par.F_current:g}, k_pc {par.k_pc:g} pu: the current controller would diverge on a "
-            'stiff bus; lower F_current or k_pc, or use model "current_source"'
+            f"gfl: abs(j X_f F_current - k_pc) / abs(R_f + j X_f) must be below 1, got {abs(own_feedback(par)):.2f} "
+            f"from F_current {par.F_current:g}, k_pc {par.k_pc:g} pu: the current controller would diverge on a "
+            'stiff bus; lower F_current or k_pc, use model "current_source", or the method "second-order"'
         )
-    y = 1.0 / (z_f * V_b**2 / (S_b / 3.0))
+    y = filter_admittance(par, S_b, V_b)
     record = np.zeros((), PARAMETERS)
     record["S_b"], record["V_b"], record["I_b"] = S_b, V_b, S_b / (3.0 * V_b)
     record["f_nom"], record["w_nom"] = f_nom, 2.0 * np.pi * f_nom
     record["current_source"] = par.model == "current_source"
     record["y_e"] = y
-    record["y_f"] = 0.0 if par.model == "current_source" else y
+    record["y_f"] = 0.0 if par.model == "current_source" or method == "second-order" else y
     record["R_p"], record["R_q"] = m_p, m_q
     for name in ("frequency_watt", "volt_var", *PARAMETERS.names[12:]):  # type: ignore[index]  # as in gfm
         record[name] = getattr(par, name)

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from plant.feeder import Plant
 from plant.network import Network
-from plant.plant_config import PlantSettings, Protection, SwitchEvent
+from plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
 from plant.tables import read_feeder
 
 T_C, H, END = 0.02, 0.002, 5.0
@@ -39,14 +39,21 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
     return first, *sorted(rest, key=lambda event: event.t)
 
 
-@pytest.mark.parametrize(("category", "seed"), [*(("off", i) for i in range(20)), *(("III", i) for i in range(10))])
-def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int) -> None:
+@pytest.mark.parametrize(
+    ("category", "seed", "method"),
+    [
+        *(("off", i, "first-order") for i in range(20)),
+        *(("III", i, "first-order") for i in range(10)),
+        *((category, i, "second-order") for i in range(2) for category in ("off", "III")),
+    ],
+)
+def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
     """Every row is finite; who delivers has a frequency within bounds, who does not has no power; trips are told."""
     draw = random.Random(f"switchings {seed}")
     factor = draw.uniform(0.8, 2.0)
     feeder = read_feeder("microgrid123")
     loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
-    settings = PlantSettings(events=schedule(draw), h=H, protection=Protection(category=category))
+    settings = PlantSettings(events=schedule(draw), h=H, method=method, protection=Protection(category=category))
     plant = Plant(Network(replace(feeder, loads=loads)), settings, T_C, T_C)
     low, high = BAND[category]
     causes = NO_SOLUTION if category == "off" else (*NO_SOLUTION, *PROTECTION)

@@ -8,7 +8,7 @@ import pytest
 from plant.dynamics import reduce_network
 from plant.feeder import Plant
 from plant.network import Network
-from plant.plant_config import PlantSettings, SwitchEvent
+from plant.plant_config import Method, PlantSettings, SwitchEvent
 from plant.tables import read_feeder
 
 EVENTS = (
@@ -18,15 +18,18 @@ EVENTS = (
 )
 
 
-def rows(monkeypatch: pytest.MonkeyPatch, most_dense: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def rows(
+    monkeypatch: pytest.MonkeyPatch, most_dense: int, method: Method
+) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """Return what is recorded of the microgrid feeder through its switchings, solved in one form."""
     monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
-    plant = Plant(Network(read_feeder("microgrid123")), PlantSettings(events=EVENTS), 0.02, 0.02)
+    plant = Plant(Network(read_feeder("microgrid123")), PlantSettings(events=EVENTS, method=method), 0.02, 0.02)
     for _ in range(40):
         plant.advance()
     return np.array(plant.take_rows())
 
 
-def test_both_forms_give_the_same_run(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("method", ["first-order", "second-order"])
+def test_both_forms_give_the_same_run(monkeypatch: pytest.MonkeyPatch, method: Method) -> None:
     """Frequency, powers and voltages through islanding, load loss and reclosing differ by rounding alone."""
-    np.testing.assert_allclose(rows(monkeypatch, 0), rows(monkeypatch, 10_000), rtol=1e-9, atol=1e-3)
+    np.testing.assert_allclose(rows(monkeypatch, 0, method), rows(monkeypatch, 10_000, method), rtol=1e-9, atol=1e-3)

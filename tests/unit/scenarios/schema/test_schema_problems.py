@@ -10,7 +10,7 @@ import pytest
 from plant.tables.read import DATA
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.schema import ScenarioError, load_scenario
-from tests.scenario_files import problems
+from tests.scenario_files import problems, written
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
 
@@ -35,7 +35,12 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
         (
             "h_s = 0.002",
             "h_s = 0.005",
-            r"time.h_s: 0.005 s is too long a step for T_p_s = 0.01 s of \[plant.gfm\]: .*; at most 0.003 s",
+            r"time.h_s: 0.005 s is too long a step for T_p_s = 0.01 s of \[plant.gfm\], .*; at most 0.003 s",
+        ),
+        (
+            "h_s = 0.002",
+            'h_s = 0.002\nmethod = "second order"',
+            r'time.method: there is no "second order"; did you mean "second-order"\?',
         ),
         ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
         ("record_s = 0.01", "record_s = 0.005", r"time.record_s: 0.005 s is not a multiple of h_s = 0.002 s"),
@@ -155,6 +160,31 @@ def test_each_problem_is_told_with_its_place_and_what_would_be_right(
 
     assert len(found) == 1, found
     assert re.search(said, found[0]), found[0]
+
+
+def test_the_longest_step_depends_on_the_method(tmp_path: Path) -> None:
+    """10 ms, the shortest time constant, is a step of the second-order method, but not of the default."""
+    longer = ISLANDING.replace("h_s = 0.002", "h_s = 0.01")
+    second_order = longer.replace("h_s = 0.01", 'h_s = 0.01\nmethod = "second-order"')
+
+    (problem,) = problems(tmp_path, longer)
+    (faster,) = problems(tmp_path, second_order + "\n[plant.gfm]\nT_p_s = 0.008\n")
+
+    assert "time.h_s: 0.01 s is too long a step for T_p_s = 0.01 s" in problem
+    assert "time.h_s: 0.01 s is too long a step for T_p_s = 0.008 s of [plant.gfm], which it" in faster
+    assert faster.endswith("at most 0.008 s, 1 of the shortest time constant")
+    assert load_scenario(written(tmp_path, second_order))[0].time.h_s == 0.01
+
+
+def test_the_method_of_time_stepping_is_that_of_our_plant(tmp_path: Path) -> None:
+    """Another simulator has its own time stepping: a method is refused there."""
+    helics = ISLANDING.replace("h_s = 0.002", 'h_s = 0.002\nmethod = "second-order"').replace(
+        "[plant]", '[plant]\nsimulator = "helics"'
+    )
+
+    assert any(
+        'time.method: "second-order" is a method of plant.simulator' in each for each in problems(tmp_path, helics)
+    )
 
 
 def test_the_line_of_a_problem_is_that_of_its_key(tmp_path: Path) -> None:

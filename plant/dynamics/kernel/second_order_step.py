@@ -1,0 +1,257 @@
+"""The plant's inner loop of second order, compiled: Heun's method for controllers and network as one DAE.
+
+They are x' = f(x, y), 0 = g(x, y), with the controllers' states x, and the voltages and currents y. A step is the
+predictor x_1 = x_0 + h f(x_0, y_0) and the corrector x_0 + h/2 (f(x_0, y_0) + f(x_1, y_1)). At each of these states
+g = 0 is solved for y, the network together with the inverters' feed-forward: the state space form of Hairer, Wanner,
+Solving Ordinary Differential Equations II, VI.1. So nothing acts a pass late, and readings are of the step's end.
+
+f is a pass of length 0 of the models, which `step` advances by passes of length h: each model is described once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.kernel.compiled import compiled
+from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
+from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.kernel.sparse import extrapolate, note_increment
+from plant.dynamics.kernel.step import FAILURES
+
+CONSISTENT = 1e-10
+"""Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
+
+LOOSE = 0.01
+"""Tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)."""
+
+MAX_ROUNDS = 60
+
+
+class Slopes(NamedTuple):
+    """States and slopes of all inverters as tables of numbers, a row each: the memory of the records in `Units`."""
+
+    gfm: NDArray[np.float64]
+    """States."""
+    gfm_0: NDArray[np.float64]
+    """States at the start of the step."""
+    gfm_d: NDArray[np.float64]
+    """Slopes of the last pass; 0 for an output."""
+    gfm_d0: NDArray[np.float64]
+    """Slopes at the start of the step."""
+    gfl: NDArray[np.float64]
+    """The same for the GFL."""
+    gfl_0: NDArray[np.float64]
+    gfl_d: NDArray[np.float64]
+    gfl_d0: NDArray[np.float64]
+
+
+class FeedForward(NamedTuple):
+    """How each inverter's current depends at once on the terminal's voltage and on itself."""
+
+    y: NDArray[np.complex128]
+    """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
+    itself, or its internal voltage is a state and the admittance is part of the network."""
+    gain: NDArray[np.complex128]
+    """1 / (1 - a), where the current after a pass changes by a times what the current before it changes."""
+    I_b: NDArray[np.float64]
+    """Rated currents (A)."""
+    V_b: float
+    """Highest nominal voltage (V)."""
+
+
+@compiled
+def take_round(
+    units: Any,
+    forward: Any,
+    used: NDArray[np.complex128],
+    change: NDArray[np.complex128],
+    readings: NDArray[np.float64],
+) -> float:
+    """Write slopes and injections that belong to the present voltages; returns a current's largest change (pu).
+
+    Parameters
+    ----------
+    units
+        `Units` whose states at the start of the step are the present ones.
+    forward
+        `FeedForward`.
+    used
+        Injections (A) of the network solution.
+    change
+        How the injections change (A); written.
+    readings
+        As in `advance_inverters`.
+    """
+    advance_inverters(units, 0.0, False, readings)
+    largest = 0.0
+    for i in range(units.online.size):
+        if units.online[i]:
+            for phase in range(3):
+                own = units.J[i, phase] - forward.y[i] * units.V[i, phase]
+                change[i, phase] = (own - used[i, phase]) * forward.gain[i]
+                units.J[i, phase] = used[i, phase] + change[i, phase]
+                largest = max(largest, abs(change[i, phase]) / forward.I_b[i])
+    return largest
+
+
+@compiled
+def solve_together(
+    net: Any,
+    units: Any,
+    forward: Any,
+    rotation: NDArray[np.complex128],
+    x: NDArray[np.float64],
+    I_b: NDArray[np.complex128],
+    tolerance: float,
+    work: NDArray[np.float64],
+    readings: NDArray[np.float64],
+) -> int:
+    """Solve network and inverters at the present states; returns the iterations, or -1.
+
+    An inverter's feed-forward of its own voltage and current is linear and solved in closed form. What remains is the
+    current reference P / u_d, weighted by k_pc: each round gains a decade, and the secant through the last two rounds
+    (Anderson acceleration of depth 1, each island by itself) two.
+
+    Parameters
+    ----------
+    net
+        A `plant.dynamics.reduced.Reduced`.
+    units
+        `Units` whose states at the start of the step are the present ones.
+    forward
+        `FeedForward`.
+    rotation
+        Factor that turns phasors into each island's frame.
+    x, I_b, tolerance, work
+        As in `solve_network`.
+    readings
+        n_inv x READING, written here.
+
+    Returns
+    -------
+    int
+        Iterations of the network, without the one that each round after the first takes at least.
+    """
+    n, islands = units.online.size, net.leader.size
+    J = units.J
+    used, change = J.copy(), np.zeros_like(J)
+    former, former_change = np.zeros_like(J), np.zeros_like(J)
+    along, square = np.empty(islands), np.empty(islands)
+    largest = take_round(units, forward, used, change, readings)  # at the former voltages: the first guess
+    total = 0
+    for count in range(MAX_ROUNDS):
+        used[:] = J
+        reach = max(tolerance, LOOSE * largest * forward.V_b)
+        iterations = solve_network(net, J, rotation, x, I_b, units.V, reach, work)
+        if iterations < 0:
+            return -1
+        total += iterations if count == 0 else iterations - 1
+        largest = take_round(units, forward, used, change, readings)
+        if largest <= CONSISTENT:
+            return total
+        along[:] = 0.0
+        square[:] = 0.0
+        for i in range(n):
+            k = net.inverter_island[i]
+            for phase in range(3):
+                bend = (change[i, phase] - former_change[i, phase]) / forward.I_b[i]
+                along[k] += (bend.conjugate() * change[i, phase]).real / forward.I_b[i]
+                square[k] += (bend.conjugate() * bend).real
+        for i in range(n):
+            k = net.inverter_island[i]
+            part = along[k] / square[k] if count > 0 and square[k] > 0.0 else 0.0
+            for phase in range(3):
+                plain = J[i, phase]
+                J[i, phase] = plain - part * (plain - former[i, phase])
+                former[i, phase], former_change[i, phase] = plain, change[i, phase]
+    return -1
+
+
+@compiled
+def run_second_order_steps(
+    begin: int,
+    steps: int,
+    h: float,
+    tolerance: float,
+    net: Any,
+    units: Any,
+    present: Any,
+    slopes: Any,
+    forward: Any,
+    x: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> int:
+    """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
+
+    Parameters
+    ----------
+    begin
+        Solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the end.
+    steps, h
+        Number of steps and their length (s).
+    tolerance
+        Of the network solution (V).
+    net
+        A `plant.dynamics.reduced.Reduced`.
+    units
+        A `plant.dynamics.kernel.controller_pass.Units`.
+    present
+        The same, with the present states in place of those at the start of the step.
+    slopes
+        `Slopes` of the same memory.
+    forward
+        `FeedForward`.
+    x
+        Branch voltages in the islands' frames, the first guess of the next solution.
+    out
+        steps x n_inv x READING: f, P, Q and V at the end of each step.
+    """
+    total = 0
+    if steps == 0:
+        return total
+    n, m = units.J.shape[0], net.S.size
+    work = np.empty(12 * n + 6 * m)
+    I_b = np.empty(m, np.complex128)
+    x_0, J_0 = np.empty_like(x), np.empty_like(units.J)
+    rotation = np.empty(net.leader.size, np.complex128)
+    theta = np.zeros(n)
+    unread = np.zeros_like(out[0])
+    for solution in range(begin, 2 * steps + 1):
+        step = solution // 2
+        predicted = solution % 2 == 1
+        ends = not predicted and step > 0
+        readings = out[step - 1] if ends else unread
+        x_0[:] = x
+        J_0[:] = units.J
+        if solution > 0:
+            extrapolate(net.sparse, x)
+        turn_frames(units, net, theta, rotation)
+        iterations = solve_together(net, present, forward, rotation, x, I_b, tolerance, work, readings)
+        if iterations < 0:
+            x[:] = x_0
+            units.J[:] = J_0
+            if not predicted:
+                keep_start(units)
+            return -1 - (FAILURES * step + solution % 2)
+        if solution > 0:  # solution 0 repeats the last one of the steps before: it says nothing about the change
+            note_increment(net.sparse, x_0, x)
+        total += iterations
+        if ends:
+            read_offline(units, readings)
+            for i in range(n):
+                if units.online[i] and not np.isfinite(readings[i, 0]):
+                    return -1 - (FAILURES * (step - 1) + 2)
+        if predicted:
+            slopes.gfm[:] = slopes.gfm_0 + 0.5 * h * (slopes.gfm_d0 + slopes.gfm_d)
+            slopes.gfl[:] = slopes.gfl_0 + 0.5 * h * (slopes.gfl_d0 + slopes.gfl_d)
+        else:
+            keep_start(units)
+            if step < steps:
+                slopes.gfm_d0[:] = slopes.gfm_d
+                slopes.gfl_d0[:] = slopes.gfl_d
+                slopes.gfm[:] = slopes.gfm_0 + h * slopes.gfm_d0
+                slopes.gfl[:] = slopes.gfl_0 + h * slopes.gfl_d0
+    return total
