@@ -21,14 +21,11 @@ from plant.gridlabd_import.glm_text import GlmText
 from plant.gridlabd_import.gridlabd_power_flow import PV, SWING
 from plant.gridlabd_import.gridlabd_process import solved_model
 from plant.import_checks import left_out_by, refuse_if, report_unconnected, report_undetermined
+from plant.import_comparison import MATCH, difference
 from plant.imported_equipment import LinearElement, LoadPart
-from plant.network import Network, solve_power_flow
 
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
-
-MATCH = 1e-6
-"""Largest difference (pu) between GridLAB-D's voltages and ours."""
 
 BALANCED = 1e-7
 """Largest unbalance (pu) of the substation's voltage that is rounding."""
@@ -205,32 +202,28 @@ class _GlmReader:
 
     def _compare(self, feeder: Feeder) -> None:
         """Note a problem if our power flow does not have GridLAB-D's voltages: something acts that we do not know."""
-        network = Network(feeder)
-        theirs = {bus["name"]: bus for bus in self._model["buses"]}
-        nodes = [k for k, (name, _) in enumerate(network.nodes) if name in theirs]
-        given = np.array([voltage_of(theirs[network.nodes[k][0]], network.nodes[k][1]) for k in nodes])
-        nominal = network.V_nom[nodes]
-        beyond = int(np.argmax(np.abs(given) / nominal))
-        if abs(given[beyond]) > BEYOND * nominal[beyond]:
-            alone = [name for name in theirs if name not in {bus.name for bus in feeder.buses}]
+        V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+        nodes = {(bus.name, letter) for bus in feeder.buses for letter in bus.phases}
+        buses = {bus["name"]: bus for bus in self._model["buses"]}
+        theirs = {(name, letter): voltage_of(buses[name], letter) for name, letter in nodes if name in buses}
+        highest = max(theirs, key=lambda node: abs(theirs[node]) / V_nom[node[0]])
+        if abs(theirs[highest]) > BEYOND * V_nom[highest[0]]:
+            alone = [name for name in buses if name not in V_nom]
             hint = f"nothing leads to bus {', '.join(alone[:3])}" if alone else "some section has no source"
             self._problems.append(
-                f"{self._path.name}: GridLAB-D's power flow has {abs(given[beyond]) / nominal[beyond]:.2g} pu at bus "
-                f"{network.nodes[nodes[beyond]][0]}: {hint}; take it out of the model, or connect it"
+                f"{self._path.name}: GridLAB-D's power flow has {abs(theirs[highest]) / V_nom[highest[0]]:.2g} pu at "
+                f"bus {highest[0]}: {hint}; take it out of the model, or connect it"
             )
             return
         try:
-            V = solve_power_flow(network, network.closed0, tolerance=1e-11).V
+            worst, (bus, phase) = difference(feeder, theirs)
         except ArithmeticError as error:
             self._problems.append(f"{self._path.name}: {error}")
             return
-        differences = np.abs(V[nodes] - given) / nominal
-        worst = int(np.argmax(differences))
-        if differences[worst] > MATCH:
-            bus, phase = network.nodes[nodes[worst]]
+        if worst > MATCH:
             self._problems.append(
-                f"{self._path.name}: our power flow differs from GridLAB-D's by {differences[worst]:.2g} pu, most at "
-                f"bus {bus}, phase {phase}; something there acts that is not taken over"
+                f"{self._path.name}: our power flow differs from GridLAB-D's by {worst:.2g} pu, most at bus {bus}, "
+                f"phase {phase}; something there acts that is not taken over"
             )
 
 

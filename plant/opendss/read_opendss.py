@@ -13,10 +13,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import msgspec
+
 from plant.equipment import NODES, Feeder
-from plant.import_checks import left_out_by, refuse_if, report_unconnected, report_undetermined
+from plant.import_checks import SHOWN, left_out_by, number_of, refuse_if, report_unconnected, report_undetermined
+from plant.import_comparison import MATCH, difference, loads_without_ground
 from plant.imported_equipment import LoadPart
-from plant.opendss.dss_elements import DssElements
+from plant.opendss.dss_elements import DssElements, complex_of, letter_of
 from plant.opendss.dss_engine import DssEngine
 from plant.opendss.dss_generation import GENERATION, read_generation
 from plant.opendss.dss_loads import read_loads
@@ -124,7 +127,34 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
     refuse_if(path, problems)
     report_undetermined(feeder, problems, UNGROUNDED)
     refuse_if(path, problems)
-    return feeder
+    if left_out:
+        return feeder
+    return _compared(path, feeder, circuit)
+
+
+def _compared(path: Path, feeder: Feeder, circuit: Any) -> Feeder:
+    """Return the feeder with a note if our power flow has not the engine's voltages; refuse it if it has none."""
+    places = [str(name).lower().rpartition(".") for name in circuit.YNodeOrder]
+    nodes = [(bus, letter_of(int(number))) for bus, _, number in places]
+    theirs = dict(zip(nodes, complex_of(circuit.YNodeVarray).tolist(), strict=True))
+    try:
+        worst, (bus, letter) = difference(feeder, theirs)
+        node = f"{bus}.{number_of(letter)}"
+        told = f"{path.name}: our power flow differs from the engine's by {worst:.2g} pu, most at {node}"
+    except ArithmeticError as error:
+        worst, told = 1.0, f"{path.name}: the engine solves it, our {error}"
+    if worst <= MATCH:
+        return feeder
+    alone = loads_without_ground(feeder)
+    if alone:
+        more = f" and {len(alone) - SHOWN} more" if len(alone) > SHOWN else ""
+        told = (
+            f"{', '.join(alone[:SHOWN])}{more}: constant power to ground behind a delta winding, where nothing else is "
+            "grounded: the voltage to ground has no single solution; make it conn=delta or model=2, or ground a winding"
+        )
+    if alone or worst == 1.0:
+        refuse_if(path, [told])
+    return msgspec.structs.replace(feeder, notes=(*feeder.notes, told))
 
 
 def _elements(circuit: Any) -> list[tuple[str, str]]:
