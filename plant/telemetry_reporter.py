@@ -9,7 +9,6 @@ from typing import get_type_hints
 from msgspec.structs import replace
 
 from plant.plant_interface import PlantLike, ReadingLike
-from wire.bounds import LIMIT
 from wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
 from wire.printable import printable
 
@@ -54,6 +53,13 @@ _in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
 
 _LATEST = 20
 """Number of latest events for late clients: with twice as many of the longest, an answer is still short."""
+
+
+ROWS_BYTES = 32_000
+"""Bytes of rows in a message: Zenoh sends it in one piece."""
+
+EVENTS = 30
+"""Most events in a message; the longest possible ones fit within the limit."""
 
 
 class Reporter:
@@ -109,11 +115,13 @@ class Reporter:
         """Yield telemetry at run time t (s) of all gathered rows and events, in messages within the size limit."""
         inverters = self._plant.inverters
         bytes_per_row = _NUMBER_BYTES * (1 + VALUES * len(inverters)) + 8
-        at_once = max(1, LIMIT // 2 // bytes_per_row)
+        at_once = max(1, ROWS_BYTES // bytes_per_row)
         rows, events, quiet = self._rows, self._events, tuple(self._quiet.items())
         self._rows, self._events, self._quiet = [], [], {}
         while True:
             part, rows = rows[:at_once], rows[at_once:]
+            told, events = ([], events) if rows else (events[:EVENTS], events[EVENTS:])
+            more = bool(rows or events)
             yield Telemetry(
                 sender=PLANT,
                 epoch=self._epoch,
@@ -121,17 +129,17 @@ class Reporter:
                 t=t,
                 inverters=inverters,
                 rows=tuple(part),
-                events=() if rows else tuple(events),
-                final=final and not rows,
+                events=tuple(told),
+                final=final and not more,
                 outcome=printable(outcome),
                 reproducible=reproducible,
                 pacing=pacing,
-                awaited=() if rows else awaited,
+                awaited=() if more else awaited,
                 impaired=impaired,
                 others=others,
-                quiet=() if rows else quiet,
+                quiet=() if more else quiet,
             )
             others = 0
             self.seq += 1
-            if not rows:
+            if not more:
                 return

@@ -13,8 +13,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-LIMIT = 64_000
-"""Longest message in bytes: Zenoh sends it in one piece, and it is ten times any message but Telemetry."""
+LIMIT = 256_000
+"""Longest message in bytes: room for a row of telemetry on `MOST` inverters with long names. All other messages are a
+hundredth of it."""
 
 NAME = r"[A-Za-z0-9_.-]{1,64}"
 """Allowed form of a name. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
