@@ -27,7 +27,7 @@ SCRIPTS = Path(__file__).parents[2] / "tests" / "feeders"
 TEXT = f"""
 Every node's phasor of our power flow, beside both OpenDSS engines: that of dss-extensions (`dss-python`, in Pascal)
 and EPRI's own (`py-dss-interface`, in C++). IEEE 13 and 34 are scripts that all three read; the 123-node feeders are
-our tables, which `bench/validation/opendss/write_opendss.py` writes as a script with none of the plant's code.
+our tables, which `bench/validation/opendss/write_opendss.py` writes as a script without any code of `plant.network`.
 Differences of complex voltages are within {LIMIT:g} pu.
 
 The switch states are all combinations of the ten switches of the microgrid feeder; any of them can be reached by
