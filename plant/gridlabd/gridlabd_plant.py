@@ -6,35 +6,29 @@ import sys
 from math import isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.switch_state import SwitchState
 from plant.feeder import Plant
-from plant.feeder.circuits import Circuits
-from plant.feeder.islands import Islands
 from plant.feeder.plant import Reading
 from plant.feeder.protection import Relays
 from plant.feeder.set_points import SetPointLimits
-from plant.feeder.switchboard import Switchboard
 from plant.inverter_parameters import GflParameters
 from plant.network import Network
-from plant.plant_config import PlantSettings, PowerLimit
+from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of
 
 from .delta_mode_process import DeltaModeProcess, GridlabdError
 from .glm import write_glm
+from .gridlabd_schedule import GridlabdSchedule, Write
 
 FEEDERS = Path(__file__).parents[1] / "data"
 
 REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
-
-Write = tuple[str, str, Any]
-"""A value for GridLAB-D: object, property, value."""
 
 
 class GridlabdPlant:
@@ -84,21 +78,16 @@ class GridlabdPlant:
         """k: the plant is at k T_c."""
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
-        self._network = network = network or ours.network
+        network = network or ours.network
         self._units = {unit.name: unit for unit in network.inverters}
         self._parameters = {
             unit.name: network.feeder.parameters_of(unit, settings.gfm, settings.gfl) for unit in network.inverters
         }
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
-        self._switches = Switchboard(network, settings.events, self._h)
-        self._circuits, self._islands = Circuits(network), Islands(network)
-        self._state = self._switch_state()
-        self._limits: dict[int, list[PowerLimit]] = {}
-        for limit in settings.limits:
-            self._limits.setdefault(round(limit.t / self._h), []).append(limit)
+        self._schedule = GridlabdSchedule(network, settings, self._parameters)
         self._set_points = SetPointLimits()
         self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
-        self._events = self._islands.report_dead(0.0, self._switches.closed, self._state)
+        self._events = self._schedule.start()
         self._writes: list[Write] = []
         """What GridLAB-D is given before its next step."""
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
@@ -144,7 +133,7 @@ class GridlabdPlant:
 
     def measure(self) -> dict[str, Reading]:
         """Read every inverter's sensors at t = tick * T_c."""
-        island, fed = self._islands.names(self._state)
+        island, fed = self._schedule.islands()
         readings = {}
         for i, name in enumerate(self.inverters):
             f, P, Q, V, P_set, V_set = self._in_units(name, self._now[i])
@@ -179,9 +168,7 @@ class GridlabdPlant:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already."""
         if synchronised:
             raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
-        known = self._network.switch_name(name)
-        self._switches.put(self.tick * self._steps, known, action)
-        return (known in self._switches.closed) == (action == "close")
+        return self._schedule.put(self.tick * self._steps, name, action)
 
     def connect(self, name: str, on: bool) -> None:
         """Do nothing if an inverter comes that is there; RuntimeError if it goes: GridLAB-D's inverters stay."""
@@ -198,9 +185,10 @@ class GridlabdPlant:
         """
         step, last = self.tick * self._steps, (self.tick + 1) * self._steps
         while step < last:
-            self._happen(step)
-            coming = [s for s in (*self._switches.steps, *self._limits) if s > step]
-            stop = min(last, step + self._relays.quiet, *coming)
+            writes, events = self._schedule.happen(step)
+            self._writes += writes
+            self._events += events
+            stop = min(last, step + self._relays.quiet, *self._schedule.after(step))
             try:
                 steps = self._run(stop - step)
             except GridlabdError as error:
@@ -254,36 +242,6 @@ class GridlabdPlant:
                 f"GridLAB-D diverges: {self.inverters[i]} has no finite values {(k + 1) * self._h:g} s later"
             )
         return readings
-
-    def _happen(self, step: int) -> None:
-        """Operate the switches of a step and limit the power that inverters have, from this step on.
-
-        GridLAB-D loses an island if two switches that part it open in one step: the others wait for the next steps.
-        """
-        due = self._switches.due(step)
-        for operation in due[1:]:
-            self._switches.drop(step, operation)
-            self._switches.put(step + 1, operation.switch, operation.action)
-            shown = self._switches.shown(operation.switch)
-            text = f"GridLAB-D operates one switch a step: {shown} follows {self._h * 1e3:g} ms later"
-            self._events.append(PlantEvent(t=self._time(step), kind="warning", subject=operation.switch, text=text))
-        if due:
-            self._writes.append((f"s{due[0].switch}", "status", due[0].action))
-            self._events += self._switches.operate(step)
-            self._state = self._switch_state()
-            self._events += self._islands.report(self._time(step), self._switches.closed, self._state)
-        for limit in self._limits.pop(step, ()):
-            unit, own = self._units[limit.inverter], self._parameters[limit.inverter]
-            assert isinstance(own, GflParameters), "a scenario limits the power of a GFL alone"
-            self._writes.append((limit.inverter, "Pref_max", limit.P_max / (unit.P_rated * own.S_max)))
-            text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
-            self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))
-
-    def _switch_state(self) -> SwitchState:
-        """Return the islands with the switches that are closed now; all inverters are on the network."""
-        circuit = self._circuits.of(self._switches.closed)
-        forming = np.array([unit.kind == "GFM" for unit in self._units.values()])
-        return SwitchState(circuit, np.zeros(forming.size, complex), forming, np.ones(forming.size, bool))
 
     def _watch(self, step: int, steps: NDArray[np.float64]) -> None:
         """End the run where protection of ours would trip an inverter, because GridLAB-D's goes on."""
