@@ -114,11 +114,11 @@ class HelicsFederate:
     ) -> dict[str, Value]:
         """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key.
 
-        If none came although they are `needed`, it looks whether their publishers have left.
+        If they are `needed`, a publisher of which none came must not have left.
         """
         late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
-        answer = self._ask({"do": "step", "publish": publish, "time": t + after}, late)
-        if needed and answer["gone"]:
+        answer = self._ask({"do": "step", "publish": publish, "time": t + after, "needed": needed}, late)
+        if answer["gone"]:
             raise HelicsError(
                 f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
                 "let it run at least as long as the scenario"

@@ -7,7 +7,7 @@ what HELICS prints goes to standard error.
 
     {"do": "join", "name", "host", "port", "federates", "wait"}
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}
-    {"do": "step", "publish": {key: value}, "time": s}  publish, request a time, return the values that came
+    {"do": "step", "publish": {key: value}, "time", "needed"}  publish, go to a time (s), return the values that came
     {"do": "end", "publish": {key: value}}              publish, leave the federation, end
     {"do": "stand"}                                     where the others are; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
@@ -59,12 +59,13 @@ class Federate:
         self.name = ""
         self.publications: dict[str, tuple[Any, str]] = {}
         self.subscriptions: dict[str, tuple[Any, str]] = {}
-        self.publishers: list[str] = []
+        self.publishers: dict[str, set[str]] = {}
+        """By federate: our subscriptions that it publishes."""
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         """Start the broker if asked for, and connect to it."""
         helics, host, port = self.helics, request["host"], request["port"]
-        loopback = host in ("127.0.0.1", "localhost", "::1")
+        loopback = host == "127.0.0.1"
         self.name = request["name"]
         if request["federates"]:
             _require_free(host, port)
@@ -103,9 +104,11 @@ class Federate:
         self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)
         others = [name for name in self._names("root", "federates") if name != self.name]
-        # a federate that does not wait for our values may have left by now: then nobody knows what it published
-        named = [name for name in others if self.subscriptions.keys() & set(self._names(name, "publications"))]
-        self.publishers = named or others
+        for name in others:
+            if keys := self.subscriptions.keys() & set(self._names(name, "publications")):
+                self.publishers[name] = set(keys)
+        if not self.publishers:  # one that does not wait for our values may have left: nobody knows what was its own
+            self.publishers = {name: set(self.subscriptions) for name in others}
         type_of = helics.helicsInputGetPublicationType
         missing = [key for key, (topic, _) in self.subscriptions.items() if type_of(topic) == NOBODY]
         return {"others": others, "missing": missing}
@@ -114,7 +117,7 @@ class Federate:
         """Publish, go to a time, and return what was published since the last step."""
         helics = self.helics
         self._publish(request["publish"])
-        granted = helics.helicsFederateRequestTime(self.fed, request["time"])
+        helics.helicsFederateRequestTime(self.fed, request["time"])
         read = {
             "double": helics.helicsInputGetDouble,
             "boolean": lambda topic: bool(helics.helicsInputGetBoolean(topic)),
@@ -125,9 +128,11 @@ class Federate:
             for key, (topic, kind) in self.subscriptions.items()
             if helics.helicsInputIsUpdated(topic)
         }
-        gone = [] if values else [who for who in self.publishers if self._query(who, "state") in _GONE]
-        gone = gone if len(gone) == len(self.publishers) else []
-        return {"granted": granted, "values": values, "gone": gone}
+        gone = []
+        if request["needed"]:
+            silent = [name for name, keys in self.publishers.items() if not keys & values.keys()]
+            gone = [name for name in silent if self._query(name, "state") in _GONE]
+        return {"values": values, "gone": gone}
 
     def end(self, request: dict[str, Any]) -> dict[str, Any]:
         """Leave the federation; an own broker stays until the others have left, or for a while."""
@@ -229,13 +234,16 @@ def main() -> None:
         with contextlib.suppress(OSError):  # the parent is gone: so is this process, in a moment
             answers.write(json.dumps(content) + "\n")
 
+    def tell_stand() -> None:
+        with contextlib.suppress(Exception):
+            answer({"stand": federate.stand() if federate else []})
+
     def listen() -> None:
         """Take requests; do at once what must not wait for the present one."""
         for line in sys.stdin:
             request = json.loads(line)
-            if request["do"] == "stand":
-                with contextlib.suppress(Exception):
-                    answer({"stand": federate.stand() if federate else []})
+            if request["do"] == "stand":  # HELICS asks a dead federate, too, and waits long for it
+                threading.Thread(target=tell_stand, daemon=True).start()
             elif request["do"] == "abort":
                 if federate:
                     federate.abort(request["reason"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 import msgspec
@@ -13,6 +14,7 @@ from plant.helics import topics
 from plant.helics.federate import HelicsError, HelicsFederate
 from plant.helics.topics import ACT, Value, number
 from plant.plant_config import PlantConfig
+from wire.bounds import NAME
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of
 
@@ -59,6 +61,7 @@ class HelicsPlant:
         ]
         optional.append(topics.events(helics.prefix))
         self._needed = [topic.key for topic in needed]
+        self._island_keys = {f"{helics.prefix}/{name}/island" for name in self.inverters}
         self._values: dict[str, Value] = {}
         self._outgoing: dict[str, Value] = {}
         self._rows: list[tuple[float, ...]] = []
@@ -160,6 +163,9 @@ class HelicsPlant:
         for key, value in came.items():
             if not isinstance(value, bool | str) and not math.isfinite(number(value)):
                 raise HelicsError(f"HELICS, t = {t:g} s: {key} is not a finite number; correct its publisher")
+            if key in self._island_keys and not re.fullmatch(NAME, str(value)):
+                text = f"{key} must be the name of an inverter, grid or off, got {str(value)!r:.80}"
+                raise HelicsError(f"HELICS, t = {t:g} s: {text}; correct its publisher")
 
     def _decoded(self, text: str, t: float) -> tuple[PlantEvent, ...]:
         try:

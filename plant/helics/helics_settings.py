@@ -7,14 +7,14 @@ from typing import Annotated
 
 import msgspec
 
+from wire.bounds import NAME
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 
 BROKER = "tcp://127.0.0.1:23404"
 """Address of a HELICS broker that was started without options on this machine."""
 
-_ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+|\[[0-9A-Fa-f:]+\])(:(?P<port>\d{1,5}))?")
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")
 
 
 class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -47,7 +47,7 @@ def settings_problems(settings: HelicsSettings) -> dict[str, str]:
         found["broker"] = f'must be like {BROKER}, got "{settings.broker}"'
     for key in ("name", "prefix"):
         value = getattr(settings, key)
-        if not _NAME.fullmatch(value):
+        if not re.fullmatch(NAME, value):
             found[key] = f'must be up to 64 letters, digits, "_", "-" or ".", got "{value}"'
     if settings.federates == 1:
         found["federates"] = "must be at least 2, this one and an outside one, or 0 to start no broker; got 1"
@@ -60,8 +60,9 @@ def endpoint(broker: str) -> tuple[str, int]:
     Examples
     --------
     >>> endpoint("tcp://10.0.0.5:24000"), endpoint("localhost")
-    (('10.0.0.5', 24000), ('localhost', 23404))
+    (('10.0.0.5', 24000), ('127.0.0.1', 23404))
     """
     match = _ADDRESS.fullmatch(broker)
     assert match is not None, broker
-    return match[2].strip("[]"), int(match["port"] or 23404)
+    host = "127.0.0.1" if match[2] == "localhost" else match[2]  # HELICS listens at numbers
+    return host, int(match["port"] or 23404)

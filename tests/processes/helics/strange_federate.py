@@ -1,6 +1,6 @@
-"""A federate of somebody else that does one thing wrong at t = 0.1 s: ``strange_federate.py BROKER WHAT``.
+"""A federate of somebody else that does one thing wrong at t = 0.1 s: ``BROKER WHAT [NAME FIRST LAST]``.
 
-It imports helics alone. Its nine inverters show the same all the time.
+It imports helics alone. Its inverters, nine if it is not told which, show the same all the time.
 """
 
 import math
@@ -12,19 +12,19 @@ STEP, WRONG, END = 0.01, 0.1, 0.2  # s
 SHOWN = {"f": 60.0, "P": 300e3, "Q": 10e3, "V": 2400.0}
 
 
-def main(broker: str, what: str) -> None:
-    """Publish until the end, or until something is wrong."""
+def main(broker: str, what: str, name: str = "strange", first: str = "1", last: str = "9") -> None:
+    """Publish until the end, or until something is wrong, for some of the inverters."""
     import helics as h
 
     info = h.helicsCreateFederateInfo()
     h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
     h.helicsFederateInfoSetCoreInitString(info, f"--federates=1 --broker_address={broker} --loglevel=no_print")
     h.helicsFederateInfoSetFlagOption(info, h.HELICS_FLAG_UNINTERRUPTIBLE, True)
-    me = h.helicsCreateValueFederate("strange", info)
+    me = h.helicsCreateValueFederate(name, info)
     kind = h.HELICS_DATA_TYPE_STRING if what == "text" else h.HELICS_DATA_TYPE_DOUBLE
     out = {
         (i, x): h.helicsFederateRegisterGlobalPublication(me, f"grid/inv{i}/{x}", kind, "")
-        for i in range(1, 10)
+        for i in range(int(first), int(last) + 1)
         for x in SHOWN
         if (what, i, x) != ("lacks a topic", 3, "V")
     }

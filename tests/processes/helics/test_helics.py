@@ -116,6 +116,18 @@ def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(what: str, s
     assert "\n" not in str(error.value)
 
 
+def test_one_of_two_plants_that_leaves_ends_the_run_too() -> None:
+    """Its inverters would stand still for ever, while those of the other move on."""
+    broker = free_broker()
+    helics = {"broker": broker, "federates": 3}
+    scenario = short(0.2, broker, **{"plant.simulator": "helics", "plant.helics": helics})
+    north = STRANGE, broker, "good", "north", "1", "4"
+    south = STRANGE, broker, "leaves", "south", "5", "9"
+
+    with federate(*north), federate(*south), pytest.raises(BrokenRunError, match="s: south left the federation"):
+        scenario.run("IV")
+
+
 def test_a_broker_that_is_missing_is_one_line() -> None:
     """The line has its address, and the command that starts one."""
     broker = free_broker()
