@@ -19,6 +19,7 @@ BoundOfPset = Annotated[float, Unit("pu"), Plausible("the bound of P_set", 0.1, 
 BoundOfVset = Annotated[float, Unit("pu"), Plausible("a bound of V_set", 0.1, 2.0, above_zero=True)]
 InternalVoltage = Annotated[float, Unit("pu"), Plausible("a limit of the internal voltage", 0.0, 2.0)]
 Capacity = Annotated[float, Unit("pu"), Plausible("a limit of apparent power or current", 0.1, 5.0, above_zero=True)]
+PhaseCurrent = Annotated[float, Unit("pu"), Plausible("a limit of a phase's current", 0.5, 1000.0, above_zero=True)]
 VoltageBand = Annotated[float, Unit("pu"), Plausible("a dead band", 0.0, 0.2)]
 FrequencyBand = Annotated[float, Unit("Hz"), Plausible("a dead band", 0.0, 5.0)]
 
@@ -64,6 +65,8 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Lower bound of the internal voltage (pu)."""
     E_max: InternalVoltage = 1.25
     """Upper bound of the internal voltage (pu)."""
+    I_max: PhaseCurrent = 2.0
+    """Largest current of a phase (pu of the rating): beyond it the phase keeps its angle and loses the surplus."""
     P_set_lim: BoundOfPset = 3.0
     """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
     unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""

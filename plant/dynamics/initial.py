@@ -243,3 +243,9 @@ def require_within_limits(units: Inverters, online: NDArray[np.bool_]) -> None:
                     f"it can from {limits[low] * base:.5g} to {limits[high] * base:.5g} {symbol} ({low}_pu, "
                     f"{high}_pu of [plant.gfm]); set another P_set0_pu or V_set0_pu, or change its load"
                 )
+        current, most = float(np.max(np.abs(units.I[i]))), float(limits["I_limit"])
+        if current > most * (1.0 + 1e-9):
+            raise PlantError(
+                f"no equilibrium at t = 0: {unit.name} would have to carry {current:.5g} A in a phase, it can carry "
+                f"{most:.5g} A (I_max_pu of [plant.gfm]); set another P_set0_pu, or change its load"
+            )

@@ -78,6 +78,8 @@ class Inverters:
         P_set, V_set, Q_set (pu); may be written between steps.
     J, V, I : complex128[n, 3]
         Norton injections (A), terminal voltages (V) and currents out of the inverters (A).
+    limiting : bool[n]
+        Inverters whose phase currents were limited in the last network solution.
     """
 
     def __init__(
@@ -109,6 +111,7 @@ class Inverters:
         self.J = np.zeros((n, 3), complex)
         self.V = np.zeros((n, 3), complex)
         self.I = np.zeros((n, 3), complex)
+        self.limiting = np.zeros(n, bool)
 
     def __len__(self) -> int:
         return len(self.units)

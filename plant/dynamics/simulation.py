@@ -127,8 +127,9 @@ class Dynamics:
             solution = 2 * step + what
             if what == 2:
                 islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
-            elif solution == renewed:  # just renewed, but not solved: rounding near the largest possible load
-                islands = set(np.flatnonzero(network.reduction.live).tolist())
+            elif solution == renewed:  # just renewed, but not solved: limited currents, or rounding at the largest load
+                limited = network.reduction.inverter_island[self.inverters.limiting]
+                islands = set(limited.tolist()) or set(np.flatnonzero(network.reduction.live).tolist())
             else:
                 try:
                     network.renew()
@@ -165,6 +166,7 @@ class Dynamics:
             self._J_0,
             units.V,
             units.I,
+            units.limiting,
         )
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:

@@ -11,6 +11,7 @@ from plant.dynamics import Dynamics, Inverter, PlantError
 from plant.dynamics.initial import require_within_limits
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
+from plant.feeder.current_limits import CurrentLimits
 from plant.feeder.in_service import InService
 from plant.feeder.islands import Islands
 from plant.feeder.set_points import SetPointLimits
@@ -101,6 +102,10 @@ class Plant:
             settings.h,
             connected=connected,
             method=settings.method,
+        )
+        units = self._dynamics.inverters.units
+        self._current_limits = CurrentLimits(
+            self.inverters, tuple(getattr(unit.parameters, "I_max", 0.0) for unit in units)
         )
         sync = Synchronism(network, self._dynamics, settings.sync_check)
         timeout = round(settings.sync_check.timeout / settings.h)
@@ -207,6 +212,9 @@ class Plant:
                 self._limit(limit)
             stop = min(min(s for s in scheduled if s > step), step + self._in_service.quiet)
             out = self._dynamics.run(stop - step)
+            if (limiting := out[:, :, 6] > 0.0).any():
+                for k in np.flatnonzero(limiting.any(axis=1)).tolist():
+                    self._events += self._current_limits.report(self._time(step + k + 1), limiting[k])
             self._tell_trips(step)
             for k in range(stop - step):
                 if (step + k + 1) % self._record == 0:

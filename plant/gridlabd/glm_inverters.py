@@ -10,9 +10,6 @@ from plant.own_parameters import InverterParameters
 
 from .glm_network import F_NOM, TableRow, block
 
-NO_LIMIT = 1e3
-"""Phase-current limit (pu): we have none. GridLAB-D's default of 2 pu acts only at a closing out of phase."""
-
 
 def inverter_blocks(
     rows: Iterable[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
@@ -33,7 +30,6 @@ def inverter_blocks(
                 frequency_convergence_criterion=1e-9,
                 voltage_convergence_criterion=1e-9,
                 current_convergence_criterion=1e-9,
-                Imax=NO_LIMIT,
                 **unit,
             )
         )
@@ -65,6 +61,7 @@ def _gfm(row: TableRow, gfm: GfmParameters) -> dict[str, str | float]:
         "kiv": gfm.k_iv,
         "E_min": gfm.E_min,
         "E_max": gfm.E_max,
+        "Imax": gfm.I_max,
     }
 
 

@@ -60,7 +60,12 @@ def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
     """
     scenario, feeder = load_scenario(run.scenario)
     config, agents = configs(scenario, feeder, run.case)
-    settings = replace(config.settings, gfl=run.gfl or config.settings.gfl, events=run.events or config.settings.events)
+    settings = replace(
+        config.settings,
+        gfl=run.gfl or config.settings.gfl,
+        gfm=run.gfm or config.settings.gfm,
+        events=run.events or config.settings.events,
+    )
     run, config = shortened(run, replace(config, settings=settings, record_step=settings.h), factor)
     network = Network(with_impedances(feeder) if run.impedances else feeder)
     if run.reclosing:

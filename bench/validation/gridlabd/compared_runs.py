@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from plant.plant_config import GflParameters, PlantConfig, SwitchEvent
+from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.plant_config import PlantConfig, SwitchEvent
 
 ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)
 """GridLAB-D has one rating for a GFL's reference and its apparent power (ours: 1 and 1.2 pu), and no bound of V_set."""
@@ -49,6 +50,8 @@ class ComparedRun(NamedTuple):
     case: str
     closed_loop: bool = False
     gfl: GflParameters | None = None
+    """Instead of the scenario's."""
+    gfm: GfmParameters | None = None
     """Instead of the scenario's."""
     events: tuple[SwitchEvent, ...] = ()
     """Instead of the scenario's."""
@@ -105,8 +108,16 @@ RUNS = {
         "the same at -70 degrees: down to 0.8 pu of voltage, up to 5 pu of power",
         "islanding",
         "I",
+        gfm=GfmParameters(I_max=1000.0),  # 2 pu would act
         reclosing=Reclosing(switch="13-152", opens=0.1, angle=70.0, further=2.0),
         in_tests=False,
+    ),
+    "current-limit": ComparedRun(
+        "as islanding-I, phase currents of the GFM limited to 1.8 pu, which acts for some ms",
+        "islanding",
+        "I",
+        gfm=GfmParameters(I_max=1.8),
+        tolerance=2e-5,  # both go on until no current is beyond the limit, but not by the same iterations
     ),
     "wind-up": ComparedRun(
         "available power below the reference, without anti-windup, in closed loop",

@@ -17,8 +17,9 @@ from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.gfl import advance_gfl
 from plant.dynamics.kernel.gfm import advance_gfm
 
-READING = 6
-"""Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), and V of the lowest and the highest phase (V)."""
+READING = 7
+"""Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), V of the lowest and the highest phase (V), and
+whether its phase currents were limited (1 or 0)."""
 
 
 class Units(NamedTuple):
@@ -54,6 +55,8 @@ class Units(NamedTuple):
     """Terminal voltages (V), n_inv x 3, of the last network solution."""
     I: NDArray[np.complex128]  # noqa: E741  # the paper's symbol
     """Currents out of the inverters (A), n_inv x 3, of the last network solution."""
+    limiting: NDArray[np.bool_]
+    """Inverters whose phase currents were limited in the last network solution."""
 
 
 @compiled
@@ -162,6 +165,8 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
         J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
         J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
         readings[i, 0] = units.f_nom + state.w / (2.0 * np.pi)
+        if units.limiting[i]:
+            readings[i, 6] = 1.0
 
     for k in range(units.gfl_at.size):
         i = units.gfl_at[k]

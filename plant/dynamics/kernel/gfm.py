@@ -20,6 +20,7 @@ PARAMETERS = np.dtype(
         ("S_b", "f8"),  # VA, three phases
         ("V_b", "f8"),  # V, line-to-neutral
         ("y_f", "c16"),  # S, of one phase
+        ("I_limit", "f8"),  # A, of one phase
         ("m_p", "f8"),  # rad/s per pu
         ("m_q", "f8"),  # pu per pu
         ("T_p", "f8"),
@@ -86,7 +87,8 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
     record["S_b"], record["V_b"] = S_b, V_b
     record["y_f"] = 1.0 / (complex(par.R_f, par.X_f) * Z_b)
     record["m_p"], record["m_q"] = m_p * (2.0 * np.pi * f_nom), m_q
-    for name in PARAMETERS.names[5:]:  # type: ignore[index]  # a structured dtype has names
+    record["I_limit"] = par.I_max * S_b / (3.0 * V_b)
+    for name in PARAMETERS.names[6:]:  # type: ignore[index]  # a structured dtype has names
         record[name] = getattr(par, name)
     return record
 

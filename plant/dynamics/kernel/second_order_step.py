@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
-from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.kernel.current_limit import solve_within_limits
 from plant.dynamics.kernel.sparse import extrapolate, note_increment
 from plant.dynamics.kernel.step import FAILURES
 
@@ -126,7 +126,7 @@ def solve_together(
     rotation
         Factor that turns phasors into each island's frame.
     x, I_b, tolerance, work
-        As in `solve_network`.
+        As in `solve_within_limits`.
     readings
         n_inv x READING, written here.
 
@@ -145,7 +145,7 @@ def solve_together(
     for count in range(MAX_ROUNDS):
         used[:] = J
         reach = max(tolerance, LOOSE * largest * forward.V_b)
-        iterations = solve_network(net, J, rotation, x, I_b, units.V, reach, work)
+        iterations = solve_within_limits(net, units, rotation, x, I_b, reach, work)
         if iterations < 0:
             return -1
         total += iterations if count == 0 else iterations - 1

@@ -84,6 +84,7 @@ def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> No
         p.hold("inv1", 3e5, 2401.8)
         p.advance()
 
+    begun = tuple(event for event in begun if "P_set" in event.text)  # beside that of its phase currents
     assert [(event.kind, event.subject) for event in begun] == [("limit", "inv1")]
     assert "10000 kW" in begun[0].text
     assert "1800 kW" in begun[0].text

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from plant.feeder import Plant
+from plant.inverter_parameters import GfmParameters
 from plant.network import Network
 from plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from plant.tables import read_feeder
 from tests.unit.plant.test_feeder import T_C, opened, run
 from wire.messages import OFF, PlantEvent
+
+UNLIMITED = GfmParameters(I_max=1000.0)
+"""GFM of any current: overloads, and black starts into the whole load, come to the functions that are tested here."""
 
 CLOUDS = tuple(PowerLimit(t=1.5, inverter=f"inv{k}", P_max=0.0) for k in (2, 3, 5, 6, 8, 9))
 """No GFL has any power from 1.5 s on."""
@@ -20,7 +24,7 @@ def plant(
     protection: Protection, *events: SwitchEvent, limits: tuple[PowerLimit, ...] = (), load_set: str = "event2"
 ) -> Plant:
     """Make the microgrid feeder with this protection."""
-    settings = PlantSettings(load_set=load_set, events=events, limits=limits, protection=protection)
+    settings = PlantSettings(load_set=load_set, events=events, limits=limits, protection=protection, gfm=UNLIMITED)
     return Plant(Network(read_feeder("microgrid123", load_set)), settings, T_C, 0.002)
 
 
