@@ -14,13 +14,12 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from plant.gridlabd_import.gridlabd_process import messages
+
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 
-LAST_LINES = 8
-"""Last lines of GridLAB-D's own output in an error."""
-
-_WHY = ("ERROR", "FATAL")
-"""Words before the lines of GridLAB-D's output that tell why it ended."""
+SHOWN = 2
+"""So many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow."""
 
 START_DEADLINE = 600.0
 """Longest time (s) until a model is loaded and its first power flow solved."""
@@ -95,7 +94,7 @@ class DeltaModeProcess:
         Raises
         ------
         GridlabdError
-            If GridLAB-D cannot do it, does not answer in time, or has ended; with its last lines.
+            If GridLAB-D cannot do it, does not answer in time, or has ended; with its own errors.
         """
         return self._answer(request, self._deadline)
 
@@ -118,14 +117,14 @@ class DeltaModeProcess:
             raise self._ended() from None
         line = self._read_line(monotonic() + deadline)
         if line is None:
-            raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._last_lines()}")
+            raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
         if not line:
             raise self._ended()
         answer: dict[str, Any] = json.loads(line)
         if "No module named 'gridlabd'" in answer.get("error", ""):
             raise GridlabdError(MISSING.format(python=self._python))
         if "error" in answer:
-            raise GridlabdError(f"GridLAB-D: {answer['error']}{self._last_lines()}")
+            raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
         return answer
 
     def _read_line(self, until: float) -> bytes | None:
@@ -145,11 +144,10 @@ class DeltaModeProcess:
     def _ended(self) -> GridlabdError:
         status = self._process.wait()
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"exited with status {status}"
-        return GridlabdError(f"GridLAB-D's process {how}{self._last_lines()}")
+        return GridlabdError(f"GridLAB-D's process {how}{self._complaints()}")
 
-    def _last_lines(self) -> str:
-        """Return the last lines of GridLAB-D's output as the end of a sentence."""
-        text = self._log.read_text(encoding="utf-8", errors="replace").replace("\r", "\n")
-        lines = [line.rstrip() for line in text.splitlines() if line.strip()]
-        lines = ([line for line in lines if line.startswith(_WHY)] or lines)[-LAST_LINES:]  # it warns often
-        return ". Its last lines:" + "".join(f"\n    {line}" for line in lines) if lines else "; it has printed nothing"
+    def _complaints(self) -> str:
+        """Return GridLAB-D's first errors as the end of a sentence, on one line as all that goes over the wire."""
+        found = messages(self._log.read_text(encoding="utf-8", errors="replace"))
+        first = [text.removeprefix("GridLAB-D: ").rstrip(".") for text in found[:SHOWN]]
+        return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"

@@ -38,6 +38,6 @@ def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:
             config.T_c,
             config.end,
             record_step=config.record_step,
-            deadline=config.deadline,
+            deadline=0.8 * config.deadline,  # the plant tells the agents before they give it up
             network=Network(feeder),
         )
