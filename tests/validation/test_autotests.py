@@ -2,7 +2,9 @@
 
 import pytest
 
+from bench.validation.autotests.island_tables import MILE, line_configs
 from bench.validation.autotests_part import AUTOTESTS
+from plant.tables import read_feeder
 from tests.validation.limits_kept import assert_limits_kept
 
 STEPS = {"gfm-gfl": "2000", "secondary-start": "610"}
@@ -14,3 +16,15 @@ def test_the_plant_runs_gridlabds_autotests_as_gridlabd_does(case: str) -> None:
     result = assert_limits_kept(AUTOTESTS, case)
 
     assert result.facts["steps"] == STEPS[case]
+
+
+def test_the_impedances_from_conductors_and_distances_are_the_published_ones() -> None:
+    """Configurations 1 and 3 to 8 of IEEE 123 have the four digits that are published; the autotest changes others."""
+    published = {config.name: config for config in read_feeder("standard123").line_configs}
+
+    for row in line_configs():
+        if row["config"] in "1345678":
+            config = published[row["config"]]
+            i, j = (config.phases.index(row[end]) for end in ("phase_1", "phase_2"))
+            Z = complex(float(row["R_ohm_per_km"]), float(row["X_ohm_per_km"]))
+            assert pytest.approx(config.Z[i][j] * MILE, abs=1e-4) == Z * MILE

@@ -66,7 +66,7 @@ INVERTERS = {
 def island_tables() -> Tables:
     """Return the tables with the load at 251 switched off; a machine stands in for the substation of `source`."""
     tables = {path.stem: _read(path) for path in sorted(TABLES.glob("*.csv")) if path.stem != "published_voltages"}
-    tables["line_configs"] = _line_configs()
+    tables["line_configs"] = line_configs()
     for line in tables["lines"]:
         if {line["from_bus"], line["to_bus"]} == {"51", "151"}:
             line["length_m"] = repr(700 * 0.3048)
@@ -97,6 +97,19 @@ def island_tables() -> Tables:
         for name, (kind, bus, kW) in INVERTERS.items()
     ]
     return tables
+
+
+def line_configs() -> list[Row]:
+    """Return the autotest's impedances as a table."""
+    rows = []
+    for name, (phases, Z) in _impedances().items():
+        for i, first in enumerate(phases):
+            for j, second in enumerate(phases[i:], i):
+                per_km = complex(Z[i, j]) / MILE
+                numbers = {"R_ohm_per_km": per_km.real, "X_ohm_per_km": per_km.imag, "B_uS_per_km": 0.0}
+                ends = {"config": name, "phase_1": first, "phase_2": second}
+                rows.append(ends | {key: repr(number) for key, number in numbers.items()})
+    return rows
 
 
 def write_tables(tables: Tables, folder: Path) -> None:
@@ -136,18 +149,6 @@ def _loads(rows: list[Row]) -> list[Row]:
         power = {key: repr(S.real if key.startswith("P_") else S.imag) for key in powers}
         loads.append(rows[0] | {"bus": bus, "connection": "Y", "model": "P"} | power)
     return loads
-
-
-def _line_configs() -> list[Row]:
-    rows = []
-    for name, (phases, Z) in _impedances().items():
-        for i, first in enumerate(phases):
-            for j, second in enumerate(phases[i:], i):
-                per_km = complex(Z[i, j]) / MILE
-                numbers = {"R_ohm_per_km": per_km.real, "X_ohm_per_km": per_km.imag, "B_uS_per_km": 0.0}
-                ends = {"config": name, "phase_1": first, "phase_2": second}
-                rows.append(ends | {key: repr(number) for key, number in numbers.items()})
-    return rows
 
 
 def _impedances() -> dict[str, tuple[str, Impedance]]:
