@@ -53,6 +53,13 @@ def federate(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
             one.kill()
 
 
+def left_behind() -> list[str]:
+    """Commands of federates of ours that this process has started and that still run."""
+    pids = [pid for file in Path("/proc/self/task").glob("*/children") for pid in file.read_text().split()]
+    commands = [Path(f"/proc/{pid}/cmdline").read_text().replace("\0", " ") for pid in pids]
+    return [command for command in commands if "federate_process" in command]
+
+
 def test_plant_and_agents_that_meet_over_helics_give_the_bytes_of_one_run(tmp_path: Path) -> None:
     """Doubles travel unchanged, and set-points are in force from the tick of their measurement on."""
     broker = free_broker()
@@ -114,6 +121,7 @@ def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(what: str, s
 
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+    assert not left_behind()
 
 
 def test_one_of_two_plants_that_leaves_ends_the_run_too() -> None:
