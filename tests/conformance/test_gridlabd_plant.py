@@ -11,6 +11,7 @@ from msgspec.structs import replace
 import gridpeers as gp
 from gridpeers.runs.result import Result
 from papers.singhal2022.tolerances import TABLE
+from plant.build import start_plant
 from plant.feeder import Plant
 from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
@@ -59,7 +60,7 @@ def test_full_coordination_restores_frequency_and_sharing_on_gridlabd(case_IV: R
     """After both events abs(f - 60 Hz) and MPSI are Table I's 0.00, within the tolerances by which ours are judged."""
     for window in ("event1", "event2"):
         for quantity in ("f_error_Hz", "MPSI"):
-            limit = TABLE["I", quantity].value  # type: ignore[index]
+            limit = TABLE["I", quantity].value
             assert 0.0 <= case_IV.metrics.loc[window, quantity] <= limit, (window, quantity)
 
 
@@ -87,6 +88,33 @@ def test_switches_of_one_event_follow_each_other_step_by_step(three_islands: gp.
 def test_both_drivers_give_the_same_bytes_on_gridlabd(three_islands: gp.Scenario) -> None:
     """GridLAB-D starts alike in every process, and takes its steps when the agents have decided."""
     assert three_islands.run("IV").sha256 == three_islands.run("IV", "processes").sha256
+
+
+def test_set_points_beyond_an_inverters_bounds_are_limited_on_gridlabd(three_islands: gp.Scenario) -> None:
+    """GridLAB-D bounds neither P_set of a GFM nor V_set; the plant does, as ours, and ignores what is no number."""
+    config, _ = configs(three_islands.spec, three_islands.feeder, "IV")
+    plant = start_plant(config)
+    try:
+        before = plant.measure()["inv3"]
+        plant.hold("inv1", 10e6, 5e3)
+        plant.hold("inv2", 1e6, 2.4e3)
+        plant.hold("inv3", float("nan"), 2.4e3)
+        plant.advance()
+        held = plant.measure()
+        texts = [event.text for event in plant.take_events()]
+    finally:
+        plant.close()
+
+    V_nom = three_islands.feeder.inverters[0].V_nom
+    assert (held["inv1"].P_set, held["inv1"].V_set) == pytest.approx((3 * 600e3, 1.2 * V_nom))
+    assert (held["inv2"].P_set, held["inv2"].V_set) == pytest.approx((350e3, 2.4e3))
+    assert (held["inv3"].P_set, held["inv3"].V_set) == (before.P_set, before.V_set)
+    assert [text.partition(",")[0] for text in texts] == [
+        "inv1 gets P_set 10000 kW",
+        "inv1 gets V_set 5000 V",
+        "inv2 gets P_set 1000 kW",
+        "inv3 gets set-points that are not finite numbers; it keeps the present ones",
+    ]
 
 
 def largest_difference(scenario: gp.Scenario, ran: Result, later: dict[str, float] | None = None) -> float:
