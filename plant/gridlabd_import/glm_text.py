@@ -7,7 +7,7 @@ from pathlib import Path
 
 INCLUDE = re.compile(r'^\s*#include\s+["<]([^">]+)[">]', re.IGNORECASE)
 
-RUNNING = re.compile(r"^\s*(#(?:system|exec|start|wget|option)|script\s+\w+|link\s+\S)", re.IGNORECASE)
+RUNNING = re.compile(r"^\s*(?:#(?:system|exec|start|wget|option)|script\s+\w+)|^link(?=\s)", re.IGNORECASE)
 """Commands that run a program, load one, or fetch a file."""
 
 NAMED = re.compile(r'(?:^|[{;\s])name\s+"?([^";]+?)"?\s*;')
@@ -52,7 +52,7 @@ class GlmText:
             bare = line.partition("//")[0] if '"' not in line else line
             where = f"{path.name}:{number}"
             if command := RUNNING.match(bare):
-                self.problems.append(f"{where}: {command[1]} would run or load a program; take this line out")
+                self.problems.append(f"{where}: {command[0].strip()} would run or load a program; take this line out")
             for name in NAMED.findall(bare):
                 self._places.setdefault(name.strip(), where)
             if included := INCLUDE.match(bare):
