@@ -141,7 +141,8 @@ class GridFormingIsland:
     def _start(self, V: NDArray[np.complex128]) -> Dynamics:
         """Return our plant at rest at these terminal phasors (V)."""
         V_b = V_LL / sqrt(3.0)
-        parameters = GfmParameters(R_f=Z_GFM.real, X_f=Z_GFM.imag)
+        # the limit is estimated at the last step's voltages, where so small an impedance shows more current than flows
+        parameters = GfmParameters(R_f=Z_GFM.real, X_f=Z_GFM.imag, I_max=100.0)
         unit = Inverter(name="gfm", kind="GFM", S_b=S_RATED, V_b=V_b, m_p=0.01, m_q=M_Q, parameters=parameters)
         dynamics = Dynamics(self._circuit(self._islanded), (unit,), 0.002)
         dynamics.start(np.zeros(1), np.zeros(1), swing_voltage=V / V_b)

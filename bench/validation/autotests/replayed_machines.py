@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
-from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.kernel.current_limit import solve_within_limits
 from plant.dynamics.live_network import TOLERANCE
 
 
@@ -57,7 +57,7 @@ class ReplayedMachines(Dynamics):
         turn_frames(arrays, net, np.zeros(n), rotation)
         scale, work = float(units.V_b.max()), np.empty(12 * n + 6 * m)
         I_b = np.empty(m, complex)
-        if solve_network(net, units.J, rotation, network.x, I_b, units.V, TOLERANCE * scale, work) < 0:
+        if solve_within_limits(net, arrays, rotation, network.x, I_b, TOLERANCE * scale, work) < 0:
             raise RuntimeError("the network has no solution with the replayed machines")
         out = np.zeros((n, READING))
         advance_inverters(arrays, self.h, second, out)
