@@ -81,6 +81,8 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     model: Literal["voltage_source", "current_source"] = "voltage_source"
     """Representation towards the network (sections 4.6, 4.7)."""
+    mode: Literal["positive_sequence", "balanced_power"] = "positive_sequence"
+    """What its phases share: one PLL and equal currents, or, with a PLL each, equal powers (section 4)."""
     R_f: Resistance = 0.01
     """Filter resistance (pu)."""
     X_f: Reactance = 0.15

@@ -83,7 +83,11 @@ class _PowerFlow:
             V_1 = aligned_sum(V)[:, None] / 3.0
             V_1 = np.where(V_1 == 0.0, 1.0, V_1)
             own = np.sum(V * np.conj(y * V), axis=1, keepdims=True)
-            updated = np.where(keep, J, np.conj((S + own) / (3.0 * V_1)) * PHASES)
+            updated = np.conj((S + own) / (3.0 * V_1)) * PHASES
+            if units.balanced.any():
+                equal = np.conj(S / (3.0 * np.where(V == 0.0, 1.0, V)))
+                updated = np.where(units.balanced[:, None], equal, updated)
+            updated = np.where(keep, J, updated)
             change = float(np.max(np.abs(updated - J) / scale[:, None], initial=0.0))
             J = updated
             if iteration == 3:

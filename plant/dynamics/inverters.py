@@ -63,6 +63,8 @@ class Inverters:
         The same for `plant.dynamics.kernel.gfl`.
     S_b, V_b, m_p, m_q : float64[n]
         Ratings (VA), nominal voltages (V) and droops (pu per pu).
+    balanced : bool[n]
+        Whether each is a GFL of balanced power.
     S_max : float64[n]
         Apparent-power limits (pu); infinite for a GFM.
     y_f : complex128[n]
@@ -98,6 +100,8 @@ class Inverters:
         self.V_b = np.array([unit.V_b for unit in units])
         self.m_p = np.array([unit.m_p for unit in units])
         self.m_q = np.array([unit.m_q for unit in units])
+        self.balanced = np.zeros(n, bool)
+        self.balanced[self.gfl_at] = self.gfl["balanced_power"]
         self.S_max = np.full(n, np.inf)
         self.S_max[self.gfl_at] = self.gfl["S_max"]
         self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])

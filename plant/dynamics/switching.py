@@ -111,7 +111,8 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
             units.gfm_state["w"][units.gfm_at == i] = w
         else:  # its PLL has locked to the island's frequency before the contactor closes
             follower = units.gfl_at == i
-            units.gfl_state["w_i"][follower] = w
+            for name in ("w_i", "w_i_B", "w_i_C"):
+                units.gfl_state[name][follower] = w
             units.gfl_state["f"][follower] = units.gfl_state["f_m"][follower] = units.f_nom + w / (2.0 * np.pi)
     return trips
 

@@ -111,7 +111,7 @@ class GridlabdInverter:
 
     def __init__(self, core: GridlabdCore, name: str, bus: str, kind: str) -> None:
         forming = kind == "GFM"
-        self._f = core.doubles(name, "freq" if forming else "f_PLL_A")
+        self._f = [core.doubles(name, key) for key in (("freq",) if forming else ("f_PLL_A", "f_PLL_B", "f_PLL_C"))]
         self._S = core.doubles(name, "VA_Out", 2)
         self._V = [core.doubles(bus, f"voltage_{phase}", 2) for phase in "ABC"]
         self._P_set, self._V_set = core.doubles(name, "Pset" if forming else "Pref"), core.doubles(name, "Vset")
@@ -120,7 +120,8 @@ class GridlabdInverter:
         """Give its reading."""
         V = [abs(complex(*phase)) for phase in self._V]
         set_points = self._P_set[0], self._V_set[0]
-        return self._f[0], self._S[0], self._S[1], sum(V) / 3.0, *set_points, min(V), max(V)
+        f = sum(each[0] for each in self._f) / len(self._f)
+        return f, self._S[0], self._S[1], sum(V) / 3.0, *set_points, min(V), max(V)
 
 
 class Simulation:

@@ -75,7 +75,7 @@ def _gfl(row: TableRow, gfl: GflParameters) -> dict[str, str | float]:
     voltage_source = gfl.model == "voltage_source"
     return {
         "control_mode": "GRID_FOLLOWING" if voltage_source else "GFL_CURRENT_SOURCE",
-        "grid_following_mode": "POSITIVE_SEQUENCE",
+        "grid_following_mode": gfl.mode.upper(),
         "rated_power": float(row["P_rated_kW"]) * 1e3 * base,
         "Rp": float(row["m_p_pu"]) * base,
         "Rq": float(row["m_q_pu"]) * base,

@@ -83,6 +83,12 @@ RUNS = {
             TimedSetPoints(6.0, ("inv5",), -1.3, 1.0),
         ),
     ),
+    "balanced-power": ComparedRun(
+        "as islanding-I, GFL of balanced power: a PLL and a reference for each phase",
+        "islanding",
+        "I",
+        gfl=GflParameters(mode="balanced_power"),
+    ),
     "available-power": ComparedRun(
         "available power below the reference, in closed loop", "wind-up", "clamp", closed_loop=True
     ),

@@ -1,7 +1,8 @@
 """Grid-following inverter: PLL, freq-watt, volt-var, current control (`inverter-models.md` section 4).
 
-Positive-sequence form: one PLL on the positive-sequence voltage, one current reference, three phase
-currents driven to it. Per unit of the inverter's own rating; dq in the PLL's frame.
+In the mode "positive_sequence" there are one PLL on the positive-sequence voltage, one current reference, and three
+phase currents driven to it; in the mode "balanced_power" each phase has a PLL and a reference of its own, so that the
+powers are equal. Per unit of the inverter's own rating; dq in the frame of the phase's PLL.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ PARAMETERS = np.dtype(
         ("y_f", "c16"),  # S, of one phase, in the network; 0 for a current source
         ("y_e", "c16"),  # S, filter admittance also in the current-source form (unused there)
         ("current_source", "b1"),
+        ("balanced_power", "b1"),
         ("frequency_watt", "b1"),
         ("volt_var", "b1"),
         ("R_p", "f8"),  # pu frequency per pu
@@ -57,6 +59,10 @@ STATE = np.dtype(
     [
         ("w_i", "f8"),  # PLL integrator, rad/s
         ("theta", "f8"),  # PLL angle, rad
+        ("w_i_B", "f8"),  # the same of phases B and C, in the mode "balanced_power"
+        ("theta_B", "f8"),
+        ("w_i_C", "f8"),
+        ("theta_C", "f8"),
         ("f_m", "f8"),  # filtered PLL frequency, Hz
         ("P_f", "f8"),  # lagged P reference, pu
         ("V_m", "f8"),  # filtered mean voltage, pu
@@ -67,7 +73,7 @@ STATE = np.dtype(
         ("cq_B", "f8"),
         ("cd_C", "f8"),
         ("cq_C", "f8"),
-        ("f", "f8"),  # PLL frequency, Hz (output)
+        ("f", "f8"),  # PLL frequency, mean of the PLLs, Hz (output)
     ],
     align=True,
 )
@@ -107,10 +113,11 @@ def pack(
     record["S_b"], record["V_b"], record["I_b"] = S_b, V_b, S_b / (3.0 * V_b)
     record["f_nom"], record["w_nom"] = f_nom, 2.0 * np.pi * f_nom
     record["current_source"] = par.model == "current_source"
+    record["balanced_power"] = par.mode == "balanced_power"
     record["y_e"] = y
     record["y_f"] = 0.0 if par.model == "current_source" or method == "second-order" else y
     record["R_p"], record["R_q"] = m_p, m_q
-    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[12:]):  # type: ignore[index]  # as in gfm
+    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[13:]):  # type: ignore[index]  # as in gfm
         record[name] = getattr(par, name)
     return record
 
@@ -138,6 +145,10 @@ def settle(
     """
     theta = float(np.angle(V @ np.array([1.0, A120, A120**2])))
     turn = np.exp(-1j * theta) * np.array([1.0, A120, A120.conjugate()])
+    if g["balanced_power"]:
+        turn = np.exp(-1j * np.angle(V))
+        theta, state["theta_B"], state["theta_C"] = (float(angle) for angle in np.angle(V))
+        state["w_i_B"] = state["w_i_C"] = 0.0
     i_dq, u_dq = I * turn / g["I_b"], V * turn / g["V_b"]
     c = i_dq
     if not g["current_source"]:
@@ -170,6 +181,29 @@ def var_reference(g: Any, V_set: float, Q_set: float, V_m: float, P_d: float) ->
         Q_d += (V_set - V_m) / g.R_q
     Q_lim = np.sqrt(max(g.S_max**2 - P_d**2, 0.0))
     return sat(Q_d, -Q_lim, Q_lim)
+
+
+@compiled
+def current_reference(g: Any, P: float, Q: float, u_d: float) -> complex:
+    """Current reference i_d + j i_q, equations (5)(6) (pu); below 1e-3 pu there is no voltage to follow."""
+    u_d = max(u_d, 1e-3)
+    return complex(sat(P / u_d, -g.i_max, g.i_max), sat(-Q / u_d, -g.i_max, g.i_max))
+
+
+@compiled
+def lock_others(
+    g: Any, x0: Any, x: Any, d: Any, u_q_B: float, u_q_C: float, h: float, second: bool
+) -> tuple[float, float]:
+    """Advance the PLLs of phases B and C; return their speeds (rad/s, relative to nominal)."""
+    dw_B, dw_C = g.k_iPLL * u_q_B, g.k_iPLL * u_q_C
+    x.w_i_B = heun(x0.w_i_B, d.w_i_B, dw_B, h, second)
+    x.w_i_C = heun(x0.w_i_C, d.w_i_C, dw_C, h, second)
+    w_B, w_C = x.w_i_B + g.k_pPLL * u_q_B, x.w_i_C + g.k_pPLL * u_q_C
+    x.theta_B = heun(x0.theta_B, d.theta_B, w_B, h, second)
+    x.theta_C = heun(x0.theta_C, d.theta_C, w_C, h, second)
+    if not second:
+        d.w_i_B, d.theta_B, d.w_i_C, d.theta_C = dw_B, w_B, dw_C, w_C
+    return w_B, w_C
 
 
 @compiled
@@ -229,6 +263,8 @@ def advance_gfl(
     # 1: measure in the frame the pass starts with
     to_dq = np.exp(-1j * x.theta)
     to_dq_B, to_dq_C = to_dq * A120, to_dq * A120.conjugate()
+    if g.balanced_power:
+        to_dq_B, to_dq_C = np.exp(-1j * x.theta_B), np.exp(-1j * x.theta_C)
     u_A, u_B, u_C = V_A * to_dq / g.V_b, V_B * to_dq_B / g.V_b, V_C * to_dq_C / g.V_b
     u = (u_A + u_B + u_C) / 3.0  # the positive sequence in the frame of phase A
     i_A = (J_A - g.y_f * V_A) * to_dq / g.I_b
@@ -237,11 +273,15 @@ def advance_gfl(
     v = (abs(V_A) + abs(V_B) + abs(V_C)) / (3.0 * g.V_b)
 
     # 2: PLL
-    dw = g.k_iPLL * u.imag
+    u_q = u_A.imag if g.balanced_power else u.imag
+    dw = g.k_iPLL * u_q
     x.w_i = heun(x0.w_i, d.w_i, dw, h, second)
-    w = x.w_i + g.k_pPLL * u.imag
+    w = x.w_i + g.k_pPLL * u_q
     x.theta = heun(x0.theta, d.theta, w, h, second)
     x.f = (g.w_nom + w) / (2.0 * np.pi)
+    if g.balanced_power:
+        w_B, w_C = lock_others(g, x0, x, d, u_B.imag, u_C.imag, h, second)
+        x.f = (g.w_nom + (w + w_B + w_C) / 3.0) / (2.0 * np.pi)
 
     # 3 to 6: frequency filter, freq-watt, voltage filter, volt-var, each lag fed by this pass' value
     df = (x.f - x.f_m) / g.T_ff
@@ -257,19 +297,22 @@ def advance_gfl(
     x.Q_f = heun(x0.Q_f, d.Q_f, dQ, h, second)
     Q_c = x.Q_f if g.volt_var else Q_d
 
-    # 7: current references, equations (5)(6); below 1e-3 pu there is no voltage to follow
-    u_d = max(u.real, 1e-3)
-    i_ref = complex(sat(P_c / u_d, -g.i_max, g.i_max), sat(-Q_c / u_d, -g.i_max, g.i_max))
+    # 7: current references
+    if g.balanced_power:
+        ref_A = current_reference(g, P_c, Q_c, u_A.real)
+        ref_B, ref_C = current_reference(g, P_c, Q_c, u_B.real), current_reference(g, P_c, Q_c, u_C.real)
+    else:
+        ref_A = ref_B = ref_C = current_reference(g, P_c, Q_c, u.real)
 
     # 8: current controllers
     c_A, out_A, s_A = current_pass(
-        g, complex(x0.cd_A, x0.cq_A), complex(x.cd_A, x.cq_A), complex(d.cd_A, d.cq_A), i_ref, i_A, u_A, h, second
+        g, complex(x0.cd_A, x0.cq_A), complex(x.cd_A, x.cq_A), complex(d.cd_A, d.cq_A), ref_A, i_A, u_A, h, second
     )
     c_B, out_B, s_B = current_pass(
-        g, complex(x0.cd_B, x0.cq_B), complex(x.cd_B, x.cq_B), complex(d.cd_B, d.cq_B), i_ref, i_B, u_B, h, second
+        g, complex(x0.cd_B, x0.cq_B), complex(x.cd_B, x.cq_B), complex(d.cd_B, d.cq_B), ref_B, i_B, u_B, h, second
     )
     c_C, out_C, s_C = current_pass(
-        g, complex(x0.cd_C, x0.cq_C), complex(x.cd_C, x.cq_C), complex(d.cd_C, d.cq_C), i_ref, i_C, u_C, h, second
+        g, complex(x0.cd_C, x0.cq_C), complex(x.cd_C, x.cq_C), complex(d.cd_C, d.cq_C), ref_C, i_C, u_C, h, second
     )
     x.cd_A, x.cq_A, x.cd_B, x.cq_B, x.cd_C, x.cq_C = c_A.real, c_A.imag, c_B.real, c_B.imag, c_C.real, c_C.imag
 
@@ -278,5 +321,8 @@ def advance_gfl(
         d.cd_A, d.cq_A, d.cd_B, d.cq_B, d.cd_C, d.cq_C = s_A.real, s_A.imag, s_B.real, s_B.imag, s_C.real, s_C.imag
 
     # 9: back with the new angle
-    turn = np.exp(1j * x.theta) * (g.I_b if g.current_source else g.V_b * g.y_e)
+    scale = g.I_b if g.current_source else g.V_b * g.y_e
+    turn = np.exp(1j * x.theta) * scale
+    if g.balanced_power:
+        return out_A * turn, out_B * np.exp(1j * x.theta_B) * scale, out_C * np.exp(1j * x.theta_C) * scale
     return out_A * turn, out_B * turn * A120.conjugate(), out_C * turn * A120
