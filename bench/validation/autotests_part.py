@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bench.validation.autotests import gfm_gfl_case, secondary_case
+from bench.validation.autotests import gfm_gfl_case
 from bench.validation.autotests.gfm_gfl_gridlabd import READ, record_gfm_gfl
-from bench.validation.autotests.secondary_gridlabd import FREQUENCY, POWER, record_secondary
-from bench.validation.autotests.secondary_plant import SecondaryPlant
+from bench.validation.autotests.secondary import secondary_case
+from bench.validation.autotests.secondary.secondary_gridlabd import FREQUENCY, POWER, record_secondary
+from bench.validation.autotests.secondary.secondary_plant import SecondaryPlant
 from bench.validation.validation_part import CaseResult, Measured, ValidationPart
 
 LIMIT_S, LIMIT_F, LIMIT_OFFSET = 0.01, 1e-8, 1e-8
@@ -37,7 +38,7 @@ powers of the machines follow from our voltages.
 The lines' impedances are computed from conductors and distances, as in GridLAB-D (`line_constants.py`), so both give
 the traces that GridLAB-D publishes with that autotest, made with its default tolerances: ours is within 24 VA of them
 at all 5000 steps. Its files are not part of this project; with its source beside it,
-`python -m bench.validation.autotests.published_traces GRIDLABD/generators/autotest` compares.
+`python -m bench.validation.autotests.secondary.published_traces GRIDLABD/generators/autotest` compares.
 """
 
 CASES = {

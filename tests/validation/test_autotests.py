@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.validation.autotests.island_tables import MILE, line_configs
+from bench.validation.autotests.secondary.island_tables import MILE, line_configs
 from bench.validation.autotests_part import AUTOTESTS
 from plant.tables import read_feeder
 from tests.validation.limits_kept import assert_limits_kept

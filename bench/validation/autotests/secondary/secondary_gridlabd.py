@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import sqrt
 
 from bench.validation.autotests.delta_header import delta_header
-from bench.validation.autotests.island_tables import INVERTERS, island_tables
-from bench.validation.autotests.machines import MACHINES, machine_blocks
 from bench.validation.autotests.recorded_run import COMPLEX, REAL, RecordedRun, record
-from bench.validation.autotests.secondary_case import (
+from bench.validation.autotests.secondary.island_tables import INVERTERS, island_tables
+from bench.validation.autotests.secondary.machines import MACHINES, machine_blocks
+from bench.validation.autotests.secondary.secondary_case import (
     CONTROL_BUS,
     DEVICES,
     GFL,
@@ -19,7 +19,7 @@ from bench.validation.autotests.secondary_case import (
     SWITCH,
     H,
 )
-from bench.validation.autotests.secondary_law import AUTOTEST, SecondarySettings
+from bench.validation.autotests.secondary.secondary_law import AUTOTEST, SecondarySettings
 from plant.gridlabd.glm_inverters import inverter_blocks
 from plant.gridlabd.glm_network import block, network_blocks
 

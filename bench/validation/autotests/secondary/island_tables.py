@@ -11,7 +11,12 @@ from math import pi, sqrt
 from pathlib import Path
 
 import plant
-from bench.validation.autotests.line_constants import Conductor, Impedance, cable_impedance, overhead_impedance
+from bench.validation.autotests.secondary.line_constants import (
+    Conductor,
+    Impedance,
+    cable_impedance,
+    overhead_impedance,
+)
 
 V_NOM = 2401.7
 """Nominal voltage (V, line-to-neutral)."""

@@ -1,6 +1,6 @@
 """Compares our run of the secondary-control autotest with the traces that GridLAB-D's source has for it.
 
-    python -m bench.validation.autotests.published_traces GRIDLABD/generators/autotest
+    python -m bench.validation.autotests.secondary.published_traces GRIDLABD/generators/autotest
 
 The folder is of GridLAB-D's source, branch develop; the traces were made with its default tolerances. Exit 1 if a power
 differs by more than the autotest's own tolerance.
@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.validation.autotests.secondary_case import DEVICES
-from bench.validation.autotests.secondary_gridlabd import record_secondary
-from bench.validation.autotests.secondary_plant import SecondaryPlant
+from bench.validation.autotests.secondary.secondary_case import DEVICES
+from bench.validation.autotests.secondary.secondary_gridlabd import record_secondary
+from bench.validation.autotests.secondary.secondary_plant import SecondaryPlant
 
 TOLERANCE = 100.0
 """Of the autotest (VA)."""

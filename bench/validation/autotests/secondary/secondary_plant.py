@@ -11,13 +11,13 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from bench.validation.autotests.bus_frequency import BusFrequency
 from bench.validation.autotests.delta_header import START
-from bench.validation.autotests.island_tables import INVERTERS, V_NOM, island_tables, write_tables
-from bench.validation.autotests.machines import MACHINES, PHASES
 from bench.validation.autotests.recorded_run import RecordedRun
-from bench.validation.autotests.replayed_machines import ReplayedMachines
-from bench.validation.autotests.secondary_case import (
+from bench.validation.autotests.secondary.bus_frequency import BusFrequency
+from bench.validation.autotests.secondary.island_tables import INVERTERS, V_NOM, island_tables, write_tables
+from bench.validation.autotests.secondary.machines import MACHINES, PHASES
+from bench.validation.autotests.secondary.replayed_machines import ReplayedMachines
+from bench.validation.autotests.secondary.secondary_case import (
     DEVICES,
     GFL,
     GFM,
@@ -27,8 +27,8 @@ from bench.validation.autotests.secondary_case import (
     SWITCH,
     H,
 )
-from bench.validation.autotests.secondary_gridlabd import INJECTION, NODE
-from bench.validation.autotests.secondary_law import Participant, SecondaryControl
+from bench.validation.autotests.secondary.secondary_gridlabd import INJECTION, NODE
+from bench.validation.autotests.secondary.secondary_law import Participant, SecondaryControl
 from plant.dynamics import Inverter
 from plant.equipment import InverterRow
 from plant.feeder.circuits import circuit_of
