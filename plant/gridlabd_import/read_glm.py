@@ -27,6 +27,9 @@ from plant.imported_equipment import LinearElement, LoadPart
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
 
+FAR = 1.3
+"""Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""
+
 BALANCED = 1e-7
 """Largest unbalance (pu) of the substation's voltage that is rounding."""
 
@@ -78,6 +81,7 @@ class _GlmReader:
                 f"write nominal_frequency {f_nom:g}; in its module powerflow, or leave f_nom out"
             )
         self._refuse_classes()
+        self._mend_nominal_voltages()
         elements = GlmElements(model["buses"], switches, problems)
         for branch in model["branches"]:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
@@ -121,6 +125,18 @@ class _GlmReader:
 
     def _called(self, name: str) -> str:
         return f"{self._text.at(name)}{self._classes[name]}.{name}"
+
+    def _mend_nominal_voltages(self) -> None:
+        """Take the voltage that a bus has for its nominal one, where the model states another one by mistake."""
+        for bus in self._model["buses"]:
+            V = [abs(voltage_of(bus, letter)) for letter in letters_of(bus["phases"])]
+            usual = sum(V) / max(len(V), 1)
+            if usual and not 1.0 / FAR < usual / bus["V_nom"] < FAR:
+                self._notes.append(
+                    f"{bus['class']}.{bus['name']}: nominal_voltage {bus['V_nom']:g} V, and {usual:.0f} V in the power "
+                    "flow; the latter is taken"
+                )
+                bus["V_nom"] = usual
 
     def _refuse_classes(self) -> None:
         """Note a problem for each object that cannot be represented."""

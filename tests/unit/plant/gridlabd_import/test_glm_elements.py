@@ -91,3 +91,17 @@ def test_switches_are_switches(tmp_path: Path) -> None:
     assert solved.V[network.index("nf", "B")] == 0.0
     solved = solve_power_flow(network, network.closed0 - {names["back"]} | {names["tie"]})
     assert abs(solved.V[network.index("nf", "B")]) > 7000.0
+
+
+def test_a_nominal_voltage_that_is_wrong_is_told_and_mended(tmp_path: Path) -> None:
+    """A bus whose nominal voltage is stated line-to-line has the voltage that GridLAB-D finds there."""
+    path = write(
+        tmp_path,
+        SWITCHES.replace("name ne; phases ABCN; nominal_voltage 7200", "name ne; phases ABCN; nominal_voltage 12470"),
+    )
+
+    feeder = read_glm(path)
+
+    assert any(note.startswith("load.ne: nominal_voltage 12470 V, and 72") for note in feeder.notes)
+    assert next(bus.V_nom for bus in feeder.buses if bus.name == "ne") == pytest.approx(7250.0, rel=0.01)
+    assert sum(feeder.load_by_bus().values()) == pytest.approx(2.9e5)
