@@ -43,7 +43,7 @@ def feeders() -> tuple[str, ...]:
     Examples
     --------
     >>> feeders()
-    ('microgrid123', 'standard123')
+    ('ieee34', 'microgrid123', 'standard123')
     """
     return tuple(sorted(path.name for path in DATA.iterdir() if path.is_dir() and path.name != "__pycache__"))
 

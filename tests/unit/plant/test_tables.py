@@ -276,10 +276,12 @@ def test_feeder_without_load_sets_is_told(folder: Path) -> None:
 
 def test_unknown_feeder_is_told_with_the_choice() -> None:
     """An unknown feeder is told with those that come with the package."""
-    with pytest.raises(FeederError, match="no such feeder and no such folder; there are microgrid123, standard123"):
+    with pytest.raises(
+        FeederError, match="no such feeder and no such folder; there are ieee34, microgrid123, standard123"
+    ):
         read_feeder("microgrid321")
 
-    assert feeders() == ("microgrid123", "standard123")
+    assert feeders() == ("ieee34", "microgrid123", "standard123")
 
 
 def test_feeder_fed_by_inverters_only_needs_no_source(folder: Path) -> None:
