@@ -1,0 +1,1 @@
+"""How the plant's error depends on its step, against a solution of the same equations by scipy."""
