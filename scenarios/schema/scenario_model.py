@@ -54,8 +54,8 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ] = 0.002
     """Integration step of the plant (s); divides T_c_s."""
     method: Method = "first-order"
-    """Method of time stepping of the plant: "first-order", GridLAB-D's own; or "second-order", which at 2 ms is more
-    accurate than the other at 0.125 ms and takes twice its time a step."""
+    """Method of time stepping of the plant: "first-order", GridLAB-D's own; or "second-order", at 2 ms ten
+    times as accurate as the other at 0.25 ms (with GFL as voltage sources), at 2.5 times its time a step."""
     record_s: Annotated[
         float,
         Unit("s"),

@@ -53,8 +53,9 @@ def gfl_pass(par: GflParameters) -> Any:
         (gfm.STATE, gfm_pass),
         (gfl.STATE, gfl_pass(WATT_VAR)),
         (gfl.STATE, gfl_pass(replace(WATT_VAR, model="current_source"))),
+        (gfl.STATE, gfl_pass(replace(WATT_VAR, mode="balanced_power"))),
     ],
-    ids=["GFM", "GFL", "GFL current source"],
+    ids=["GFM", "GFL", "GFL current source", "GFL of balanced power"],
 )
 def test_a_pass_of_length_0_gives_the_slopes_and_moves_no_state(state: np.dtype[Any], advance: Any) -> None:
     """Both methods integrate the same right-hand side: the limit of a short pass's slopes is that of the empty one."""
