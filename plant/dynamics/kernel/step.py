@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
-from plant.dynamics.kernel.current_limit import solve_within_limits
+from plant.dynamics.kernel.current_limit import limit_currents, solve_on
+from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.kernel.sparse import extrapolate, note_increment
 
 FAILURES = 3
@@ -64,7 +65,14 @@ def run_steps(
         turn_frames(units, net, theta, rotation)
         x_0[:] = x
         extrapolate(net.sparse, x)
-        iterations = solve_within_limits(net, units, rotation, x, I_b, tolerance, work)
+        units.limiting[:] = False
+        limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+        iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance, work)
+        if iterations >= 0:
+            surplus = limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
+            if surplus > tolerance:
+                more = solve_on(net, units, rotation, x, I_b, tolerance, work)
+                iterations = iterations + more if more >= 0 else -1
         if iterations < 0:
             x[:] = x_0
             return -1 - (FAILURES * step + solution % 2)
