@@ -16,7 +16,7 @@ Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")
 """Order of the phases in every table and vector."""
 
-NODES = "ABC456789DEFGHIJKLMNOPQRSTUVWXYZ"
+NODES = "ABC456789DEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 """Letters of a bus's nodes 1, 2, 3, ... in a feeder from another program: the phases, then neutrals and the like."""
 
 

@@ -61,7 +61,7 @@ ONE_LINE = {
         "New Load.d bus1=c kv=0.48 kw=10000 vminpu=0.01 vlowpu=0.005",
         "Master.dss: the engine's power flow does not converge",
     ),
-    "more nodes than letters": ("New Line.l phases=1 bus1=c.1 bus2=d.40", "bus d: nodes above 32 are not supported"),
+    "more nodes than letters": ("New Line.l phases=1 bus1=c.1 bus2=d.60", "bus d: nodes above 58 are not supported"),
     "loads that grow by the year": ("New Load.l bus1=c kv=0.48 kw=9\nSet year=3", "set year=3"),
     "a script that includes itself": ("Redirect Master.dss", "Master.dss:11: includes itself"),
     "an element defined twice": (
