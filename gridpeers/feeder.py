@@ -228,3 +228,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         write_feeder(self, Path(folder))
         return Path(folder)
+
+
+READERS = {".dss": Feeder.from_opendss, ".glm": Feeder.from_glm}
+"""Readers of feeders that were written for another program, by the end of the file's name."""

@@ -51,6 +51,7 @@ def import_(
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
+    from plant.tables import feeders
     from scenarios.results.run_files import refusal, shown
 
     feeder = read_script(str(file), switch or [], leave_out or [])
@@ -66,6 +67,8 @@ def import_(
         typer.echo(f"NOTE  {note}")
     if len(feeder.notes) > SHOWN:
         typer.echo(f"NOTE  and {len(feeder.notes) - SHOWN} more")
+    if str(folder) in feeders():
+        typer.echo(f'NOTE  in a scenario write "./{folder}": "{folder}" is the feeder that comes with gridpeers')
     typer.echo(f"Tables: {shown(folder)}")
 
 
@@ -161,11 +164,10 @@ app.command()(glm)
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     """Read a feeder that was written for another program, or end with every problem in it."""
-    from gridpeers.feeder import Feeder
+    from gridpeers.feeder import READERS
     from plant.tables import FeederError
 
-    readers = {".dss": Feeder.from_opendss, ".glm": Feeder.from_glm}
-    read = readers.get(Path(name).suffix.lower())
+    read = READERS.get(Path(name).suffix.lower())
     if read is None:
         fail(
             [f"{name}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"], BAD_INPUT
@@ -178,10 +180,10 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
 
 def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
     """Read a feeder of tables or a script, or end with every problem in it."""
-    from gridpeers.feeder import Feeder
+    from gridpeers.feeder import READERS, Feeder
     from plant.tables import FeederError
 
-    if Path(name).suffix.lower() in (".dss", ".glm"):
+    if Path(name).suffix.lower() in READERS:
         return read_script(name, switch or [], leave_out or [])
     if switch or leave_out:
         fail(["--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited"], BAD_INPUT)

@@ -34,12 +34,13 @@ def glm(
 
     Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
     """
+    from gridpeers.feeder import READERS
     from plant.dynamics import PlantError
     from plant.gridlabd.export_glm import export_glm
     from plant.tables import FeederError
     from scenarios.results.run_files import refusal, shown
 
-    if feeder.lower().endswith((".dss", ".glm")):
+    if Path(feeder).suffix.lower() in READERS:
         fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
     if case is not None and scenario is None:
         fail(["--case: is a case of a scenario; name it with --scenario"], BAD_INPUT)

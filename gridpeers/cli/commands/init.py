@@ -24,7 +24,7 @@ name = "islanding"
 title = "Islanding of {feeder} at {switch}"
 
 [plant]
-feeder = "{folder}"
+feeder = "./{folder}"
 P_set0_pu = {P_set0}  # the substation gives the rest
 
 [time]

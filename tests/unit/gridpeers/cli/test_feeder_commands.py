@@ -31,6 +31,14 @@ def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path, feeder: str) -
     assert float(line.split()[-2]) < 2.0
 
 
+def test_tables_named_as_a_feeder_of_ours_need_their_path(elsewhere: Path) -> None:
+    """A script of the name of a feeder that comes with gridpeers is imported, with a note on how to name its tables."""
+    script = str(FEEDERS / "ieee34.dss")
+
+    assert 'NOTE  in a scenario write "./ieee34"' in invoke("feeder", "import", script)[1]
+    assert "NOTE  in a scenario" not in invoke("feeder", "import", script, "--out", "mine")[1]
+
+
 def test_an_imported_feeder_is_checked_solved_and_drawn(elsewhere: Path) -> None:
     """The tables that `import` writes are read again, and give the voltages of the script."""
     for words in (
