@@ -22,7 +22,7 @@ def start_plant(config: PlantConfig) -> LivePlant:
         If it cannot start; the message says why, and what to do.
     """
     if config.settings.simulator == "helics":
-        from plant.helics.helics_plant import HelicsPlant  # only who uses it needs the wheel
+        from plant.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
 
         return HelicsPlant(config, _feeder(config))
     if config.bridged:

@@ -50,11 +50,17 @@ class PlantLike(Protocol):
         ...
 
     def advance(self) -> None:
-        """Advance one control period; de-energise an island without solution, which is an event and ends nothing."""
+        """Advance one control period; de-energise an island without solution, which is an event and ends nothing.
+
+        Raise RuntimeError if the plant cannot go on: the run breaks, and reports the message.
+        """
         ...
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Take out the rows recorded since the last call."""
+        """Take out the rows recorded since the last call, every `PlantConfig.record_step` from t = 0 on.
+
+        Each is t (s), then for each inverter f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V): history.csv.
+        """
         ...
 
     def take_events(self) -> tuple[PlantEvent, ...]:

@@ -1,4 +1,4 @@
-"""Whether a checked scenario has an operating point to start from: the last thing that `gridpeers check` finds out."""
+"""The operating point of a checked scenario at t = 0: the last check of `gridpeers check`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenarios.schema.configs import configs
 
 
 def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
-    """Why the plant has no operating point at t = 0, or cannot have its switches as an event wants them; "" if it has.
+    """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can.
 
     All cases start from the same one, GridLAB-D too. Another simulator finds its own.
     """

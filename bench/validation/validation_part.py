@@ -1,4 +1,4 @@
-"""What a part of the cross-validation is: cases, each a row of its table, and one figure."""
+"""A part of the cross-validation: cases, each a row of its table, and one figure."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Measured(NamedTuple):
     value: float
     """Mostly the largest difference between ours and the rival; nan if there is none, which fails."""
     limit: float
-    """What it must not exceed."""
+    """The largest value that passes."""
     at_least: bool = False
-    """Whether the limit is the least value instead."""
+    """Whether the limit is the smallest value that passes instead."""
 
     @property
     def passed(self) -> bool:
@@ -43,7 +43,7 @@ class CaseResult(NamedTuple):
     facts: Mapping[str, str] = {}
     """Further columns: how many states, where the largest difference is. Nothing that changes from run to run."""
     curves: Mapping[str, NDArray] = {}  # type: ignore[type-arg]
-    """What the part's figure draws of it."""
+    """Arrays for the part's figure, by name."""
 
     def broken(self) -> list[str]:
         """Return a sentence for each limit that is not kept."""

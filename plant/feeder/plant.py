@@ -227,10 +227,7 @@ class Plant:
     # ---------------------------------------------------------------- for the recorder
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows recorded since the last call.
-
-        Each is t (s), then for each inverter f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V).
-        """
+        """Return the rows recorded since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 

@@ -114,7 +114,7 @@ class HelicsPlant:
         self.tick += 1
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows since the last call, laid out as those of `Plant.take_rows`."""
+        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 

@@ -1,4 +1,4 @@
-"""How a run takes part in a HELICS federation: table `[plant.helics]` of a scenario."""
+"""Settings of a run's HELICS federate: table `[plant.helics]` of a scenario."""
 
 from __future__ import annotations
 

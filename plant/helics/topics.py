@@ -27,13 +27,13 @@ class Topic(NamedTuple):
 
 
 SENSORS = (("f", "Hz"), ("P", "W"), ("Q", "var"), ("V", "V"))
-"""What a plant publishes of every inverter, in the order of a recorded row."""
+"""Measurements that a plant publishes of every inverter, in the order of a recorded row."""
 
 HELD = (("P_set_held", "W"), ("V_set_held", "V"))
 """Set-points that an inverter follows, after its bounds; in the order of a recorded row, behind the sensors."""
 
 SET_POINTS = (("P_set", "W"), ("V_set", "V"))
-"""What a controller publishes for every inverter."""
+"""Set-points that a controller publishes for every inverter."""
 
 
 def sensors(prefix: str, inverter: str) -> list[Topic]:

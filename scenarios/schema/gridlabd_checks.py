@@ -1,4 +1,4 @@
-"""What GridLAB-D as the plant cannot do: each is refused by name, before anything starts."""
+"""Refuse what a scenario asks of GridLAB-D as the plant beyond its abilities, by name, before anything starts."""
 
 from __future__ import annotations
 

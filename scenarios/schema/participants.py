@@ -72,7 +72,7 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note what another simulator has not, joins, leaves and our methods, and what is wrong with its settings."""
+    """Note joins, leaves and methods of time stepping that other simulators lack, and wrong settings of HELICS."""
     simulator = scenario.plant.simulator
     if scenario.time.method != "first-order" and simulator != "gridpeers":
         problems.add(
