@@ -14,7 +14,7 @@ from bench.validation.autotests.gfm_gfl_gridlabd import READ, record_gfm_gfl
 from bench.validation.autotests.secondary import secondary_case
 from bench.validation.autotests.secondary.secondary_gridlabd import FREQUENCY, POWER, record_secondary
 from bench.validation.autotests.secondary.secondary_plant import SecondaryPlant
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 
 LIMIT_S, LIMIT_F, LIMIT_OFFSET = 0.01, 1e-8, 1e-8
 """Largest difference of a power (VA), a frequency (Hz) and a set-point of the controller (pu)."""
@@ -71,7 +71,7 @@ def _gfm_gfl(case: str) -> CaseResult:
         for own, keys in ((S, READ[:2]), (f, READ[2:]))
     )
     names = tuple(gfm_gfl_case.TERMINALS)
-    return CaseResult(case, _measured(S_gap, f_gap), _facts(names, S_gap), _curves(gfm_gfl_case.H, names, S, S_gap))
+    return CaseResult(case, _checks(S_gap, f_gap), _facts(names, S_gap), _curves(gfm_gfl_case.H, names, S, S_gap))
 
 
 def _secondary(case: str) -> CaseResult:
@@ -80,19 +80,19 @@ def _secondary(case: str) -> CaseResult:
     names = secondary_case.DEVICES
     S_gap = np.abs(ours.S - np.array([theirs[name, POWER[name]][1:] for name in names]).T)
     frequencies = [theirs[name, FREQUENCY[name]][1:] for name in secondary_case.START_POWER]
-    measured = theirs[f"n{secondary_case.CONTROL_BUS}", "measured_frequency"][1:]
+    measured_frequency = theirs[f"n{secondary_case.CONTROL_BUS}", "measured_frequency"][1:]
     f = np.column_stack([ours.f, ours.f_bus])
-    f_gap = np.abs(f - np.array([*frequencies, measured]).T)
+    f_gap = np.abs(f - np.array([*frequencies, measured_frequency]).T)
     offset_gap = np.abs(
         ours.offset - np.array([theirs[name, "pdispatch_offset"][1:] for name in secondary_case.SHARES]).T
     )
-    controller = Measured("set-points of the controller, pu", float(offset_gap.max()), LIMIT_OFFSET)
+    controller = ToleranceCheck("set-points of the controller, pu", float(offset_gap.max()), LIMIT_OFFSET)
     curves = _curves(secondary_case.H, names, ours.S, S_gap)
-    return CaseResult(case, (*_measured(S_gap, f_gap), controller), _facts(names, S_gap), curves)
+    return CaseResult(case, (*_checks(S_gap, f_gap), controller), _facts(names, S_gap), curves)
 
 
-def _measured(S_gap: NDArray[np.float64], f_gap: NDArray[np.float64]) -> tuple[Measured, Measured]:
-    return Measured("S, VA", float(S_gap.max()), LIMIT_S), Measured("f, Hz", float(f_gap.max()), LIMIT_F)
+def _checks(S_gap: NDArray[np.float64], f_gap: NDArray[np.float64]) -> tuple[ToleranceCheck, ToleranceCheck]:
+    return ToleranceCheck("S, VA", float(S_gap.max()), LIMIT_S), ToleranceCheck("f, Hz", float(f_gap.max()), LIMIT_F)
 
 
 def _facts(names: Sequence[str], S_gap: NDArray[np.float64]) -> dict[str, str]:

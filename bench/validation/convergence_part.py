@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench.validation.convergence.step_errors import QUANTITIES, STEPS, StepErrors, step_errors
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart, rounded_up
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, rounded_up
 from plant.plant_config import Method
 
 END, SHORT = 0.9, 0.3
@@ -31,10 +31,10 @@ LIMIT_REST = 2e-5
 
 TEXT = f"""
 The scenario islanding with T_c = 20 ms on the complete 123-node feeder, its events at 0.1 and 0.5 s, at six steps h, in
-both methods of time stepping ([plant.md](plant.md#method-of-time-stepping)). The rival is scipy: `solve_ivp` (DOP853,
-relative tolerance 1e-7) integrates the inverters' equations, which `bench/validation/convergence` writes again from
-[inverter-models.md](inverter-models.md), and Newton's method solves the network to 1e-12 in every evaluation. Errors
-are the largest over all inverters and all rows, 4 ms apart, from 0 to {END:g} s; the tests end at {SHORT:g} s.
+both methods of time stepping ([plant.md](plant.md#method-of-time-stepping)). The reference is scipy: `solve_ivp`
+(DOP853, relative tolerance 1e-7) integrates the inverters' equations, which `bench/validation/convergence` writes again
+from [inverter-models.md](inverter-models.md), and Newton's method solves the network to 1e-12 in every evaluation.
+Errors are the largest over all inverters and all rows, 4 ms apart, from 0 to {END:g} s; the tests end at {SHORT:g} s.
 
 - Both methods converge to the integrated equations. The default, GridLAB-D's, is of first order: feed-forward acts a
   pass late, a GFM's integrators take the slopes of the pass's end, and P, Q, V are those of the predictor. Its error
@@ -59,18 +59,18 @@ def _run(name: str, end: float = END) -> CaseResult:
     errors = step_errors(case, method, end)
     coarse, fine = ORDER_AT[method]
     order = np.log(errors.always[coarse] / errors.always[fine]) / np.log(STEPS[coarse] / STEPS[fine])
-    measured = [Measured("order", float(order.min()), LEAST_ORDER[method], at_least=True)]
+    checks = [ToleranceCheck("order", float(order.min()), LEAST_ORDER[method], at_least=True)]
     if method == "second-order":
         default = step_errors(case, "first-order", end).always[AT_QUARTER]
         ratio = float((errors.always[AT_2_MS] / default).max())
-        measured.append(Measured("error at 2 ms, of the default's at 0.25 ms", ratio, LIMIT_RATIO))
-        measured.append(Measured("error at 0.125 ms, Hz or pu", float(errors.always[SMALLEST].max()), LIMIT_REST))
+        checks.append(ToleranceCheck("error at 2 ms, of the default's at 0.25 ms", ratio, LIMIT_RATIO))
+        checks.append(ToleranceCheck("error at 0.125 ms, Hz or pu", float(errors.always[SMALLEST].max()), LIMIT_REST))
     facts = {
         f"{which} at {STEPS[k] * 1e3:g} ms: f (Hz), P, Q, V (pu)": ", ".join(map(rounded_up, row[k]))
         for which, row in (("error", errors.always), ("after 20 ms,", errors.afterwards))
         for k in (AT_2_MS, AT_QUARTER)
     }
-    return CaseResult(name, tuple(measured), facts, _curves(errors))
+    return CaseResult(name, tuple(checks), facts, _curves(errors))
 
 
 def _curves(errors: StepErrors) -> dict[str, NDArray[np.float64]]:

@@ -28,7 +28,7 @@ from bench.validation.opendss.grid_forming_island import (
     island_script,
 )
 from bench.validation.opendss.opendss_engines import ENGINES, SolvedStates, solve_scripts
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.phasors import aligned_sum
 from plant.equipment import Feeder
@@ -69,8 +69,8 @@ CASES = {
     "regulated": "the same, our GFM settled under its own control",
 }
 
-RIVAL_STATE = {name: number for number, name in enumerate(CASES)}
-"""Which of `STATES` a case is compared with."""
+ENGINE_STATE = {name: number for number, name in enumerate(CASES)}
+"""Number in `STATES` of the state that a case is compared with."""
 
 
 class GridFormingIsland:
@@ -91,7 +91,7 @@ class GridFormingIsland:
         island = next(buses for buses in self.network.islands(self._islanded) if BUS in buses)
         self.nodes = [i for i, (bus, _) in enumerate(self.network.nodes) if bus in island]
 
-    def rival(self, state: int) -> NDArray[np.complex128]:
+    def engine_voltages(self, state: int) -> NDArray[np.complex128]:
         """Return the engine's phasors (V) at `nodes`."""
         found = self._theirs.state(state)
         names = [self.network.nodes[i] for i in self.nodes]
@@ -118,7 +118,7 @@ class GridFormingIsland:
 
     def dynamics(self, case: str) -> tuple[NDArray[np.complex128], float]:
         """Return our phasors (V) and frequency (Hz) in a case of the dynamics."""
-        dynamics = self._start(self.terminal(self.rival(RIVAL_STATE["settled"])))
+        dynamics = self._start(self.terminal(self.engine_voltages(ENGINE_STATE["settled"])))
         f = float(dynamics.run(500)[-1, 0, 0])
         if case == "settled":
             return self._phasors(dynamics, self._islanded), f
@@ -126,7 +126,7 @@ class GridFormingIsland:
         dynamics.connect(self._circuit(shed))
         if case == "shed":
             return self._phasors(dynamics, shed), f
-        aim = self.rival(RIVAL_STATE[case])
+        aim = self.engine_voltages(ENGINE_STATE[case])
         V_b = V_LL / sqrt(3.0)
         v, q = float(np.abs(self.terminal(aim)).mean()) / V_b, self.power(aim).imag / S_RATED
         dynamics.inverters.hold(0, float(dynamics.inverters.set_points[0, 0]), v + M_Q * q)
@@ -155,16 +155,16 @@ class GridFormingIsland:
 
 def _run(case: str) -> CaseResult:
     feeder = read_feeder("microgrid123", "main")
-    measured, curves, facts = [], {}, {}
+    checks, curves, facts = [], {}, {}
     for engine in ENGINES:
         island = GridFormingIsland(feeder, _solved(engine))
         V, f = (island.snapshot(), 60.0) if case == "snapshot" else island.dynamics(case)
-        theirs = island.rival(RIVAL_STATE[case])
+        theirs = island.engine_voltages(ENGINE_STATE[case])
         gap = np.abs(V - theirs) / island.network.V_nom[island.nodes]
         S, S_theirs = island.power(V), island.power(theirs)
-        measured += [
-            Measured(f"V, pu, {engine}", float(gap.max()), LIMIT),
-            Measured(f"S, pu, {engine}", abs(S - S_theirs) / S_RATED, LIMIT),
+        checks += [
+            ToleranceCheck(f"V, pu, {engine}", float(gap.max()), LIMIT),
+            ToleranceCheck(f"S, pu, {engine}", abs(S - S_theirs) / S_RATED, LIMIT),
         ]
         live = np.abs(V) > 0.0  # the zone that is shed has no voltage, here or there
         curves[engine] = gap[live]
@@ -174,7 +174,7 @@ def _run(case: str) -> CaseResult:
             "P + jQ": f"{S.real / 1e3:.1f} kW + {S.imag / 1e3:.1f} kvar",
             "f, ours": f"{f:.4f} Hz",
         }
-    return CaseResult(case, tuple(measured), facts, curves)
+    return CaseResult(case, tuple(checks), facts, curves)
 
 
 @cache

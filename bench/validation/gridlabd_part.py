@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bench.validation.gridlabd.both_plants import QUANTITIES, compare
 from bench.validation.gridlabd.compared_runs import RUNS, SHORT
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 
 PHYSICAL = ("f", "P", "Q", "V")
 
@@ -56,18 +56,18 @@ tests go through all cases but `reclosing-70`, `wind-up` and `ideal`, in a fifth
 def _run(case: str, factor: float = 1.0) -> CaseResult:
     run = RUNS[case]
     compared = compare(run, factor)
-    measured = [
-        Measured(f"{quantity}, {unit}", float(compared.differences[quantity].max()), run.tolerance)
+    checks = [
+        ToleranceCheck(f"{quantity}, {unit}", float(compared.differences[quantity].max()), run.tolerance)
         for quantity, unit in QUANTITIES.items()
     ]
     facts = {"closed at": ""}
     if run.reclosing and compared.angles:
         off = max(abs(angle - run.reclosing.angle) for angle in compared.angles)
-        measured.append(Measured("angle, deg", off, ANGLE_LIMIT))
+        checks.append(ToleranceCheck("angle, deg", off, ANGLE_LIMIT))
         facts["closed at"] = f"-{compared.angles[0]:.2f} deg, GridLAB-D -{compared.angles[1]:.2f} deg"
     curves: dict[str, NDArray[np.float64]] = {"t": compared.t}
     curves |= {quantity: compared.differences[quantity].max(axis=1) for quantity in PHYSICAL}
-    return CaseResult(case, tuple(measured), facts, curves)
+    return CaseResult(case, tuple(checks), facts, curves)
 
 
 def _draw(results: Sequence[CaseResult]) -> Figure:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bench.validation.opendss.opendss_engines import ENGINES, solve_scripts
 from bench.validation.opendss.switch_states import SwitchStates
 from bench.validation.opendss.write_opendss import write_opendss
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from plant.equipment import Feeder
 from plant.network import Network, solve_power_flow
 from plant.opendss import read_opendss
@@ -82,8 +82,8 @@ def _switch_states(feeder: Feeder, script: Path) -> CaseResult:
 
 
 def _result(case: str, differences: Mapping[str, NDArray[np.float64]], facts: Mapping[str, str]) -> CaseResult:
-    measured = (Measured(f"V, pu, {engine}", float(gap.max()), LIMIT) for engine, gap in differences.items())
-    return CaseResult(case, tuple(measured), facts, differences)
+    checks = (ToleranceCheck(f"V, pu, {engine}", float(gap.max()), LIMIT) for engine, gap in differences.items())
+    return CaseResult(case, tuple(checks), facts, differences)
 
 
 def _node_names(network: Network) -> list[str]:

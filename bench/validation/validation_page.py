@@ -64,7 +64,7 @@ def _section(part: ValidationPart, results: Sequence[CaseResult]) -> str:
         (
             part.title,
             part.text.strip("\n"),
-            f"Compared with {part.rivals()}.",
+            f"Compared with {part.references()}.",
             _table(part, results),
             f"![{part.title}]({FIGURES}/{part.name}.png)",
         )
@@ -72,12 +72,12 @@ def _section(part: ValidationPart, results: Sequence[CaseResult]) -> str:
 
 
 def _table(part: ValidationPart, results: Sequence[CaseResult]) -> str:
-    quantities = list(dict.fromkeys(each.quantity for result in results for each in result.measured))
+    quantities = list(dict.fromkeys(each.quantity for result in results for each in result.checks))
     facts = list(dict.fromkeys(fact for result in results for fact in result.facts))
     rows = [["case", *quantities, "limit", *facts]]
     for result in results:
-        values = {each.quantity: each.text() for each in result.measured}
-        limits = list(dict.fromkeys(f"{'>= ' if each.at_least else ''}{each.limit:g}" for each in result.measured))
+        values = {each.quantity: each.text() for each in result.checks}
+        limits = list(dict.fromkeys(f"{'>= ' if each.at_least else ''}{each.limit:g}" for each in result.checks))
         rows.append(
             [
                 f"`{result.case}`: {part.cases[result.case]}",

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 
-class Measured(NamedTuple):
-    """A number of a case beside the limit that it must keep."""
+class ToleranceCheck(NamedTuple):
+    """A number of a case and the limit that it must keep."""
 
     quantity: str
     """Head of its column, with the unit: "V, pu"."""
     value: float
-    """Mostly the largest difference between ours and the rival; nan if there is none, which fails."""
+    """Mostly the largest difference between our plant and the reference; nan if there is none, which fails."""
     limit: float
     """The largest value that passes."""
     at_least: bool = False
@@ -39,7 +39,7 @@ class CaseResult(NamedTuple):
     """A case that was run: a row of its part's table."""
 
     case: str
-    measured: tuple[Measured, ...]
+    checks: tuple[ToleranceCheck, ...]
     facts: Mapping[str, str] = {}
     """Further columns: how many states, where the largest difference is. Nothing that changes from run to run."""
     curves: Mapping[str, NDArray] = {}  # type: ignore[type-arg]
@@ -49,7 +49,7 @@ class CaseResult(NamedTuple):
         """Return a sentence for each limit that is not kept."""
         return [
             f"{self.case}: {each.quantity}: {each.value:.3g} is {'below' if each.at_least else 'beyond'} {each.limit:g}"
-            for each in self.measured
+            for each in self.checks
             if not each.passed
         ]
 
@@ -64,7 +64,7 @@ class ValidationPart(NamedTuple):
     text: str
     """Markdown: what is compared with what, with which tolerance and why."""
     needs: tuple[str, ...]
-    """Distributions of the rivals: "gridlabd"."""
+    """Distributions of the reference programs: "gridlabd"."""
     cases: Mapping[str, str]
     """Each case's name, and what it is in a few words."""
     run: Callable[[str], CaseResult]
@@ -81,8 +81,8 @@ class ValidationPart(NamedTuple):
             return ""
         return f"{self.name} needs {', '.join(absent)}: pip install 'gridpeers[validation]'"
 
-    def rivals(self) -> str:
-        """Return the rivals with their versions: "gridlabd 6.0.0"."""
+    def references(self) -> str:
+        """Return the reference programs with their versions: "gridlabd 6.0.0"."""
         return ", ".join(f"{name} {_version(name)}" for name in self.needs)
 
 

@@ -47,7 +47,7 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
 
 
 def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
-    """One inverter: what is said of it alone is taken as it stands, the rest is the table's times the factors."""
+    """Return an inverter with its changes: its own values replace the table's, factors multiply the others."""
     own = changes.inverters.get(row.name)
     return replace(
         row,

@@ -16,7 +16,7 @@ _SHOWN = 6
 
 
 class SupplyState(NamedTuple):
-    """Who feeds what from some time on."""
+    """Supply of the feeder from an event on: de-energised nodes, islands, and inverters on the network."""
 
     event: Event | None
     """The event from which on it is so; None at t = 0."""
@@ -31,7 +31,7 @@ class SupplyState(NamedTuple):
 
 
 def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note as a problem what a run would begin with and nothing feeds: load, and inverters without a leader."""
+    """Note a problem if at t = 0 nothing feeds a load, or an inverter has no leader."""
     start = next(supply_states(scenario, feeder))
     if what := _what(start.dead, start.inverters, feeder):
         problems.add(
@@ -68,7 +68,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
 
 
 def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplyState]:
-    """Who feeds what at t = 0 and after each event."""
+    """Yield the supply of the feeder at t = 0 and after each event."""
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()
     names = {name: switch.name for switch in feeder.switches for name in switch.names}

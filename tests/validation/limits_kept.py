@@ -8,10 +8,10 @@ from bench.validation.validation_part import CaseResult, ValidationPart
 
 
 def assert_limits_kept(part: ValidationPart, case: str) -> CaseResult:
-    """Run a case and fail with every limit that it breaks; skip where a rival is not installed."""
+    """Run a case and fail with every limit that it breaks; skip where a reference is not installed."""
     if missing := part.missing():
         pytest.skip(missing)
     result = (part.run_short or part.run)(case)
     assert result.broken() == []
-    assert result.measured
+    assert result.checks
     return result

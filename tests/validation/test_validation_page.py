@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from bench.validation.__main__ import main
-from bench.validation.validation_part import CaseResult, Measured, ValidationPart, rounded_up
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, rounded_up
 
 
 def part(name: str, value: float, needs: tuple[str, ...] = ("numpy",)) -> ValidationPart:
@@ -17,7 +17,7 @@ def part(name: str, value: float, needs: tuple[str, ...] = ("numpy",)) -> Valida
         "Text.",
         needs,
         {"one": "a case"},
-        lambda case: CaseResult(case, (Measured("V, pu", value, 1.0),)),
+        lambda case: CaseResult(case, (ToleranceCheck("V, pu", value, 1.0),)),
         lambda results: Figure(),
     )
 
@@ -47,12 +47,12 @@ def test_a_part_that_is_not_run_keeps_its_section(tmp_path: Path) -> None:
     assert (tmp_path / "images/validation/a.png").exists()
 
 
-def test_a_missing_rival_is_one_line_that_says_what_to_install(
+def test_a_missing_reference_is_one_line_that_says_what_to_install(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Without the wheel the command ends with 2, names it, and writes nothing."""
-    assert main([], [part("a", 0.0, ("no-such-rival",))], tmp_path) == 2
-    assert capsys.readouterr().err == "a needs no-such-rival: pip install 'gridpeers[validation]'\n"
+    assert main([], [part("a", 0.0, ("no-such-reference",))], tmp_path) == 2
+    assert capsys.readouterr().err == "a needs no-such-reference: pip install 'gridpeers[validation]'\n"
     assert not list(tmp_path.iterdir())
 
 

@@ -1,1 +1,1 @@
-"""GridLAB-D as a rival: runs that both plants go through step by step."""
+"""GridLAB-D as the reference: runs that both plants go through step by step."""

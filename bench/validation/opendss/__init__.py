@@ -1,1 +1,1 @@
-"""OpenDSS as a rival: its two engines, a feeder of our tables as its script."""
+"""OpenDSS as the reference: its two engines, a feeder of our tables as its script."""

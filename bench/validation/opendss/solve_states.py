@@ -61,21 +61,21 @@ def engine(name: str) -> Engine:
 
 def main(name: str, jobs: Path, out: Path) -> None:
     """Solve every state of every job."""
-    rival = engine(name)
+    circuit = engine(name)
     arrays: dict[str, Any] = {}
     for number, (script, states) in enumerate(json.loads(jobs.read_text(encoding="utf-8"))):
         for command in (f'compile "{script}"', *SETTLE):
-            rival.command(command)
+            circuit.command(command)
         rows, order = [], None
         for commands in states:
             for command in (*commands, COARSE, "solve"):
-                rival.command(command)
-            sound = rival.converged()
+                circuit.command(command)
+            sound = circuit.converged()
             for command in (FINE, "solve"):
-                rival.command(command)
-            names = [each.lower() for each in rival.names()]
+                circuit.command(command)
+            names = [each.lower() for each in circuit.names()]
             order = order or names
-            found = dict(zip(names, np.asarray(rival.voltages(), float).reshape(-1, 2) @ (1.0, 1j), strict=True))
+            found = dict(zip(names, np.asarray(circuit.voltages(), float).reshape(-1, 2) @ (1.0, 1j), strict=True))
             rows.append([found[each] if sound else complex("nan") for each in order])
         arrays |= {f"names{number}": np.array(order), f"V{number}": np.array(rows)}
     np.savez(out, **arrays)
