@@ -202,14 +202,14 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """Name of the load set: "main" is from loads_main.csv."""
     buses: tuple[Bus, ...]
     """Buses; their order is that of the nodes in every vector."""
-    lines: tuple[Line, ...]
-    line_configs: tuple[LineConfig, ...]
-    switches: tuple[Switch, ...]
-    loads: tuple[Load, ...]
-    capacitors: tuple[Capacitor, ...]
-    regulators: tuple[Regulator, ...]
-    transformers: tuple[Transformer, ...]
-    inverters: tuple[InverterRow, ...]
+    lines: tuple[Line, ...] = ()
+    line_configs: tuple[LineConfig, ...] = ()
+    switches: tuple[Switch, ...] = ()
+    loads: tuple[Load, ...] = ()
+    capacitors: tuple[Capacitor, ...] = ()
+    regulators: tuple[Regulator, ...] = ()
+    transformers: tuple[Transformer, ...] = ()
+    inverters: tuple[InverterRow, ...] = ()
     source: Source | None
     """The substation, or None in a feeder with inverters alone."""
     f_nom: float = F_NOM

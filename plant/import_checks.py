@@ -1,4 +1,4 @@
-"""Checks that feeders from another program share: elements left out by name, nodes whose voltage nothing determines."""
+"""Checks that all imports of feeders share: elements left out by name, nodes whose voltage nothing determines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from plant.network import Network
 from plant.tables.read import FeederError
 
 BEYOND = 100.0
-"""Voltage without load (pu) that only a singular matrix gives."""
+"""Voltage (pu) that only a singular matrix gives."""
 
 SHOWN = 5
 """How many buses of a floating section a problem names."""
@@ -43,11 +43,32 @@ def left_out_by(names: Sequence[str], patterns: Sequence[str], problems: list[st
     return left_out
 
 
-def report_unconnected(feeder: Feeder, problems: list[str], called: Callable[[str], str] = number_of) -> None:
-    """Add a problem for each node that loads alone lead to, and each section without the source, switches closed.
+def refuse_unsolvable(
+    path: Path, feeder: Feeder, problems: list[str], remedy: str, name_node: Callable[[str], str] = number_of
+) -> None:
+    """Raise a FeederError if an import has problems, or if its feeder has nodes without a determined voltage.
 
-    Nodes are named as `called` makes of their letters.
+    Parameters
+    ----------
+    path
+        The imported file.
+    feeder
+        Its feeder, with a source.
+    problems
+        Problems of the import so far.
+    remedy
+        What to do where nothing determines a voltage to ground.
+    name_node
+        Name of a node in the imported program, from its letter.
     """
+    _report_unconnected(feeder, problems, name_node)
+    refuse_if(path, problems)
+    _report_undetermined(feeder, problems, remedy)
+    refuse_if(path, problems)
+
+
+def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable[[str], str]) -> None:
+    """Add a problem for each node that loads alone lead to, and each section without the source, switches closed."""
     assert feeder.source is not None
     held = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
     held |= {(feeder.source.bus, letter) for letter in PHASES}
@@ -57,7 +78,7 @@ def report_unconnected(feeder: Feeder, problems: list[str], called: Callable[[st
             if letter and (part.bus, letter) not in held:
                 alone.setdefault((part.name, part.bus), set()).add(letter)
     for (name, bus), letters in alone.items():
-        which = ", ".join(map(called, sorted(letters, key=NODES.index)))
+        which = ", ".join(map(name_node, sorted(letters, key=NODES.index)))
         problems.append(
             f"{name}: node {which} of bus {bus} is connected to nothing but loads: a "
             "phase that does not come there, or an open neutral; connect or ground it"
@@ -72,14 +93,14 @@ def report_unconnected(feeder: Feeder, problems: list[str], called: Callable[[st
         nodes = [node for node in graph.nodes if node in section & held]
         buses = list(dict.fromkeys(bus for bus, _ in nodes))
         more = f" and {len(buses) - SHOWN} more" if len(buses) > SHOWN else ""
-        first = ", ".join(f"{bus}.{called(letter)}" for bus, letter in nodes if bus == buses[0])
+        first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
         problems.append(
             f"bus{'es' if len(buses) > 1 else ''} {', '.join(buses[:SHOWN])}{more} (first {first}): no path to the "
             "source, even with all switches closed; connect or leave out what is there"
         )
 
 
-def report_undetermined(feeder: Feeder, problems: list[str], remedy: str) -> None:
+def _report_undetermined(feeder: Feeder, problems: list[str], remedy: str) -> None:
     """Add a problem for each bus whose voltage to ground nothing determines: without load it is beyond all bounds."""
     try:
         network = Network(feeder)

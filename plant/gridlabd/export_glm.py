@@ -8,15 +8,14 @@ from pathlib import Path
 
 from plant.equipment import Feeder, Regulator
 from plant.feeder import Plant
+from plant.gridlabd.glm import START, read_table, write_glm
+from plant.gridlabd.glm_network import TableRow, network_blocks
+from plant.gridlabd.impedance import with_impedances
+from plant.gridlabd.unrepresentable import unrepresentable
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError
 from plant.tables.write import TAP_STEP, write_feeder
-
-from .glm import START, read_table, write_glm
-from .glm_network import TableRow, network_blocks
-from .impedance import with_impedances
-from .unrepresentable import unrepresentable
 
 POWER_FLOW_HEADER = f"""clock {{
 	timezone UTC0;

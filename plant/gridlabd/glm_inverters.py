@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import pi
 
+from plant.gridlabd.glm_network import F_NOM, TableRow, block
 from plant.inverter_parameters import GflParameters, GfmParameters
 from plant.own_parameters import InverterParameters
-
-from .glm_network import F_NOM, TableRow, block
 
 
 def inverter_blocks(

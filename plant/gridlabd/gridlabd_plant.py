@@ -1,4 +1,4 @@
-"""GridLAB-D as a plant: what `plant.feeder.Plant` does, done by GridLAB-D's own network and inverters."""
+"""GridLAB-D as a plant: the interface of `plant.feeder.Plant` on GridLAB-D's own network and inverters."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from plant.feeder import Plant
 from plant.feeder.plant import Reading
 from plant.feeder.protection import Relays
 from plant.feeder.set_points import SetPointLimits
+from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
+from plant.gridlabd.glm import write_glm
+from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
 from plant.inverter_parameters import GflParameters
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of
-
-from .delta_mode_process import DeltaModeProcess, GridlabdError
-from .glm import write_glm
-from .gridlabd_schedule import GridlabdSchedule, Write
 
 FEEDERS = Path(__file__).parents[1] / "data"
 
@@ -89,7 +88,7 @@ class GridlabdPlant:
         self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
         self._events = self._schedule.start()
         self._writes: list[Write] = []
-        """What GridLAB-D is given before its next step."""
+        """Values for GridLAB-D's next step."""
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
         model = write_glm(
             FEEDERS / settings.feeder,
@@ -176,7 +175,7 @@ class GridlabdPlant:
             raise GridlabdError(f"{name} leaves, and GridLAB-D's delta mode cannot disconnect an inverter")
 
     def advance(self) -> None:
-        """Go to the next tick; what is scheduled happens on the way.
+        """Advance to the next tick, with the scheduled switches and limits on the way.
 
         Raises
         ------
@@ -204,7 +203,7 @@ class GridlabdPlant:
     # ---------------------------------------------------------------- for the recorder
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows since the last call, laid out as those of `Plant.take_rows`."""
+        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
@@ -233,7 +232,7 @@ class GridlabdPlant:
     # ---------------------------------------------------------------- steps
 
     def _run(self, steps: int) -> NDArray[np.float64]:
-        """Give GridLAB-D what it is to take, and return its readings after each step: steps x inverters x values."""
+        """Write the pending values, advance, and return the readings after each step: steps x inverters x values."""
         writes, self._writes = self._writes, []
         readings = np.array(self.process.ask(write=writes, advance=steps)["steps"])
         if not np.isfinite(readings).all():

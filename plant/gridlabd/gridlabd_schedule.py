@@ -1,4 +1,4 @@
-"""What a scenario does to GridLAB-D's feeder: switches and available power by step, as writes and as events. Pure."""
+"""Scheduled switches and available power of a GridLAB-D run, by step: as writes and as events. Pure."""
 
 from __future__ import annotations
 

@@ -9,12 +9,11 @@ from msgspec.structs import replace
 
 from plant.equipment import Feeder
 from plant.feeder import Plant
+from plant.gridlabd.export_glm import write_tables
+from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
 from plant.plant_config import FeederChanges, PlantConfig
-
-from .export_glm import write_tables
-from .gridlabd_plant import GridlabdPlant
-from .impedance import with_impedances
 
 
 def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:

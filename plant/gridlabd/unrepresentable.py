@@ -1,4 +1,4 @@
-"""What of a feeder our GridLAB-D model cannot represent; without numpy, as the checks of a scenario ask for it."""
+"""Equipment of a feeder that our GridLAB-D model cannot represent; without numpy, for the checks of a scenario."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from plant.equipment import Feeder
-
-from .glm_network import F_NOM
+from plant.gridlabd.glm_network import F_NOM
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""

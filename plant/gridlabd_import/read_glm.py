@@ -20,12 +20,9 @@ from plant.gridlabd_import.glm_loads import BusLoads
 from plant.gridlabd_import.glm_text import GlmText
 from plant.gridlabd_import.gridlabd_power_flow import PV, SWING
 from plant.gridlabd_import.gridlabd_process import solved_model
-from plant.import_checks import left_out_by, refuse_if, report_unconnected, report_undetermined
+from plant.import_checks import BEYOND, left_out_by, refuse_if, refuse_unsolvable
 from plant.import_comparison import MATCH, difference
 from plant.imported_equipment import LinearElement, LoadPart
-
-BEYOND = 100.0
-"""Voltage (pu) that only a singular matrix gives."""
 
 FAR = 1.3
 """Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""
@@ -100,24 +97,14 @@ class _GlmReader:
             name=self._path.stem,
             load_set="main",
             buses=elements.bus_rows(used, places),
-            lines=(),
-            line_configs=(),
             switches=tuple(elements.switches),
-            loads=(),
-            capacitors=(),
-            regulators=(),
-            transformers=(),
-            inverters=(),
             source=source,
             f_nom=model["f_nom"],
             elements=tuple(rows),
             load_parts=tuple(parts),
             notes=tuple(self._notes),
         )
-        report_unconnected(feeder, problems, str)
-        refuse_if(self._path, problems)
-        report_undetermined(feeder, problems, UNGROUNDED)
-        refuse_if(self._path, problems)
+        refuse_unsolvable(self._path, feeder, problems, UNGROUNDED, str)
         if all(self._classes[name] == "player" for name in self._left_out):
             self._compare(feeder)
         refuse_if(self._path, problems)

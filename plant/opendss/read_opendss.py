@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import NODES, Feeder
-from plant.import_checks import SHOWN, left_out_by, number_of, refuse_if, report_unconnected, report_undetermined
+from plant.import_checks import SHOWN, left_out_by, number_of, refuse_if, refuse_unsolvable
 from plant.import_comparison import MATCH, difference, loads_without_ground
 from plant.imported_equipment import LoadPart
 from plant.opendss.dss_elements import DssElements, complex_of, letter_of
@@ -109,24 +109,14 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         name=str(circuit.Name),
         load_set="main",
         buses=elements.buses(load_parts),
-        lines=(),
-        line_configs=(),
         switches=tuple(elements.switches),
-        loads=(),
-        capacitors=(),
-        regulators=(),
-        transformers=(),
-        inverters=(),
         source=elements.source[0],
         f_nom=frequency,
         elements=tuple(elements.rows),
         load_parts=tuple(load_parts),
         notes=tuple(notes),
     )
-    report_unconnected(feeder, problems)
-    refuse_if(path, problems)
-    report_undetermined(feeder, problems, UNGROUNDED)
-    refuse_if(path, problems)
+    refuse_unsolvable(path, feeder, problems, UNGROUNDED)
     if left_out:
         return feeder
     return _compared(path, feeder, circuit)
