@@ -21,7 +21,7 @@ LEGS = {"1": ("A", ""), "2": ("B", ""), "12": ("A", "B")}
 """Ends of the branches of a split-phase service."""
 
 EXPONENT = {"P": 0.0, "I": 1.0, "Y": 2.0}
-"""Power of the voltage with which the power goes, by what is constant: power, current, admittance."""
+"""Exponent of the voltage in the power of each part: constant power, current, admittance."""
 
 EDGE = {"P": 0.0, "I": 1.0, "Y": 0.0}
 
@@ -32,7 +32,7 @@ Without a limit, a dip at the islanding would be a collapse."""
 
 
 class BusLoads:
-    """What the objects at one bus of the solver take.
+    """Power, current and admittance that the objects at one bus of the solver take.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class BusLoads:
     Attributes
     ----------
     of : dict
-        What each takes, by its class and name.
+        Power, current and admittance of each object, by class and name.
     """
 
     def __init__(self, bus: Mapping[str, Any], objects: list[dict[str, Any]]) -> None:
