@@ -79,6 +79,7 @@ class _GlmReader:
             )
         self._refuse_classes()
         self._mend_nominal_voltages()
+        refuse_if(self._path, problems)  # all that follows is per unit
         elements = GlmElements(model["buses"], switches, problems)
         for branch in model["branches"]:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
@@ -118,7 +119,12 @@ class _GlmReader:
         for bus in self._model["buses"]:
             V = [abs(voltage_of(bus, letter)) for letter in letters_of(bus["phases"])]
             usual = sum(V) / max(len(V), 1)
-            if usual and not 1.0 / FAR < usual / bus["V_nom"] < FAR:
+            stated = bus["V_nom"] > 0.0
+            if not stated and not usual > 0.0:
+                self._problems.append(
+                    f"{self._called(bus['name'])}: nominal_voltage must be above 0 V, got {bus['V_nom']:g} V"
+                )
+            elif usual and not (stated and 1.0 / FAR < usual / bus["V_nom"] < FAR):
                 self._notes.append(
                     f"{bus['class']}.{bus['name']}: nominal_voltage {bus['V_nom']:g} V, and {usual:.0f} V in the power "
                     "flow; the latter is taken"

@@ -75,6 +75,10 @@ ONE_LINE = {
         "feeder.glm:11: overhead_line.l3: status OPEN; leave it out",
     ),
     "a line of no length": (HEAD + NODE.replace("NAME", "d") + line("l2", "b", "d", "0"), "zero length"),
+    "no nominal voltage": (
+        HEAD.replace("7200", "nan"),
+        "feeder.glm:8: node.b: nominal_voltage must be above 0 V, got nan V",
+    ),
     "no solution": (HEAD + LOAD.replace("1e4", "1e9"), "convergence iteration limit reached"),
 }
 
