@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,7 +56,7 @@ def import_(
     from scenarios.results.run_files import refusal, shown
 
     feeder = read_script(str(file), switch or [], leave_out or [])
-    folder = out or Path(feeder.name)
+    folder = out or Path(folder_of(feeder.name))
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             fail([f"{folder}: is there already; name a new folder with --out"], BAD_INPUT)
@@ -176,6 +177,17 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
         return read(name, switches=switches, leave_out=leave_out)
     except FeederError as error:
         refuse(error)
+
+
+def folder_of(name: str) -> str:
+    """Return the name of a folder for a feeder, whose name comes from a script and may be any text.
+
+    Examples
+    --------
+    >>> folder_of("ieee13"), folder_of("../up and away")
+    ('ieee13', '_up_and_away')
+    """
+    return re.sub(r"[^\w.-]+", "_", name).lstrip(".-") or "feeder"
 
 
 def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:

@@ -21,7 +21,7 @@ TEMPLATE = Path(__file__).parents[1] / "template"
 SCENARIO = """\
 # A first islanding of {feeder}, proposed by `gridpeers init`: edit it, and {folder}/inverters.csv.
 name = "islanding"
-title = "Islanding of {feeder} at {switch}"
+title = {title}
 
 [plant]
 feeder = "./{folder}"
@@ -33,7 +33,7 @@ end_s = 6.0
 [[event]]
 label = "islanding"
 t_s = 1.0
-open = ["{switch}"]
+open = [{switch}]
 
 [case.none]
 title = "droop alone"
@@ -41,7 +41,7 @@ secondary = "none"
 graph = "none"
 
 [case.{graph}]
-title = "secondary control, {title}"
+title = "secondary control, {agents}"
 secondary = "all"
 graph = "{graph}"
 """
@@ -132,8 +132,11 @@ def _with_proposal(
 
 def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str], count: int | None) -> None:
     """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
+    import json
+
     import msgspec
 
+    from gridpeers.cli.commands.feeder_commands import folder_of
     from scenarios.feeder_proposal import NoProposalError
     from scenarios.operating_point import start_problem
     from scenarios.schema import load_scenario
@@ -142,17 +145,19 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         feeder, proposal = _with_proposal(str(script), switches, leave_out, count)
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
-    msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / feeder.name)
+    name = folder_of(feeder.name)
+    msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / name)
     graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
     problem = ""
     for part in PARTS:
         text = SCENARIO.format(
             feeder=feeder.name,
-            folder=feeder.name,
-            switch=proposal.switch,
+            folder=name,
+            switch=json.dumps(proposal.switch),  # names of scripts may have quotes
             P_set0=round(part * proposal.P_set0, 3),
             graph=graph,
-            title=GRAPHS[graph],
+            agents=GRAPHS[graph],
+            title=json.dumps(f"Islanding of {feeder.name} at {proposal.switch}"),
         )
         (folder / "islanding.toml").write_text(text, encoding="utf-8")
         found = start_problem(*load_scenario(str(folder / "islanding.toml")))
@@ -161,6 +166,8 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         problem = problem or found
     else:
         typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then `gridpeers check islanding.toml`")
+    if count is not None and len(proposal.inverters) < count:
+        typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
         f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "

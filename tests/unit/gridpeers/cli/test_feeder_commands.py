@@ -39,6 +39,19 @@ def test_tables_named_as_a_feeder_of_ours_need_their_path(elsewhere: Path) -> No
     assert "NOTE  in a scenario" not in invoke("feeder", "import", script, "--out", "mine")[1]
 
 
+def test_names_of_a_script_are_no_paths_and_no_toml(elsewhere: Path) -> None:
+    """A circuit called ../x gets a folder within the project, and a quote in a switch's name ends no text."""
+    Path("odd.dss").write_text(
+        'New Circuit.../x basekv=4.16 bus1=src\nNew Line."l,1" bus1=src bus2=a length=0.1 units=km switch=y\n'
+        "New Load.ld bus1=a kv=4.16 kw=100\n"
+    )
+    code, made = invoke("init", "mine", "--feeder", "odd.dss", "--inverters", "2")
+
+    assert code == 0, made
+    assert "NOTE  no bus for more than 1 of the 2 inverters" in made
+    assert sorted(path.name for path in Path("mine").iterdir()) == ["_x", "islanding.toml"]
+
+
 def test_an_imported_feeder_is_checked_solved_and_drawn(elsewhere: Path) -> None:
     """The tables that `import` writes are read again, and give the voltages of the script."""
     for words in (
