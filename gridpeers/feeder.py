@@ -70,7 +70,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from plant.opendss import read_opendss
 
-        return cls._of(read_opendss(path, f_nom, leave_out=leave_out, switches=switches))
+        return cls._of(read_opendss(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
     @classmethod
     def from_glm(
@@ -101,7 +101,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from plant.gridlabd_import.read_glm import read_glm
 
-        return cls._of(read_glm(path, f_nom, leave_out=leave_out, switches=switches))
+        return cls._of(read_glm(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
     @classmethod
     def _of(cls, tables: Tables) -> Feeder:
@@ -142,9 +142,10 @@ class Feeder(Tables, frozen=True, kw_only=True):
         Raises
         ------
         ValueError
-            If the name or the bus is taken, the bus is not there or lacks a phase, or a parameter is wrong.
+            If the name or the bus is taken, the bus is not there or lacks a phase, or a value is wrong.
         """
         from plant.tables.parameter_sets import as_set
+        from plant.tables.shunts import problems_of
         from wire.schema.suggestion import suggestion
 
         found = {one.name: one for one in self.buses}.get(bus)
@@ -152,12 +153,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
             raise ValueError(f'bus "{bus}": no such bus; {suggestion(bus, [one.name for one in self.buses], "buses")}')
         if not set("ABC") <= set(found.phases):
             raise ValueError(f'bus "{bus}" has phases {found.phases}; an inverter needs A, B and C')
-        for row in self.inverters:
+        for row in (*self.inverters, *self.spares):
             if name == row.name or bus == row.bus:
                 raise ValueError(
                     f'inverter "{row.name}" at bus {row.bus} is there already; names and buses must differ'
                 )
-        set_name, sets = as_set(name, kind, params, self.parameter_sets)
         row = InverterRow(
             name=name,
             kind=kind,
@@ -167,8 +167,12 @@ class Feeder(Tables, frozen=True, kw_only=True):
             V_nom=found.V_nom,
             m_p=m_p,
             m_q=m_q,
-            parameters=set_name,
         )
+        load = sum(S.real for load in self.loads for S in load.S if S.real > 0.0)
+        if problems := problems_of(row, found, load):
+            raise ValueError("; ".join(problems))
+        set_name, sets = as_set(name, kind, params, self.parameter_sets)
+        row = msgspec.structs.replace(row, parameters=set_name)
         return msgspec.structs.replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
 
     def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:
@@ -194,7 +198,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         from plant.network import Network, solve_power_flow
 
         network = Network(self)
-        closed = network.closed0 - {network.switch_name(name) for name in open_switches}
+        closed = network.closed0 - {network.switch_name(name) for name in _listed(open_switches)}
         V = solve_power_flow(network, closed).V
         return pd.DataFrame(
             {
@@ -232,3 +236,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
 READERS = {".dss": Feeder.from_opendss, ".glm": Feeder.from_glm}
 """Readers of feeders that were written for another program, by the end of the file's name."""
+
+
+def _listed(names: Sequence[str]) -> Sequence[str]:
+    """Return several names, also where one is given as it is: its letters are never meant."""
+    return [names] if isinstance(names, str) else names

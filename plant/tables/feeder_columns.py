@@ -290,6 +290,9 @@ TABLES: dict[str, type[msgspec.Struct]] = {
 }
 """Tables of a feeder by their files, beside its load sets."""
 
+LOAD_SETS = ("loads_", "load_parts_")
+"""How the files of a load set begin."""
+
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
     """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound.

@@ -98,6 +98,11 @@ def as_set(
     else:
         if isinstance(params, Mapping):
             values = dict(params)
+        elif not isinstance(params, InverterParameters):
+            raise ValueError(
+                f'inverter "{name}": params: must be the name of a set, keys with values such as {{"T_p_s": 0.02}}, '
+                f"GfmParameters or GflParameters, got {params!r}"
+            )
         else:
             values = {field.key: getattr(params, field.name) for field in fields_of(type(params))}
         own, noted = read_table(OwnParameters, values)

@@ -8,7 +8,7 @@ from plant.equipment import Feeder
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.csv_table import required_columns
-from plant.tables.feeder_columns import TABLES, LoadColumns
+from plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
 from plant.tables.imported import read_elements, read_load_parts
 from plant.tables.manifest import read_f_nom
 from plant.tables.parameter_sets import read_parameter_sets
@@ -17,9 +17,6 @@ from wire.schema.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""
-
-LOAD_SETS = ("loads_", "load_parts_")
-"""How the files of a load set begin."""
 
 
 class FeederError(ValueError):

@@ -154,6 +154,19 @@ def read_inverters(
     return tuple(inverters.values())
 
 
+def problems_of(inverter: InverterRow, bus: Bus, load: float) -> list[str]:
+    """Return what the tables would refuse of an inverter at a bus of a feeder with so much load (W)."""
+    problems: list[str] = []
+    numbers = {"P_rated_kW": inverter.P_rated / 1e3, "m_p_pu": inverter.m_p, "m_q_pu": inverter.m_q}
+    cells: dict[str | None, Any] = {key: getattr(inverter, key) for key in ("name", "kind", "bus", "microgrid")}
+    cells.update({key: repr(float(value)) for key, value in numbers.items()})
+    row = CsvRow(InverterColumns, f'inverter "{inverter.name}"', cells, problems)
+    row.require("P_rated_kW", _rating(bus, load / 1e3))
+    if inverter.name:
+        _require_name(row, inverter.name)
+    return problems
+
+
 def _require_set(row: CsvRow[InverterColumns], sets: Mapping[str, OwnParameters]) -> None:
     """Note a problem if an inverter's set of parameters is not there, or has what its kind has not."""
     name, kind = row.columns.parameters, row.columns.kind

@@ -24,7 +24,7 @@ Table = tuple[str, type[msgspec.Struct], list[Row]]
 
 
 def write_feeder(feeder: Feeder, folder: Path) -> None:
-    """Write a feeder's tables into a folder, which is made if need be; what is there is written anew.
+    """Write a feeder's tables into a folder, which is made if need be; they replace those of a feeder that is there.
 
     Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
 
@@ -33,8 +33,12 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
     OSError
         If the folder cannot be written.
     """
+    tables = list(_tables(feeder))
     folder.mkdir(parents=True, exist_ok=True)
-    for file, of_row, rows in _tables(feeder):
+    replaced = {*columns.TABLES, *(f"{kind}{feeder.load_set}.csv" for kind in columns.LOAD_SETS)}
+    for file in replaced - {file for file, *_ in tables}:
+        (folder / file).unlink(missing_ok=True)
+    for file, of_row, rows in tables:
         with (folder / file).open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(of_row.__struct_fields__)

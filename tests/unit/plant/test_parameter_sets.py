@@ -150,6 +150,7 @@ def test_parameters_of_an_added_inverter_are_saved_and_read_again(tmp_path: Path
         ({"T_p_s": 0.2}, "T_p_s: a GFL has no such parameter"),
         (GfmParameters(), "a GFL has no such parameter"),
         ("slow", 'no parameter set "slow"'),
+        (7, "params: must be the name of a set, .* got 7"),
     ],
 )
 def test_wrong_parameters_of_an_added_inverter_are_refused(params: object, said: str) -> None:

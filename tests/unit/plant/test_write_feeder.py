@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -31,3 +33,32 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
     feeder = Feeder.read("microgrid123").add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
 
     assert Feeder.read(feeder.save(tmp_path / "mine")).inverters == feeder.inverters
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"kind": "gfm"}, 'inverter "inv11": kind "gfm": no such kind'),
+        ({"P_rated": -1.0, "m_p": 0.0}, "P_rated_kW: .* above 0.*; .*m_p_pu: .* above 0"),
+        ({"P_rated": 200.0}, "P_rated_kW: 0.2 kW is not plausible"),
+        ({"name": "a/b"}, "cannot be part of a Zenoh key"),
+    ],
+)
+def test_an_inverter_that_the_tables_would_refuse_is_not_added(wrong: dict[str, Any], said: str) -> None:
+    """The mistake is told where it is made, not by a row of a file that is written later."""
+    with pytest.raises(ValueError, match=said):
+        Feeder.read("microgrid123").add_inverter(
+            **{"name": "inv11", "bus": "87", "kind": "GFL", "P_rated": 2e5} | wrong
+        )
+
+
+def test_a_saved_feeder_keeps_no_table_of_the_one_before(tmp_path: Path) -> None:
+    """Capacitors and parameter sets of what a folder had are not those of the feeder that is saved into it."""
+    feeder = Feeder.read("microgrid123").add_inverter("inv11", "87", "GFL", 2e5, params={"T_pf_s": 0.2})
+    folder = feeder.save(tmp_path / "mine")
+    (folder / "README.md").write_text("mine")
+    bare = msgspec.structs.replace(feeder, capacitors=(), inverters=feeder.inverters[:-1], parameter_sets={})
+    again = Feeder.read(bare.save(folder))
+
+    assert (again.capacitors, again.parameter_sets) == ((), {})
+    assert (folder / "README.md").is_file()
