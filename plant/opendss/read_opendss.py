@@ -23,6 +23,7 @@ from plant.opendss.dss_elements import DssElements, complex_of, letter_of
 from plant.opendss.dss_engine import DssEngine
 from plant.opendss.dss_generation import GENERATION, read_generation
 from plant.opendss.dss_loads import read_loads
+from wire.schema.suggestion import suggestion
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""
@@ -99,8 +100,9 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         elif kind not in CONTROLS | WATCHING | {"load"}:
             problems.append(f'{name}: elements of class {kind} are not supported; leave it out (leave_out=["{name}"])')
     load_parts = [*read_loads(engine, left_out, problems), *generated]
-    for name in set(switches) - elements.used_switches:
-        problems.append(f'switches: there is no line "{name}"')
+    lines = [name for name, kind in there if kind == "line"]
+    for name in sorted(set(switches) - elements.used_switches):
+        problems.append(f'switches: there is no line "{name}"; {suggestion(name.lower(), lines, "lines")}')
     if all(kind != "vsource" for _, kind in there):
         problems.append("no Vsource: a circuit has one, its substation")
     if not elements.source:

@@ -19,12 +19,17 @@ feeder = "{name}"
 
 [time]
 T_c_s = {T_c}
-end_s = 4.0
+end_s = 6.0
 
 [[event]]
 label = "islanding"
 t_s = 1.0
 open = [{switches}]
+
+[case.none]
+title = "droop alone"
+secondary = "none"
+graph = "none"
 
 [case.ring]
 title = "agents in a ring"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,9 @@ HALO: Any = [withStroke(linewidth=2.0, foreground="white")]
 
 MANY = 400
 """Buses beyond which loads are not marked and branches are half as wide."""
+
+MOST_LABELS = 15
+"""Inverters beyond which their names are left out, which would cover each other."""
 
 Places = Mapping[str, tuple[float, float]]
 
@@ -60,10 +64,13 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
             axes.plot(*at[bus], ".", color="black" if V else colours.get(zones[bus], BESIDE), ms=3.5, zorder=2)
     for switch in feeder.switches:
         _draw_switch(switch, at, axes, named=few)
+    labelled = len(feeder.inverters) <= MOST_LABELS
     for row in (*feeder.inverters, *feeder.spares):
         GFM = row.kind == "GFM"
         face = "white" if row.spare else colours.get(row.microgrid, BESIDE)
         axes.plot(*at[row.bus], marker="s" if GFM else "o", ms=10 if GFM else 8, mfc=face, mec="black", zorder=4)
+        if not labelled:
+            continue
         text = f"{row.name}{' (spare)' if row.spare else ''}"
         axes.annotate(text, at[row.bus], (6, 6), textcoords="offset points", weight="bold", zorder=5, path_effects=HALO)
     if feeder.source is not None:
@@ -149,7 +156,7 @@ def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
     beside = {"", zones[feeder.source.bus] if feeder.source is not None else ""}
     first = [row.microgrid for row in feeder.inverters]
     named = [zone for zone in dict.fromkeys((*first, *zones.values())) if zone not in beside]
-    return dict(zip(named, COLOURS, strict=False)) | dict.fromkeys(beside, BESIDE)
+    return dict(zip(named, cycle(COLOURS), strict=False)) | dict.fromkeys(beside, BESIDE)
 
 
 def _draw_branches(feeder: Feeder, at: Places, axes: Axes) -> LineCollection:
@@ -185,8 +192,15 @@ def _legend(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str]
         )
         if zone in load:
             axes.plot([], [], color=colour, lw=3, label=text)
-    for marker, face, text in (("s", BESIDE, "GFM inverter"), ("o", BESIDE, "GFL inverter"), ("o", "white", "spare")):
-        axes.plot([], [], marker=marker, ms=8, mfc=face, mec="black", ls="", label=text)
-    axes.plot([], [], marker="s", ms=5, mfc="black", mec="black", ls="", label="switch, closed")
-    axes.plot([], [], marker="s", ms=5, mfc="white", mec="black", ls="", label="switch, open")
+    kinds, states = {row.kind for row in feeder.inverters}, {switch.closed for switch in feeder.switches}
+    marks = (
+        ("s", 8, BESIDE, "GFM inverter", "GFM" in kinds),
+        ("o", 8, BESIDE, "GFL inverter", "GFL" in kinds),
+        ("o", 8, "white", "spare", bool(feeder.spares)),
+        ("s", 5, "black", "switch, closed", True in states),
+        ("s", 5, "white", "switch, open", False in states),
+    )
+    for marker, size, face, text, shown in marks:
+        if shown:
+            axes.plot([], [], marker=marker, ms=size, mfc=face, mec="black", ls="", label=text)
     picture.legend(loc="outside lower center", frameon=False, ncols=2)

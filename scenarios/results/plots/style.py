@@ -105,12 +105,18 @@ def case_styles(cases: Iterable[str]) -> dict[str, Style]:
     --------
     >>> [width for _, _, width in case_styles(["I", "II", "III", "IV"]).values()]
     [3.0, 2.5, 2.0, 1.5]
+
+    A case of a fixed style takes its colour from the others:
+
+    >>> len({colour for colour, _, _ in case_styles(["none", "ring", "star"]).values()})
+    3
     """
     names = list(cases)
-    return {
-        case: (*case_style(case, number), width)
-        for number, (case, width) in enumerate(zip(names, widths(len(names)), strict=True))
-    }
+    taken = {CASE_STYLES[case][0] for case in names if case in CASE_STYLES}
+    free = [style for style in OTHER_STYLES if style[0] not in taken] or list(OTHER_STYLES)
+    others = [case for case in names if case not in CASE_STYLES]
+    styles = CASE_STYLES | {case: free[k % len(free)] for k, case in enumerate(others)}
+    return {case: (*styles[case], width) for case, width in zip(names, widths(len(names)), strict=True)}
 
 
 def widths(count: int) -> list[float]:
