@@ -86,10 +86,11 @@ def _outside(text: str, known: list[str], spec: ScenarioModel) -> tuple[str, ...
     names = known if text == "all" else [] if text == "none" else listed
     for name in names:
         check_choice("--outside: ", "inverter", name, ["all", "none", *known])
-    for event in spec.events:
-        if moving := sorted({*event.leave, *event.join}.intersection(names)):
-            fail(
-                [f'event "{event.label}": {", ".join(moving)} leaves or joins with an agent of ours; see --outside'],
-                BAD_INPUT,
-            )
+    problems = [
+        f'event "{event.label}": {", ".join(moving)} leaves or joins with an agent of ours; see --outside'
+        for event in spec.events
+        if (moving := sorted({*event.leave, *event.join}.intersection(names)))
+    ]
+    if problems:
+        fail(problems, BAD_INPUT)
     return tuple(names)

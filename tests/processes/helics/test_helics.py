@@ -21,6 +21,7 @@ from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import PlantConfig, PlantSettings
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.run import BrokenRunError
+from tests.command_line import invoke
 from tests.toy.toy_plant import ToyPlant
 
 pytest.importorskip("helics", reason="needs HELICS: pip install 'gridpeers[helics]'")
@@ -196,3 +197,11 @@ def test_a_bridged_plant_takes_set_points_from_the_tick_on_in_which_they_are_dec
     assert [event.text for event in events] == [
         "nobody publishes set-points of inv1: it stays on primary droop at its first ones"
     ]
+
+
+def test_every_event_that_moves_an_inverter_of_others_is_named() -> None:
+    """Leaving and returning are told at once, before anything starts."""
+    code, said = invoke("bridge", "helics", "plug-n-play")
+
+    assert code == 2
+    assert [line.split('"')[1] for line in said.splitlines() if "inv2 leaves or joins" in line] == ["leave", "return"]
