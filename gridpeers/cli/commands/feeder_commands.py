@@ -152,6 +152,7 @@ def plot(
 
     tables = _read(feeder, switch, leave_out)
     try:
+        out = out if out.suffix else out.with_suffix(".png")  # as the figure would by itself, without telling
         tables.plot(voltages=voltages).savefig(out, dpi=130)
     except (ValueError, ArithmeticError) as error:
         fail([f"{feeder}: {error}"], BAD_INPUT)

@@ -79,6 +79,7 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
         (("solve", "feeder.glm", "--csv", "model.csv"), "lowest"),
         (("solve", "mine", "--csv", "tables.csv"), "lowest"),
         (("plot", "mine", "--out", "map.svg"), "Figure: map.svg"),
+        (("plot", "mine", "--out", "map"), "Figure: map.png"),
     ):
         code, printed = invoke("feeder", *words)
         assert code == 0, printed
