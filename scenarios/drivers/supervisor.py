@@ -130,7 +130,7 @@ def share(names: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:
 
     Examples
     --------
-    >>> share(("inv1", "inv2", "inv3"), 2)["inv2"]
+    >>> share(("inv1", "inv2", "inv3", "inv4"), 2)["inv2"]
     ('inv1', 'inv2')
     >>> share(("inv1", "inv2", "inv3"), 0)["inv2"]
     ('inv2',)
