@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, Literal
 
 import msgspec
@@ -27,6 +28,12 @@ FrequencyBand = Annotated[float, Unit("Hz"), Plausible("a dead band", 0.0, 5.0)]
 class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
 
+    model: Literal["gridlabd", "regfm_a1"] = "gridlabd"
+    """What its controller measures: total power and the mean of the phases' voltages, as GridLAB-D, or power and
+    voltage of the positive sequence, as REGFM_A1 (section 3.8)."""
+    voltage_control: bool = True
+    """Whether a controller brings the terminal to the voltage of the Q-V droop; otherwise the droop gives the internal
+    voltage (VFlag of REGFM_A1, section 3.8)."""
     R_f: Resistance = 0.015
     """Filter resistance (pu)."""
     X_f: Reactance = 0.15
@@ -74,6 +81,20 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Lower bound of V_set (pu)."""
     V_set_max: BoundOfVset = 1.2
     """Upper bound of V_set (pu)."""
+
+
+REGFM_A1 = GfmParameters(
+    model="regfm_a1",
+    R_f=0.0,
+    X_f=0.15,
+    P_max=0.9,
+    k_pp=0.01 * 2.0 * pi * 60.0,
+    k_ip=0.1 * 2.0 * pi * 60.0,
+    Q_max=0.44,
+    Q_min=-0.44,
+    E_max=1.15,
+)
+"""REGFM_A1 with the default values of public implementations, at 60 Hz (section 3.8)."""
 
 
 class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
@@ -19,13 +19,20 @@ PARAMETERS_OF: dict[str, type[GfmParameters] | type[GflParameters]] = {"GFM": Gf
 """Parameters by kind of inverter."""
 
 
+def _either(first: Any, second: Any) -> Any:
+    """Return the type of a key that both kinds have: a choice takes the words of both, `foreign` knows whose."""
+    if get_origin(first) is get_origin(second) is Literal:
+        return Literal[(*get_args(first), *get_args(second))]
+    return first | second
+
+
 def _optional_fields() -> list[tuple[str, Any, None]]:
     """Return the fields of both kinds, each with its unit and range, and None where it gives nothing."""
     types: dict[str, Any] = {}
     for cls in PARAMETERS_OF.values():
         for field in fields_of(cls):
             kind = types.get(field.name, (None, ()))[0]
-            types[field.name] = field.type if kind is None else kind | field.type, field.marks
+            types[field.name] = field.type if kind is None else _either(kind, field.type), field.marks
     return [
         (name, Annotated[(kind | None, *marks)] if marks else kind | None, None)
         for name, (kind, marks) in types.items()
@@ -65,12 +72,24 @@ def given(own: OwnParameters) -> dict[str, Any]:
 
 
 def foreign(own: OwnParameters, kind: str) -> list[str]:
-    """Return the keys of what a set gives and a kind of inverter does not have.
+    """Return what a set gives and a kind of inverter does not have: keys, and words of a choice with their key.
 
     Examples
     --------
     >>> foreign(OwnParameters(P_max=1.2, S_max=1.2), "GFM")
     ['S_max_pu']
+    >>> foreign(OwnParameters(model="regfm_a1"), "GFL")
+    ['model = "regfm_a1"']
     """
-    names = {field.name for field in fields_of(PARAMETERS_OF[kind])}
-    return [field.key for field in fields_of(OwnParameters) if field.name in given(own).keys() - names]
+    values, found = given(own), []
+    fields = {field.name: field for field in fields_of(PARAMETERS_OF[kind])}
+    for field in fields_of(OwnParameters):
+        if field.name not in values:
+            continue
+        if field.name not in fields:
+            found.append(field.key)
+            continue
+        kept = fields[field.name].type
+        if get_origin(kept) is Literal and values[field.name] not in get_args(kept):
+            found.append(f'{field.key} = "{values[field.name]}"')
+    return found

@@ -185,15 +185,15 @@ def set_equilibrium(
         Real powers and set-points of the point (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
         V_set := v, Q_set := q; else all the reactive power comes from the droop.
     """
-    S = np.sum(point.V * np.conj(point.I), axis=1) / units.S_b
-    v = np.mean(np.abs(point.V), axis=1) / units.V_b
+    S, v = units.measured(point.V, point.I)
+    held = units.regulated(point.V, point.I)
     units.J, units.V, units.I = point.J.copy(), point.V.copy(), point.I.copy()
     for i in range(len(units)):
         if not online[i]:
             units.set_points[i] = P[i], 1.0 if V_set is None else V_set[i], 0.0
             continue
         if units.forming[i] or V_set is not None:
-            units.set_points[i] = S[i].real, v[i] + units.m_q[i] * S[i].imag, 0.0
+            units.set_points[i] = S[i].real, held[i] + units.m_q[i] * S[i].imag, 0.0
         else:
             units.set_points[i] = S[i].real, v[i], S[i].imag
         units.rest(i, S[i], v[i])
@@ -214,9 +214,10 @@ def _by_droop(
         trial = Q.copy()
         trial[free] = q
         J, V = flow.solve(J, P, trial, swing)
-        v = np.mean(np.abs(V), axis=1) / units.V_b
-        by_droop = np.clip((V_set - v) / units.m_q, -limit, limit)
-        return np.asarray((by_droop - trial)[free] * units.m_q[free])
+        I_out = J - flow.y[:, None] * V
+        by_droop = np.clip((V_set - units.regulated(V, I_out)) / units.m_q, -limit, limit)
+        measured = np.where(units.positive_sequence, units.measured(V, I_out)[0].imag, trial)
+        return np.asarray((by_droop - measured)[free] * units.m_q[free])
 
     solution = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
     if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:

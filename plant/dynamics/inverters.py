@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.kernel.second_order_step import FeedForward
-from plant.dynamics.reduced import Real
+from plant.dynamics.phasors import aligned_sum
+from plant.dynamics.reduced import Complex, Real
 from plant.equipment import F_NOM
 from plant.inverter_parameters import GflParameters, GfmParameters
 from plant.plant_config import Method
@@ -63,6 +64,8 @@ class Inverters:
         The same for `plant.dynamics.kernel.gfl`.
     S_b, V_b, m_p, m_q : float64[n]
         Ratings (VA), nominal voltages (V) and droops (pu per pu).
+    positive_sequence, direct : bool[n]
+        Whether each is a GFM that measures the positive sequence, and one without voltage controller (section 3.8).
     balanced : bool[n]
         Whether each is a GFL of balanced power.
     S_max : float64[n]
@@ -102,6 +105,9 @@ class Inverters:
         self.m_q = np.array([unit.m_q for unit in units])
         self.balanced = np.zeros(n, bool)
         self.balanced[self.gfl_at] = self.gfl["balanced_power"]
+        self.positive_sequence, self.direct = np.zeros(n, bool), np.zeros(n, bool)
+        self.positive_sequence[self.gfm_at] = self.gfm["positive_sequence"]
+        self.direct[self.gfm_at] = ~self.gfm["voltage_control"]
         self.S_max = np.full(n, np.inf)
         self.S_max[self.gfl_at] = self.gfl["S_max"]
         self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])
@@ -126,6 +132,32 @@ class Inverters:
         theta[self.gfm_at] = self.gfm_state["theta"]
         return theta
 
+    def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
+        """Return the powers and voltages (pu) that the controllers measure (sections 3.2, 3.8).
+
+        Parameters
+        ----------
+        V, I
+            Terminal voltages (V) and currents out of the inverters (A), n x 3.
+        """
+        V_1, I_1 = aligned_sum(V) / 3.0, aligned_sum(I) / 3.0
+        S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_b
+        v = np.where(self.positive_sequence, np.abs(V_1), np.mean(np.abs(V), axis=1)) / self.V_b
+        return S, v
+
+    def regulated(self, V: Complex, I: Complex) -> Real:  # noqa: E741  # the paper's symbol
+        """Return the voltages (pu) that V_set - m_q q is at rest: measured ones, or E without voltage controller.
+
+        Parameters
+        ----------
+        V, I
+            As for `measured`.
+        """
+        v = self.measured(V, I)[1]
+        i = self.direct
+        v[i] = np.abs(I[i, 0] / self.y_f[i] + V[i, 0]) / self.V_b[i]
+        return v
+
     def rest(self, i: int, S: complex, v: float) -> None:
         """Set an inverter's controller to rest at its present J, V and I.
 
@@ -134,9 +166,9 @@ class Inverters:
         i
             The inverter.
         S
-            Its terminal power (pu).
+            The power that it measures (pu).
         v
-            Its mean terminal voltage (pu).
+            The voltage that it measures (pu).
         """
         if self.forming[i]:
             k = int(np.searchsorted(self.gfm_at, i))

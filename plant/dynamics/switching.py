@@ -103,7 +103,7 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
     units.connected[moved] = on
     w_nom = 2.0 * np.pi * units.f_nom
     for i in moved if on else ():
-        v = _mean_voltage(units, i)
+        v = _rest_voltage(units, i)
         units.set_points[i] = speed[i] / (units.m_p[i] * w_nom), v if v > 0.1 else 1.0, 0.0
     trips = connect(units, network, network.circuit)
     for i, w in speed.items() if on else ():
@@ -130,6 +130,13 @@ def _island_speed(units: Inverters, network: LiveNetwork, i: int) -> float:
     """Return the speed (rad/s, relative to nominal) of inverter i's island; 0 with a source or if dead."""
     leader = network.reduction.leader[network.reduction.inverter_island[i]]
     return 0.0 if leader < 0 else float(units.gfm_state["w"][units.gfm_at == leader][0])
+
+
+def _rest_voltage(units: Inverters, i: int) -> float:
+    """Return the V_set (pu) at which inverter i rests without current."""
+    if units.positive_sequence[i] or units.direct[i]:
+        return float(abs(aligned_sum(units.V[i]))) / 3.0 / float(units.V_b[i])
+    return _mean_voltage(units, i)
 
 
 def _mean_voltage(units: Inverters, i: int) -> float:

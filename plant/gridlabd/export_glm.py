@@ -11,7 +11,8 @@ from plant.feeder import Plant
 from plant.gridlabd.glm import START, read_table, write_glm
 from plant.gridlabd.glm_network import TableRow, network_blocks
 from plant.gridlabd.impedance import with_impedances
-from plant.gridlabd.unrepresentable import unrepresentable
+from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
+from plant.inverter_parameters import GfmParameters
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError
@@ -55,6 +56,11 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
         If there is no operating point.
     """
     problems = unrepresentable(feeder)
+    for row in feeder.inverters:
+        own = feeder.parameters_of(row, settings.gfm, settings.gfl)
+        if isinstance(own, GfmParameters):
+            for key, value in beyond_gridlabd(own).items():
+                problems.append(f"{row.name} has {key} = {value}, which no GFM of GridLAB-D has; leave it out")
     if problems:
         raise FeederError(feeder.name, tuple(problems))
     with tempfile.TemporaryDirectory() as name:

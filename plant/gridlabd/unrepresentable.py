@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from plant.equipment import Feeder
 from plant.gridlabd.glm_network import F_NOM
+from plant.inverter_parameters import GfmParameters
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""
@@ -33,6 +34,12 @@ def unrepresentable(feeder: Feeder) -> list[str]:
         elif taken[in_model] > 1:
             problems.append(f'{kind} "{name}": another object of the model has its name {in_model}; rename it')
     return problems
+
+
+def beyond_gridlabd(own: GfmParameters) -> dict[str, str]:
+    """Return, by their keys, the values that make a GFM another than that of GridLAB-D."""
+    found = {} if own.model == "gridlabd" else {"model": f'"{own.model}"'}
+    return found if own.voltage_control else {**found, "voltage_control": "false"}
 
 
 def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:

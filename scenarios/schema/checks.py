@@ -148,10 +148,10 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
             problems.add(
                 path, f"changes nothing; give it one of {', '.join(keys_of(InverterTable))}, or a key of {kind}"
             )
-        for key in foreign(table.own, kind):
-            problems.add(
-                f"{path}.{key}", f"a {kind} has no such parameter; {name} takes those of [plant.{kind.lower()}]"
-            )
+        for text in foreign(table.own, kind):
+            key, _, word = text.partition(" = ")
+            what = f"{key} {word}" if word else "such parameter"
+            problems.add(f"{path}.{key}", f"a {kind} has no {what}; {name} takes those of [plant.{kind.lower()}]")
         if table.parameters and not problems.unknown(f"{path}.parameters", "parameter set", table.parameters, sets):
             for key in foreign(sets[table.parameters], kind):
                 problems.add(f"{path}.parameters", f'set "{table.parameters}" has {key}, which a {kind} has not')

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 from plant.equipment import Feeder
-from plant.gridlabd.unrepresentable import unrepresentable
+from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
 from plant.inverter_parameters import GfmParameters
+from plant.own_parameters import InverterParameters
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.supply import supply_states
@@ -48,19 +50,27 @@ def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problem
     seen: set[str] = set()
     for row in feeder.inverters:
         own = feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl)
-        if isinstance(own, GfmParameters):
-            path, default = "plant.gfm.V_lim_pu", GfmParameters().V_lim
-            wrong = own.V_lim != default
-            text = f"GridLAB-D has no such bound, got {own.V_lim:g} pu at {row.name}; leave it at {default:g}"
-        else:
-            path, wrong = "plant.gfl.P_set_lim_pu", own.P_set_lim > own.S_max
-            text = (
-                f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {row.name}; "
-                "choose at most that"
-            )
-        if wrong and path not in seen:
-            problems.add(path, f"{text}, {_OTHERWISE}")
-            seen.add(path)
+        for path, text in _parameters_beyond(row.name, own):
+            if path not in seen:
+                problems.add(path, f"{text}, {_OTHERWISE}")
+                seen.add(path)
+
+
+def _parameters_beyond(name: str, own: InverterParameters) -> Iterator[tuple[str, str]]:
+    """Yield the key and a sentence for every parameter of one inverter that GridLAB-D does not take."""
+    if isinstance(own, GfmParameters):
+        for key, value in beyond_gridlabd(own).items():
+            yield f"plant.gfm.{key}", f"GridLAB-D has no such GFM, got {value} at {name}; leave it out"
+        default = GfmParameters().V_lim
+        if own.V_lim != default:
+            text = f"GridLAB-D has no such bound, got {own.V_lim:g} pu at {name}; leave it at {default:g}"
+            yield "plant.gfm.V_lim_pu", text
+    elif own.P_set_lim > own.S_max:
+        yield (
+            "plant.gfl.P_set_lim_pu",
+            f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {name}; "
+            "choose at most that",
+        )
 
 
 def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel.arithmetic import A120
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.gfl import advance_gfl
-from plant.dynamics.kernel.gfm import advance_gfm
+from plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
 
 READING = 7
 """Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), V of the lowest and the highest phase (V), and
@@ -149,6 +149,9 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
         former = units.gfm[k]
         read_terminal(former.y_f, J[i], V[i], units.I[i], readings[i])
         state = units.gfm_state[k]
+        P, Q, v = readings[i, 1] / former.S_b, readings[i, 2] / former.S_b, readings[i, 3] / former.V_b
+        if former.positive_sequence:
+            P, Q, v = measure_positive_sequence(former, V[i], units.I[i])
         advance_gfm(
             former,
             set_points[i, 0],
@@ -156,9 +159,9 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
             units.gfm_0[k],
             state,
             units.gfm_d[k],
-            readings[i, 1] / former.S_b,
-            readings[i, 2] / former.S_b,
-            readings[i, 3] / former.V_b,
+            P,
+            Q,
+            v,
             h,
             second,
         )

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import heun, sat
+from plant.dynamics.kernel.arithmetic import A120, heun, sat
 from plant.dynamics.kernel.compiled import compiled
 from plant.plant_config import GfmParameters
 
@@ -23,6 +23,8 @@ PARAMETERS = np.dtype(
         ("I_limit", "f8"),  # A, of one phase
         ("m_p", "f8"),  # rad/s per pu
         ("m_q", "f8"),  # pu per pu
+        ("positive_sequence", "b1"),  # measurements of REGFM_A1, section 3.8
+        ("voltage_control", "b1"),
         ("T_p", "f8"),
         ("T_q", "f8"),
         ("T_v", "f8"),
@@ -88,7 +90,8 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
     record["y_f"] = 1.0 / (complex(par.R_f, par.X_f) * Z_b)
     record["m_p"], record["m_q"] = m_p * (2.0 * np.pi * f_nom), m_q
     record["I_limit"] = par.I_max * S_b / (3.0 * V_b)
-    for name in PARAMETERS.names[6:]:  # type: ignore[index]  # a structured dtype has names
+    record["positive_sequence"], record["voltage_control"] = par.model == "regfm_a1", par.voltage_control
+    for name in PARAMETERS.names[8:]:  # type: ignore[index]  # a structured dtype has names
         record[name] = getattr(par, name)
     return record
 
@@ -103,15 +106,28 @@ def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> No
     J_A
         Injection of phase A (A), from which the internal voltage follows.
     S
-        Terminal power (pu).
+        Measured power (pu).
     v
-        Mean terminal voltage (pu).
+        Measured voltage (pu).
     """
     E = J_A / g["y_f"]
     state["p"], state["q"], state["v"] = S.real, S.imag, v
     state["x_over"] = state["x_under"] = state["y_over"] = state["y_under"] = state["w"] = 0.0
     state["e"] = state["E"] = abs(E) / g["V_b"]
     state["theta"] = np.angle(E)
+
+
+@compiled
+def measure_positive_sequence(
+    g: Any,
+    V: NDArray[np.complex128],
+    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+) -> tuple[float, float, float]:
+    """Return P, Q and V (pu) of the positive sequence, from phase voltages (V) and currents out (A); section 3.8."""
+    V_1 = (V[0] + A120 * V[1] + A120.conjugate() * V[2]) / 3.0
+    I_1 = (I[0] + A120 * I[1] + A120.conjugate() * I[2]) / 3.0
+    S = 3.0 * V_1 * I_1.conjugate() / g.S_b
+    return S.real, S.imag, abs(V_1) / g.V_b
 
 
 @compiled
@@ -133,7 +149,7 @@ def advance_gfm(
         Records of `STATE`: at the start of the step; the trial state, advanced here; slopes of
         the first pass, written in the first and read in the second.
     P, Q, v
-        Terminal power and mean voltage (pu) of this pass' network solution.
+        Power and voltage (pu) of this pass' network solution, as the model measures them.
     h
         Step (s).
     second
@@ -158,9 +174,11 @@ def advance_gfm(
     x.y_over = sat(heun(x0.y_over, d.y_over, g.k_iq * q_over, h, second), -g.V_lim, 0.0)
     x.y_under = sat(heun(x0.y_under, d.y_under, g.k_iq * q_under, h, second), 0.0, g.V_lim)
     q_limit = sat(x.y_over + g.k_pq * q_over, -g.V_lim, 0.0) + sat(x.y_under + g.k_pq * q_under, 0.0, g.V_lim)
-    error = V_set - g.m_q * x.q + q_limit - x.v
-    x.e = sat(heun(x0.e, d.e, g.k_iv * error, h, second), g.E_min, g.E_max)
-    x.E = sat(x.e + g.k_pv * error, g.E_min, g.E_max)
+    V_ref = V_set - g.m_q * x.q + q_limit
+    error = V_ref - x.v
+    de = g.k_iv * error if g.voltage_control else 0.0
+    x.e = sat(heun(x0.e, d.e, de, h, second), g.E_min, g.E_max)
+    x.E = sat(x.e + g.k_pv * error if g.voltage_control else V_ref, g.E_min, g.E_max)
 
     # droop, 3.3 and equation (3)
     x.w = g.m_p * (P_set - x.p) + limit
@@ -170,4 +188,4 @@ def advance_gfm(
         d.p, d.q, d.v = dp, dq, dv
         d.x_over, d.x_under = g.k_ip * over, g.k_ip * under
         d.y_over, d.y_under = g.k_iq * q_over, g.k_iq * q_under
-        d.e, d.theta = g.k_iv * error, x.w
+        d.e, d.theta = de, x.w

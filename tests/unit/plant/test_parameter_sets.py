@@ -105,6 +105,7 @@ def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
     ("tables", "said"),
     [
         ("[plant.inverter.inv1]\nS_max_pu = 1", r"plant.inverter.inv1.S_max_pu: a GFM has no such parameter"),
+        ('[plant.inverter.inv2]\nmodel = "regfm_a1"', r'inv2.model: a GFL has no model "regfm_a1"'),
         ('[plant.inverter.inv2]\nparameters = "slwo"', r'no parameter set "slwo"; did you mean "slow"\?'),
         ('[plant.inverter.inv1]\nparameters = "slow"', r'set "slow" has k_pPLL, which a GFM has not'),
         ("[plant.inverter.inv1]\nT_p = 0.1", r"plant.inverter.inv1.T_p: unknown key; write T_p_s, in seconds"),

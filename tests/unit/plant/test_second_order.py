@@ -14,7 +14,7 @@ from plant.dynamics import Dynamics
 from plant.dynamics.kernel import gfl, gfm
 from plant.feeder import Plant
 from plant.network import Network
-from plant.plant_config import GflParameters, Method, PlantSettings
+from plant.plant_config import GflParameters, GfmParameters, Method, PlantSettings
 from plant.tables import read_feeder
 from tests.unit.plant.circuits import (
     BALANCED,
@@ -29,10 +29,14 @@ from tests.unit.plant.circuits import (
 WATT_VAR = replace(GFL_D, F_current=0.6, frequency_watt=True, volt_var=True)
 
 
-def gfm_pass(x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
-    """A pass of a GFM that meets 0.4 + 0.1j pu at 0.98 pu."""
-    record = gfm.pack(GFM_D, S_B, V_B, 0.01, 0.05, 60.0)[()]
-    gfm.advance_gfm(record, 0.5, 1.0, x0, x, d, 0.4, 0.1, 0.98, h, second)
+def gfm_pass(par: GfmParameters) -> Any:
+    """Return a pass of a GFM that meets 0.4 + 0.1j pu at 0.98 pu."""
+    record = gfm.pack(par, S_B, V_B, 0.01, 0.05, 60.0)[()]
+
+    def advance(x0: Any, x: Any, d: Any, h: float, second: bool) -> None:
+        gfm.advance_gfm(record, 0.5, 1.0, x0, x, d, 0.4, 0.1, 0.98, h, second)
+
+    return advance
 
 
 def gfl_pass(par: GflParameters) -> Any:
@@ -50,12 +54,13 @@ def gfl_pass(par: GflParameters) -> Any:
 @pytest.mark.parametrize(
     ("state", "advance"),
     [
-        (gfm.STATE, gfm_pass),
+        (gfm.STATE, gfm_pass(GFM_D)),
+        (gfm.STATE, gfm_pass(replace(GFM_D, voltage_control=False))),
         (gfl.STATE, gfl_pass(WATT_VAR)),
         (gfl.STATE, gfl_pass(replace(WATT_VAR, model="current_source"))),
         (gfl.STATE, gfl_pass(replace(WATT_VAR, mode="balanced_power"))),
     ],
-    ids=["GFM", "GFL", "GFL current source", "GFL of balanced power"],
+    ids=["GFM", "GFM without voltage controller", "GFL", "GFL current source", "GFL of balanced power"],
 )
 def test_a_pass_of_length_0_gives_the_slopes_and_moves_no_state(state: np.dtype[Any], advance: Any) -> None:
     """Both methods integrate the same right-hand side: the limit of a short pass's slopes is that of the empty one."""
