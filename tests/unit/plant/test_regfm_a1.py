@@ -61,6 +61,24 @@ def test_it_rests_where_it_starts_on_unequal_phases(parameters: GfmParameters, m
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
+def test_a_given_v_set_is_met_at_the_start(parameters: GfmParameters, method: Method) -> None:
+    """Behind a line with unequal loads it starts with the Q at which its own droop gives V_set, and rests."""
+    y = np.eye(3) / ((0.02 + 0.04j) * Z_B)
+    load = np.diag([0.9, 0.5, 0.2]) * (1.0 - 0.4j) / Z_B
+    network = circuit(np.block([[y, -y], [-y, y + load]]), [[3, 4, 5]], source=V_B * BALANCED)
+    dynamics = Dynamics(network, (inverter(parameters),), 0.002, method=method)
+    dynamics.start(np.array([0.25]), None, np.array([1.01]))
+    before = dynamics.readings().copy()
+
+    out = dynamics.run(500)
+
+    assert dynamics.inverters.set_points[0, 1] == pytest.approx(1.01, abs=1e-9)
+    assert np.abs(out[:, :, 0] - 60.0).max() < 1e-9
+    assert np.abs(out[:, :, 1:3] - before[:, 1:3]).max() / S_B < 1e-9
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("parameters", [REGFM_A1, DIRECT], ids=["VFlag 1", "VFlag 0"])
 def test_it_droops_by_the_positive_sequence(parameters: GfmParameters, method: Method) -> None:
     """After a load step f follows P of the positive sequence, and V_set - m_q Q is its voltage, or the internal one."""
     dynamics = unbalanced(replace(parameters, **RESISTIVE), method)

@@ -14,7 +14,7 @@ from plant.equipment import Feeder, Load
 from plant.feeder import Plant
 from plant.gridlabd.export_glm import export_glm
 from plant.gridlabd.impedance import with_impedances
-from plant.inverter_parameters import GfmParameters
+from plant.inverter_parameters import REGFM_A1, GfmParameters
 from plant.network import Network, solve_power_flow
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError, read_feeder
@@ -95,7 +95,7 @@ def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None
 
 
 def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
-    """No substation, another frequency and names that GridLAB-D does not take, or twice, are problems of one error."""
+    """No substation, another frequency, names that it does not take, or twice; and a GFM that it does not have."""
     feeder = read_feeder("microgrid123")
     first, second, *others = feeder.inverters
     inverters = (replace(first, name="1.st"), replace(second, name="n13"), *others)
@@ -103,6 +103,8 @@ def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
 
     with pytest.raises(FeederError) as error:
         export_glm(feeder, PlantSettings(), 1, "voltages.csv")
+    with pytest.raises(FeederError, match='inv1 has model = "regfm_a1", which no GFM of GridLAB-D has'):
+        export_glm(read_feeder("microgrid123"), PlantSettings(gfm=REGFM_A1), 1, "voltages.csv")
 
     assert error.value.problems == (
         "microgrid123 has no source.csv; GridLAB-D needs a substation as its swing bus",
