@@ -78,8 +78,10 @@ class _GlmReader:
                 f"write nominal_frequency {f_nom:g}; in its module powerflow, or leave f_nom out"
             )
         self._refuse_classes()
+        known = len(problems)
         self._mend_nominal_voltages()
-        refuse_if(self._path, problems)  # all that follows is per unit
+        if len(problems) > known:
+            refuse_if(self._path, problems)  # all that follows is per unit
         elements = GlmElements(model["buses"], switches, problems)
         for branch in model["branches"]:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
