@@ -38,7 +38,7 @@ WYE, AROUND, LEGS = ("A", "B", "C"), ("AB", "BC", "CA"), ("1", "2", "12")
 """Branches of a load: to ground, between phases, of a split-phase service."""
 
 KINDS = {"P": "power", "I": "current", "Y": "shunt"}
-"""What a load takes (VA, A, S), and the word in the names of GridLAB-D's properties."""
+"""Kinds of a load's demand (VA, A, S), and the word in the names of GridLAB-D's properties."""
 
 
 class PowerFlowModel:

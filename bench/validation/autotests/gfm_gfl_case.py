@@ -48,7 +48,7 @@ TERMINALS = {"GFM": "Meter1", "GFL": "Load2"}
 """Bus of each inverter."""
 
 START_POWER = {"GFM": 60e3 + 0j, "GFL": 60e3 + 10e3j}
-"""What they deliver at the start (VA); the GFM's, which holds the voltage, is a first guess."""
+"""Powers at the start (VA); that of the GFM, which holds the voltage, is a first guess."""
 
 GFM = GfmParameters(R_f=0.014, X_f=0.1636, P_max=1.0, k_pp=0.0, k_ip=90.9)
 GFL = GflParameters(X_f=0.10, F_current=0.0, T_ff=0.05, T_pf=0.5, T_vf=0.05, T_qf=0.2, S_max=1.0, i_max=1.0)

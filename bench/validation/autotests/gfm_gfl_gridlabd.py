@@ -32,7 +32,7 @@ READ: Sequence[Property] = (
     ("GFM", "freq", REAL),
     ("GFL", "f_PLL_A", REAL),
 )
-"""What is compared, in the order of the inverters."""
+"""Compared quantities, in the order of the inverters."""
 
 
 def record_gfm_gfl(changes: Mapping[int, complex], steps: int) -> RecordedRun:

@@ -23,7 +23,7 @@ Values = Mapping[tuple[str, str], NDArray[Any]]
 
 
 class RecordedRun(NamedTuple):
-    """What was read in a run."""
+    """Readings of a run."""
 
     after: Values
     """Values after each step."""

@@ -26,7 +26,7 @@ COARSE, FINE = "set tolerance=1e-6", "set tolerance=1e-11"
 
 
 class Engine(NamedTuple):
-    """What is asked of an engine."""
+    """Request to an engine."""
 
     command: Callable[[str], Any]
     converged: Callable[[], bool]

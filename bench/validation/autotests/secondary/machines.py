@@ -105,7 +105,7 @@ class Machine(NamedTuple):
     S_rated: float
     """Rating (VA)."""
     S_start: complex
-    """What each phase delivers at the start (VA); for the first, which holds the voltage, a first guess."""
+    """Power of each phase at the start (VA); that of the first, which holds the voltage, is a first guess."""
     own: Mapping[str, str | float]
     """Its properties beside those of `MACHINE`."""
 

@@ -19,7 +19,7 @@ GFM = GfmParameters(R_f=0.0025, X_f=0.05, P_max=1.2, k_pp=20.0, k_ip=60.0)
 GFL = GflParameters(model="current_source", frequency_watt=False, volt_var=False, P_min=0.0, S_max=1.0, i_max=1.0)
 
 START_POWER = {"Inv1": 240e3 + 0j, "Inv2": 700e3 + 500e3j, "Inv3": 0j, "Inv4": 0j}
-"""What the inverters deliver at the start (VA)."""
+"""Powers of the inverters at the start (VA)."""
 
 SHARES = {"Gen1": 0.3, "Gen4": 0.2, "Inv1": 0.2, "Inv3": 0.3}
 """Of the controller's output."""
