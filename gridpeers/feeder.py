@@ -10,7 +10,7 @@ import msgspec
 
 from plant.equipment import Feeder as Tables
 from plant.equipment import InverterRow
-from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         plant.tables.FeederError
             With everything that the engine refuses, and everything that cannot be represented.
         """
-        from plant.opendss import read_opendss
+        from plant.imports.opendss import read_opendss
 
         return cls._of(read_opendss(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
@@ -99,7 +99,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         plant.tables.FeederError
             With everything that GridLAB-D refuses, and everything that cannot be represented.
         """
-        from plant.gridlabd_import.read_glm import read_glm
+        from plant.imports.gridlabd.read_glm import read_glm
 
         return cls._of(read_glm(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 

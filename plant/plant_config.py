@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from plant.equipment.inverter_parameters import GflParameters as GflParameters
+from plant.equipment.inverter_parameters import GfmParameters as GfmParameters
+from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
-from plant.inverter_parameters import GflParameters as GflParameters
-from plant.inverter_parameters import GfmParameters as GfmParameters
-from plant.own_parameters import OwnParameters
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 

@@ -8,8 +8,8 @@ from itertools import accumulate
 from math import ceil
 from typing import NamedTuple
 
-from plant.connectivity import Connectivity, by_bus
 from plant.equipment import Feeder, InverterRow
+from plant.equipment.connectivity import Connectivity, by_bus
 from plant.tables.feeder_columns import RATED_CURRENT, power_of
 from scenarios.feeder_walk import cut_off_sums, depth_first, neighbours
 

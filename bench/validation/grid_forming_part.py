@@ -32,8 +32,8 @@ from bench.validation.validation_part import CaseResult, ToleranceCheck, Validat
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.phasors import aligned_sum
 from plant.equipment import Feeder
+from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder.circuits import circuit_of
-from plant.inverter_parameters import GfmParameters
 from plant.network import Network, solve_power_flow
 from plant.tables import read_feeder
 

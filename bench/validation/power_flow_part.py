@@ -15,8 +15,8 @@ from bench.validation.opendss.switch_states import SwitchStates
 from bench.validation.opendss.write_opendss import write_opendss
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from plant.equipment import Feeder
+from plant.imports.opendss import read_opendss
 from plant.network import Network, solve_power_flow
-from plant.opendss import read_opendss
 from plant.tables import read_feeder
 
 LIMIT = 1e-6

@@ -17,8 +17,8 @@ from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
 from plant.dynamics.phasors import PHASES, aligned_sum
-from plant.dynamics.reduce_network import reduce_network
-from plant.dynamics.reduced import Complex, Real, Reduced
+from plant.dynamics.reduction.reduce_network import reduce_network
+from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.kernel.second_order_step import FeedForward
 from plant.dynamics.phasors import aligned_sum
-from plant.dynamics.reduced import Complex, Real
+from plant.dynamics.reduction.reduced import Complex, Real
 from plant.equipment import F_NOM
-from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.plant_config import Method
 
 

@@ -8,8 +8,8 @@ from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.solve import solve_network
-from plant.dynamics.reduce_network import Reduction, reduce_network
-from plant.dynamics.reduced import Complex, Real, Reduced
+from plant.dynamics.reduction.reduce_network import Reduction, reduce_network
+from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""

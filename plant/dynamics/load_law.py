@@ -1,7 +1,7 @@
 r"""The currents that load branches draw, and their tangent.
 
 A branch has a constant power S and a constant current I_0, :math:`I = (S / V)^* + I_0 V / |V|`; or, for loads of
-feeders that come from other programs, the law of `plant.imported_equipment.LoadPart`.
+feeders that come from other programs, the law of `plant.equipment.imported_equipment.LoadPart`.
 
 References
 ----------

@@ -17,7 +17,7 @@ from plant.dynamics.kernel.second_order_step import Slopes, run_second_order_ste
 from plant.dynamics.kernel.step import FAILURES, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
-from plant.dynamics.reduced import Complex, Real
+from plant.dynamics.reduction.reduced import Complex, Real
 from plant.plant_config import Method
 
 

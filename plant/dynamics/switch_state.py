@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.reduced import Complex, Real, Reduced
+from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
 
 class SwitchState:

@@ -14,7 +14,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from plant.gridlabd_import.gridlabd_process import messages
+from plant.imports.gridlabd.gridlabd_process import messages
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 

@@ -7,12 +7,12 @@ from collections import Counter
 from pathlib import Path
 
 from plant.equipment import Feeder, Regulator
+from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder import Plant
 from plant.gridlabd.glm import START, read_table, write_glm
 from plant.gridlabd.glm_network import TableRow, network_blocks
 from plant.gridlabd.impedance import with_impedances
 from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
-from plant.inverter_parameters import GfmParameters
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
+from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.glm_inverters import inverter_blocks
 from plant.gridlabd.glm_network import network_blocks
-from plant.own_parameters import InverterParameters
 
 START = "2000-01-01 00:00:00"
 """GridLAB-D's clock at the start; delta mode begins one second later."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import pi
 
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.glm_network import F_NOM, TableRow, block
-from plant.inverter_parameters import GflParameters, GfmParameters
-from plant.own_parameters import InverterParameters
 
 
 def inverter_blocks(

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.equipment.inverter_parameters import GflParameters
 from plant.feeder import Plant
 from plant.feeder.plant import Reading
 from plant.feeder.protection import Relays
@@ -18,7 +19,6 @@ from plant.feeder.set_points import SetPointLimits
 from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.gridlabd.glm import write_glm
 from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
-from plant.inverter_parameters import GflParameters
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent

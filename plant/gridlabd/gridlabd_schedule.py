@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from plant.dynamics.switch_state import SwitchState
+from plant.equipment.inverter_parameters import GflParameters
+from plant.equipment.own_parameters import InverterParameters
 from plant.feeder.circuits import Circuits
 from plant.feeder.islands import Islands
 from plant.feeder.switchboard import Switchboard
-from plant.inverter_parameters import GflParameters
 from plant.network import Network
-from plant.own_parameters import InverterParameters
 from plant.plant_config import PlantSettings, PowerLimit
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from plant.equipment import Feeder
+from plant.equipment.inverter_parameters import GfmParameters
 from plant.gridlabd.glm_network import F_NOM
-from plant.inverter_parameters import GfmParameters
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""

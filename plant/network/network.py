@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from plant.dynamics.load_law import LoadLaw
 from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
-from plant.imported_equipment import LoadPart
+from plant.equipment.imported_equipment import LoadPart
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance

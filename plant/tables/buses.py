@@ -7,8 +7,8 @@ from math import sqrt
 from pathlib import Path
 from typing import Any
 
-from plant.connectivity import Connectivity, Node, by_bus
 from plant.equipment import PHASES, Bus, Feeder
+from plant.equipment.connectivity import Connectivity, Node, by_bus
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import BusColumns, ImportedBusColumns
 from wire.schema.suggestion import suggestion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from plant.equipment import Feeder, InverterRow
-from plant.own_parameters import OwnParameters
+from plant.equipment.own_parameters import OwnParameters
 from plant.plant_config import FeederChanges
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.equipment import Bus
-from plant.imported_equipment import LinearElement, LoadPart
+from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import ElementColumns, LoadPartColumns

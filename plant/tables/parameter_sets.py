@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from plant.own_parameters import InverterParameters, OwnParameters, foreign
+from plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign
 from plant.tables.csv_table import CsvTable
 from plant.tables.feeder_columns import ParameterColumns
 from wire.schema.relations import contradictions

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
-from plant.own_parameters import OwnParameters, foreign
+from plant.equipment.own_parameters import OwnParameters, foreign
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import (

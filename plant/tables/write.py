@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder, LineConfig
-from plant.own_parameters import OwnParameters
+from plant.equipment.own_parameters import OwnParameters
 from plant.tables import feeder_columns as columns
 from plant.tables.parameter_sets import FILE
 from wire.schema.table_schema import fields_of

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from agents.agent_config import Control, Gains
 from agents.topology import adjacency
 from plant.equipment import F_NOM, Feeder, InverterRow
-from plant.inverter_parameters import GflParameters, GfmParameters
-from plant.own_parameters import InverterParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.own_parameters import InverterParameters
 from scenarios.results.history import Flags, Floats
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import inverters_of, without_agent

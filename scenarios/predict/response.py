@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
-from plant.inverter_parameters import GfmParameters
+from plant.equipment.inverter_parameters import GfmParameters
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.results.history import Floats
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from plant.equipment import Feeder, InverterRow
-from plant.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given
+from plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given
 from plant.trip_settings import DEFAULTS, defaults
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from plant.equipment import Feeder
+from plant.equipment.inverter_parameters import GfmParameters
+from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
-from plant.inverter_parameters import GfmParameters
-from plant.own_parameters import InverterParameters
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.supply import supply_states

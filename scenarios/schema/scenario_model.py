@@ -12,9 +12,9 @@ import msgspec
 
 from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
-from plant.inverter_parameters import GflParameters, GfmParameters
-from plant.own_parameters import OwnParameters
 from plant.plant_config import Method, Protection, Simulator, SyncCheck
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Divides, MultipleOf

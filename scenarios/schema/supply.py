@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
-from plant.connectivity import Connectivity, Node
 from plant.equipment import Feeder
+from plant.equipment.connectivity import Connectivity, Node
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import Event, ScenarioModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 from plant.equipment import Feeder
-from plant.inverter_parameters import GfmParameters
-from plant.own_parameters import InverterParameters, given
+from plant.equipment.inverter_parameters import GfmParameters
+from plant.equipment.own_parameters import InverterParameters, given
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from wire.schema.relations import MultipleOf

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 import plant.data
 from plant.equipment import Feeder, InverterRow
-from plant.opendss import read_opendss
+from plant.imports.opendss import read_opendss
 from plant.tables.write import write_feeder
 
 SCRIPT = Path(__file__).parent / "ieee34.dss"

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.load_law import LoadLaw
-from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 
 H = 0.002
 """Step (s)."""

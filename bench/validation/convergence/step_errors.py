@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from bench.validation.convergence.dae_dynamics import reference_plant
-from plant.dynamics.blas import one_thread
+from plant.dynamics.reduction.blas import one_thread
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import Method, PlantConfig, SwitchEvent

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.plant_config import PlantConfig, SwitchEvent
 
 ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)

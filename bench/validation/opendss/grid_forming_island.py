@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bench.validation.opendss.write_opendss import LIMITS, write_opendss
 from plant.equipment import Bus, Feeder, InverterRow, Source
-from plant.imported_equipment import LinearElement
+from plant.equipment.imported_equipment import LinearElement
 
 BUS, EMF = "gfm", "emf"
 """Bus of the storage, and behind its impedance."""

@@ -81,7 +81,7 @@ def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = Non
 
     Example:  gridpeers feeder check microgrid123
     """
-    from plant.connectivity import Connectivity
+    from plant.equipment.connectivity import Connectivity
 
     tables = _read(feeder, switch, leave_out)
     _describe(tables)

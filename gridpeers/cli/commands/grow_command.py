@@ -64,7 +64,7 @@ def grow(
     Example:  gridpeers feeder grow microgrid123 --copies 11 --joint 450 --switch 13-152 --out hundred
     """
     from gridpeers.feeder import Feeder
-    from plant.joined_copies import copy_name, joined_copies
+    from plant.equipment.joined_copies import copy_name, joined_copies
     from plant.tables import FeederError
     from scenarios.results.run_files import refusal, shown
     from wire.schema.suggestion import suggestion

@@ -112,7 +112,7 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
     units
         `Units`.
     net
-        A `plant.dynamics.reduced.Reduced`.
+        A `plant.dynamics.reduction.reduced.Reduced`.
     theta
         Room for a number an inverter.
     rotation

@@ -1,4 +1,4 @@
-"""The law of `plant.imported_equipment.LoadPart`, compiled: power as any power of the voltage, within limits."""
+"""The law of `plant.equipment.imported_equipment.LoadPart`, compiled: any power of the voltage, within limits."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def solve_together(
     Parameters
     ----------
     net
-        A `plant.dynamics.reduced.Reduced`.
+        A `plant.dynamics.reduction.reduced.Reduced`.
     units
         `Units` whose states at the start of the step are the present ones.
     forward
@@ -195,7 +195,7 @@ def run_second_order_steps(
     tolerance
         Of the network solution (V).
     net
-        A `plant.dynamics.reduced.Reduced`.
+        A `plant.dynamics.reduction.reduced.Reduced`.
     units
         A `plant.dynamics.kernel.controller_pass.Units`.
     present

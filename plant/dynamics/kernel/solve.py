@@ -1,4 +1,4 @@
-"""The network solution of the inner loop, compiled: see `plant.dynamics.reduction` for the equations."""
+"""The network solution of the inner loop, compiled: see `plant.dynamics.reduction.reduction` for the equations."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def solve_network(
     Parameters
     ----------
     net
-        A `plant.dynamics.reduced.Reduced`.
+        A `plant.dynamics.reduction.reduced.Reduced`.
     J
         Injections, n_inv x 3 (A).
     rotation

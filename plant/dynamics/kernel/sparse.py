@@ -108,7 +108,7 @@ def draw_remainders(
     I_b
         Currents of the branches (A) at x.
     i_c, A, B
-        The tangent; see `plant.dynamics.reduced.Reduced`.
+        The tangent; see `plant.dynamics.reduction.reduced.Reduced`.
     x
         [Re V_b; Im V_b] of the branches (V).
     right

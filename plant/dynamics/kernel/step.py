@@ -42,7 +42,7 @@ def run_steps(
     tolerance
         Of the network solution (V).
     net
-        A `plant.dynamics.reduced.Reduced`.
+        A `plant.dynamics.reduction.reduced.Reduced`.
     units
         A `plant.dynamics.kernel.controller_pass.Units`.
     x

@@ -12,8 +12,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from plant.connectivity import Connectivity
 from plant.equipment import Feeder, Switch
+from plant.equipment.connectivity import Connectivity
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""

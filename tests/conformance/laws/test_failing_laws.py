@@ -30,14 +30,15 @@ BAD = "tests.conformance.laws.bad_laws"
     ("sends an array", r"step at t = 1.2 s returned SetPoints.*, which raised ValueError: The truth value of an.*"),
     ("shares nothing", r"step at t = 1.2 s shares None; share at most 16 numbers by name"),
     ("shares an array", r"step at t = 1.2 s shares array\(\[1., 2.\]\); share at most 16 numbers by name"),
-    ("hangs in spite of all", r"step at t = 1.2 s took longer than time_limit_s = 0.05 s"),
-    ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.05 s"),
+    ("hangs in spite of all", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
+    ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
     ("shares too much", r"step at t = 1.2 s shares .*; share at most 16 numbers by name"),
     ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
 ])  # fmt: skip
 def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
     """Whatever a step does: one line of every agent in events.csv, primary droop from then on, a history to the end."""
-    result = written({"use": f"{BAD}:Failing", "how": how, "time_limit_s": 0.05})
+    limit = {"time_limit_s": 0.3} if how.startswith("hangs") else {}  # the default is out of a starved machine's reach
+    result = written({"use": f"{BAD}:Failing", "how": how, **limit})
     told = result.events[result.events["kind"] == "law"]
 
     assert list(told["subject"]) == [f"inv{i}" for i in range(1, 10)]

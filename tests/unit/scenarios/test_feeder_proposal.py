@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from plant.equipment import Bus, Feeder, Source, Switch
-from plant.imported_equipment import LinearElement, LoadPart
+from plant.equipment.imported_equipment import LinearElement, LoadPart
 from scenarios.feeder_proposal import NoProposalError, NoSwitchError, propose
 from scenarios.results.plots.feeder_diagram import feeder_diagram, places
 

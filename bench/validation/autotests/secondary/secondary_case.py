@@ -7,7 +7,7 @@ controller at bus 150 restores the frequency through two machines and two invert
 from __future__ import annotations
 
 from bench.validation.autotests.secondary.machines import MACHINES
-from plant.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 
 H = 1e-3
 """Step (s)."""

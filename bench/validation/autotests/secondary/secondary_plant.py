@@ -31,9 +31,9 @@ from bench.validation.autotests.secondary.secondary_gridlabd import INJECTION, N
 from bench.validation.autotests.secondary.secondary_law import Participant, SecondaryControl
 from plant.dynamics import Inverter
 from plant.equipment import InverterRow
+from plant.equipment.imported_equipment import LinearElement
 from plant.feeder.circuits import circuit_of
 from plant.gridlabd.impedance import with_impedances
-from plant.imported_equipment import LinearElement
 from plant.network import Network
 from plant.tables import read_feeder
 

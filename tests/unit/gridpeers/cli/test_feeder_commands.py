@@ -9,7 +9,7 @@ import pytest
 
 from plant.tables import read_feeder
 from tests.command_line import invoke
-from tests.unit.plant.gridlabd_import.glm_models import LOADS
+from tests.unit.plant.imports.gridlabd.glm_models import LOADS
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
 pytest.importorskip("gridlabd", reason="GridLAB-D is not installed")

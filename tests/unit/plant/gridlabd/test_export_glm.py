@@ -11,10 +11,10 @@ import pytest
 from msgspec.structs import replace
 
 from plant.equipment import Feeder, Load
+from plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from plant.feeder import Plant
 from plant.gridlabd.export_glm import export_glm
 from plant.gridlabd.impedance import with_impedances
-from plant.inverter_parameters import REGFM_A1, GfmParameters
 from plant.network import Network, solve_power_flow
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError, read_feeder

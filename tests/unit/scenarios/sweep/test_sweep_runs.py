@@ -21,7 +21,7 @@ from scipy.stats import binomtest
 from plant.build import build_plant
 from plant.dynamics import Circuit
 from plant.dynamics.live_network import LiveNetwork
-from plant.dynamics.reduction import DenseReduction
+from plant.dynamics.reduction.reduction import DenseReduction
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError

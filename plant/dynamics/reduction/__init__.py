@@ -1,0 +1,1 @@
+"""The network as seen from loads and terminals, in dense and in sparse form."""

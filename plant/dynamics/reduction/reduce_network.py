@@ -1,0 +1,23 @@
+"""The form in which a switch state is solved: dense matrices for a small network, sparse factors for a large one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.reduction.reduced import Complex
+from plant.dynamics.reduction.reduction import DenseReduction
+from plant.dynamics.reduction.sparse_reduction import SparseReduction
+
+Reduction = DenseReduction | SparseReduction
+
+MOST_DENSE = 300
+"""Load branches up to which dense matrices are faster: their cost grows with the square of it."""
+
+
+def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
+    """Return a switch state as it is solved; arguments as for `plant.dynamics.switch_state.SwitchState`."""
+    if circuit.loads.S.size > MOST_DENSE:
+        return SparseReduction(circuit, y_f, forming, online)
+    return DenseReduction(circuit, y_f, forming, online)

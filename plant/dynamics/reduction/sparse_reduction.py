@@ -1,0 +1,180 @@
+"""A switch state of a large network: its admittances stay sparse, and are factored with the loads' tangent."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU, splu
+
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.island_newton import TOLERANCE, solve_island
+from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
+from plant.dynamics.kernel.sparse import SparseMaps
+from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
+from plant.dynamics.reduction.elimination import eliminated
+from plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from plant.dynamics.switch_state import SwitchState
+
+
+class SparseReduction(SwitchState):
+    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers.
+
+    Parameters
+    ----------
+    circuit, y_f, forming, online
+        As for `SwitchState`.
+    """
+
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+        super().__init__(circuit, y_f, forming, online)
+        rows, by_node = self.Y[self.unknown], self.C.tocsr()
+        self._whole, Y_S, C = rows[:, self.unknown], rows[:, circuit.sources], by_node[self.unknown]
+        needed = (np.diff(C.indptr) > 0) | (np.diff(Y_S.indptr) > 0)
+        at = self.place[circuit.terminals]
+        needed[at[at >= 0]] = True
+        kept, Y = eliminated(self._whole, needed)
+        order = elimination_order(Y, C[kept].tocsc())
+        kept, self._Y = kept[order], Y[order][:, order].tocsc()
+        self._label = self.label[self.unknown[kept]]
+        self._Y_S, self._C, self._C_S = Y_S[kept].tocsc(), C[kept].tocsc(), by_node[circuit.sources].tocsc()
+        self._Y_S_whole, self._C_whole = Y_S, C
+        self._pattern = BlockPattern(self._Y, self._C)
+        self._lu: SuperLU | None = None
+        place = np.full(circuit.Y.shape[0], -1, np.int64)
+        place[self.unknown[kept]] = np.arange(kept.size)
+        self._at = place[circuit.terminals]
+        self._feeds = np.zeros(len(circuit.terminals), bool)
+        self._feeds[self.feeding % max(self._feeds.size, 1)] = True
+
+    def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
+        """Return the inner loop's arrays; see `DenseReduction.linearise`."""
+        net = self.at_tangent(V_b, theta)
+        from_sources = self._C_S.T @ source_voltage
+        drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
+        constant = -(self._Y_S @ source_voltage) - self._C @ drawn
+        pattern, matrix = self._pattern, self._pattern.matrix(net.A, net.B)
+        factorise_blocks(matrix)
+        return net._replace(
+            sparse=SparseMaps(
+                factored=matrix,
+                constant=_interleaved(constant),
+                first=pattern.first,
+                second=pattern.second,
+                a_first=pattern.a_first,
+                a_second=pattern.a_second,
+                from_sources=from_sources,
+                terminals=self._at,
+                fixed=self._held_voltages(source_voltage),
+                feeds=self._feeds,
+                scratch=np.empty(4 * constant.size),
+                increments=np.zeros((2, 2 * self._C.shape[1])),
+            ),
+        )
+
+    def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
+        """Return branch voltages by Newton's method; see `DenseReduction.solve_islands`."""
+        V_b, failed = guess.copy(), []
+        from_sources = self._C_S.T @ source_voltage
+        right = self._injected(J, self._at, self._Y.shape[0]) - self._Y_S @ source_voltage
+        nominal = self._node_guess(guess, from_sources)
+        for k in np.flatnonzero(self.live).tolist():
+            nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
+            island = SparseIsland(
+                self._Y[nodes][:, nodes].tocsc(),
+                self._C[nodes][:, own].tocsc(),
+                self.loads.of(own),
+                from_sources[own],
+                right[nodes],
+            )
+            solution = solve_island(island, nominal[nodes]) if nodes.size else np.zeros(0, complex)
+            if solution is None:
+                failed.append(k)
+            else:
+                V_b[own] = self._C[nodes][:, own].T @ solution + from_sources[own]
+        return V_b, tuple(failed)
+
+    def _node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
+        """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
+        A, _ = self.loads.tangent(V_b)
+        Y = (self._Y + self._C @ sp.diags_array(A) @ self._C.T).tocsc()
+        constant = -self._C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
+        return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
+
+    def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
+        """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
+        return self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
+
+    def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
+        """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
+        V = np.zeros(self.circuit.Y.shape[0], complex)
+        if self.unknown.size:
+            if self._lu is None:
+                self._lu = splu(sp.csc_matrix(self._whole))
+            right = self._injected(J, self.place[self.circuit.terminals], self.unknown.size)
+            V[self.unknown] = self._lu.solve(right - self._Y_S_whole @ source_voltage - self._C_whole @ I_b)
+        V[self.circuit.sources] = source_voltage
+        return V
+
+    def _injected(self, J: Complex, at: NDArray[np.int64], size: int) -> Complex:
+        """Currents (A) that the inverters inject at these positions into so many nodes."""
+        right = np.zeros(size, complex)
+        feeding = (at >= 0) & self._feeds[:, None]
+        np.add.at(right, at[feeding], J[feeding])
+        return right
+
+    def _held_voltages(self, source_voltage: Complex) -> Complex:
+        """Voltages (V) of the terminals that a source holds; 0 elsewhere."""
+        V = np.zeros(self.circuit.Y.shape[0], complex)
+        V[self.circuit.sources] = source_voltage
+        return np.asarray(V[self.circuit.terminals].reshape(-1, 3))
+
+
+class SparseIsland:
+    r"""An island by its node voltages, :math:`F(V) = Y V + C I_b(C^T V + c) - J`.
+
+    Parameters
+    ----------
+    Y
+        Admittances between its unknown nodes (S).
+    C
+        Incidence of its load branches.
+    loads
+        What they draw.
+    from_sources
+        What sources contribute to the branches' voltages, c (V).
+    right
+        Currents (A) into the nodes, J: of inverters, and from sources.
+    """
+
+    def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
+        self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
+        self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
+        self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
+        self._scale = np.abs(Y.diagonal()) * self.V_nom
+        self._pattern = BlockPattern(Y, C)
+
+    def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
+        """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
+        drawn = self._loads.currents(self._C.T @ V + self._c)
+        F = self._Y @ V + part * (self._C @ drawn) - self._right
+        return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
+
+    def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
+        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
+        A, B = self._loads.tangent(self._C.T @ V + self._c)
+        matrix = self._pattern.matrix(part * A, part * B)
+        # without load the determinant is that of a complex matrix, squared in magnitude: positive
+        positive = factorise_blocks(matrix)
+        step = _interleaved(-F)
+        solve_blocks(matrix, step)
+        dV = step.view(complex)
+        if not np.isfinite(dV).all():  # it is singular
+            return None
+        ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
+        return dV, not ended or positive
+
+
+def _interleaved(V: Complex) -> Real:
+    return np.ascontiguousarray(V, complex).view(float)

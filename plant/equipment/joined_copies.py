@@ -1,0 +1,131 @@
+"""A larger feeder from copies of one: for studies of scale. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from plant.equipment import Feeder, Line, Switch
+from plant.equipment.imported_equipment import LinearElement
+from wire.bounds import MOST
+
+TIE_LENGTH = 0.3
+"""Length (km) of the line of a tie."""
+
+AnyFeeder = TypeVar("AnyFeeder", bound=Feeder)
+Row = TypeVar("Row", bound=msgspec.Struct)
+
+_REFERENCES = ("bus", "from_bus", "to_bus")
+"""Fields of equipment that name a bus."""
+
+_NAMES = ("name", "alias", "microgrid", "zone")
+"""Fields whose names differ from copy to copy."""
+
+
+def copy_name(name: str, k: int) -> str:
+    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names.
+
+    Examples
+    --------
+    >>> copy_name("inv1", 1), copy_name("inv1", 3)
+    ('inv1', 'inv1_3')
+    """
+    return name if k == 1 or not name else f"{name}_{k}"
+
+
+def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
+    """Return copies of a feeder at one substation, joined in a chain by ties between their buses `joint`.
+
+    All copies hang on the first one's substation by closed switches. A tie is a closed switch and a line, so the copies
+    remain one network when each is cut off the substation. Spare inverters are left out.
+
+    Parameters
+    ----------
+    feeder
+        A feeder with a substation.
+    copies
+        How many, at least 1.
+    joint
+        A bus with phases A, B and C.
+
+    Raises
+    ------
+    ValueError
+        If the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
+    """
+    bus = next((each for each in feeder.buses if each.name == joint), None)
+    if feeder.source is None:
+        raise ValueError(f'feeder "{feeder.name}" has no substation for its copies to share')
+    most = MOST // max(len(feeder.inverters), 1)
+    if not 1 <= copies <= most:
+        raise ValueError(f"copies: must be from 1 to {most}, as a run has at most {MOST} inverters; got {copies}")
+    if bus is None or not set("ABC") <= set(bus.phases):
+        raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
+    fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")
+    rows = {name: [row for k in range(1, copies + 1) for row in _copied(getattr(feeder, name), k)] for name in fields}
+    elements = [element for k in range(1, copies + 1) for element in _copied_elements(feeder, k)]
+    parts = [part for k in range(1, copies + 1) for part in _copied(feeder.load_parts, k)]
+    source = feeder.source.bus
+    width = max(each.x for each in feeder.buses) - min(each.x for each in feeder.buses)
+    rows["buses"] = [
+        replace(row, x=row.x + 1.1 * width * (i // len(feeder.buses))) for i, row in enumerate(rows["buses"])
+    ]
+    for k in range(2, copies + 1):
+        rows["switches"].append(_tie_switch(source, copy_name(source, k), f"substation_{k}"))
+        here, there, between = copy_name(joint, k - 1), copy_name(joint, k), f"tie_{k}"
+        place = next(row for row in rows["buses"] if row.name == here)
+        rows["buses"].append(replace(place, name=between, phases="ABC"))
+        rows["switches"].append(_tie_switch(here, between, between))
+        if feeder.lines:
+            rows["lines"].append(_tie_line(feeder, between, there))
+        else:
+            elements.append(_tie_element(feeder, bus.V_nom, between, there))
+    return replace(
+        feeder,
+        name=f"{feeder.name}_x{copies}",
+        **{name: tuple(value) for name, value in rows.items()},
+        elements=tuple(elements),
+        load_parts=tuple(parts),
+        spares=(),
+    )
+
+
+def _copied(rows: tuple[Row, ...], k: int) -> Iterator[Row]:
+    """Yield the rows with the names of copy k; loads of another program keep theirs, which nothing refers to."""
+    for row in rows:
+        fields = row.__struct_fields__
+        changed = {name: copy_name(getattr(row, name), k) for name in (*_REFERENCES, *_NAMES) if name in fields}
+        if isinstance(row, Switch):
+            changed["name"] = f"{changed['from_bus']}-{changed['to_bus']}"
+        yield replace(row, **changed)
+
+
+def _copied_elements(feeder: Feeder, k: int) -> Iterator[LinearElement]:
+    for element in feeder.elements:
+        nodes = tuple((copy_name(bus, k), phase) for bus, phase in element.nodes)
+        yield replace(element, name=copy_name(element.name, k), nodes=nodes)
+
+
+def _tie_switch(one: str, other: str, alias: str) -> Switch:
+    return Switch(name=f"{one}-{other}", alias=alias, from_bus=one, to_bus=other, phases="ABC", closed=True)
+
+
+def _tie_line(feeder: Feeder, one: str, other: str) -> Line:
+    """Return a line as the first of three phases."""
+    kind = next(line for line in feeder.lines if line.phases == "ABC")
+    return Line(name=one, from_bus=one, to_bus=other, phases="ABC", config=kind.config, length=TIE_LENGTH)
+
+
+def _tie_element(feeder: Feeder, V_nom: float, one: str, other: str) -> LinearElement:
+    """Return a line as the first of three phases at this voltage."""
+    voltages = {bus.name: bus.V_nom for bus in feeder.buses}
+    for element in feeder.elements:
+        buses = [bus for bus, _ in element.nodes]
+        phases = [phase for _, phase in element.nodes]
+        if phases == ["A", "B", "C"] * 2 and all(abs(voltages[bus] / V_nom - 1.0) < 0.1 for bus in buses):
+            nodes = tuple((bus, phase) for bus in (one, other) for phase in "ABC")
+            return LinearElement(name=f"line.{one}", nodes=nodes, Y=element.Y)
+    raise ValueError("the feeder has no three-phase line that a tie could be like")

@@ -1,0 +1,122 @@
+"""The OpenDSS engine (package dss-python): one circuit, read and solved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from plant.imports.opendss.dss_script import DssScript
+from plant.tables.read import FeederError
+
+SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
+"""Solves with controls, which set taps and capacitor steps."""
+
+EXACT = ("set controlmode=off", "set tolerance=1e-11", "solve")
+"""Solves once more, with all that is controlled left where it stands."""
+
+NO_INVERSE = "Matrix Inversion Error"
+"""In the engine's message on an element without impedance."""
+
+MOST = 50
+"""How many problems are told."""
+
+FEW = 3
+"""How many are told of a script that makes no circuit."""
+
+SNAPSHOT = 0
+
+
+class DssEngine:
+    """One circuit in an engine of its own.
+
+    Attributes
+    ----------
+    circuit : dss.ICircuit
+        The engine's active circuit.
+    notes : list of str
+        What was not done as the script says.
+    """
+
+    def __init__(self) -> None:
+        try:
+            from dss import DSS
+        except ImportError:
+            raise FeederError(
+                "OpenDSS",
+                ("reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'",),
+            ) from None
+        engine = DSS.NewContext()
+        engine.AllowForms = engine.AllowEditor = engine.AllowChangeDir = False
+        engine.Error.ExtendedErrors = True
+        self._engine: Any = engine
+        self.notes: list[str] = []
+
+    @property
+    def circuit(self) -> Any:
+        """The circuit that was read last."""
+        return self._engine.ActiveCircuit
+
+    def read(self, path: Path, scratch: Path | None = None) -> list[str]:
+        """Run a script and solve its circuit; return all problems, each with its file and line.
+
+        Parameters
+        ----------
+        path
+            The script.
+        scratch
+            Folder that takes what the engine writes by itself (traces of controls); else the working folder.
+        """
+        if not path.is_file():
+            return [f"{path}: there is no such file"]
+        if scratch is not None:
+            self.execute(f'set datapath="{scratch}"')
+        script = DssScript(self.execute, self._may_solve)
+        script.run(path)
+        if not self._engine.NumCircuits:
+            none = f"{path.name}: makes no circuit; a script has a line New Circuit.name"
+            return [*script.problems[:FEW], none]
+        if script.problems:
+            return self._clear(script.problems)
+        for verb, where in script.not_run.items():
+            self.notes.append(f"{where}: {verb} was not run")
+        for command in SETTLE:
+            if message := self.execute(command):
+                return [f"{path.name}: the engine cannot solve the circuit: {message}"]
+        if not self.circuit.Solution.Converged:
+            return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]
+        for command in EXACT:  # may end at rounding instead: not every circuit allows its tolerance
+            self.execute(command)
+        return []
+
+    def _clear(self, problems: list[str]) -> list[str]:
+        """Return each problem once, lines without an impedance by their names, and not thousands of problems."""
+        others = list({problem.partition(" ")[2]: problem for problem in reversed(problems)}.values())[::-1]
+        if any(NO_INVERSE in problem for problem in others):
+            others = [problem for problem in others if NO_INVERSE not in problem]
+            others += [
+                f"line.{name}: it has no length or no impedance; leave it out, or give it some (switch=yes does)"
+                for name in self._lines_without_impedance()
+            ] or problems[:1]
+        more = len(others) - MOST
+        return [*others[:MOST], f"and {more} problems more"] if more > 0 else others
+
+    def _lines_without_impedance(self) -> list[str]:
+        found = []
+        for line in self.circuit.Lines if self.circuit.Lines.Count else ():
+            zero = not any(line.Rmatrix) and not any(line.Xmatrix)
+            if self.circuit.ActiveCktElement.Enabled and (line.Length == 0.0 or zero):
+                found.append(str(line.Name).lower())
+        return found
+
+    def execute(self, command: str) -> str:
+        """Run one command; return the engine's message if it fails."""
+        from dss import DSSException
+
+        try:
+            self._engine.Text.Command = command
+        except DSSException as error:
+            return " ".join(str(error.args[1] if len(error.args) > 1 else error).split())
+        return ""
+
+    def _may_solve(self) -> bool:
+        return bool(self._engine.NumCircuits) and self.circuit.Solution.Mode == SNAPSHOT

@@ -1,0 +1,81 @@
+"""The phase-current limit of grid-forming inverters, `inverter-models.md` section 3.7."""
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from plant.dynamics import PlantError
+from plant.equipment.inverter_parameters import GfmParameters
+from plant.feeder import Plant
+from plant.network import Network
+from plant.plant_config import PlantSettings, Protection, SwitchEvent
+from plant.tables import read_feeder
+from tests.unit.plant.dynamics.circuits import GFM_D, S_B, V_B, Z_B, circuit, loaded, lone
+
+I_B = S_B / (3.0 * V_B)
+
+
+def test_an_overloaded_phase_carries_no_more_than_its_limit_and_the_others_what_they_need() -> None:
+    """With a load of 3 pu on phase A, |I_A| stays below I_max and V_A is what that gives; B and C stay as they are."""
+    dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
+    dynamics.connect(circuit(np.diag([3.0, 0.5, 0.5]).astype(complex) / Z_B, [[0, 1, 2]]))
+
+    out = dynamics.run(1)
+    current, V = np.abs(dynamics.inverters.I[0]) / I_B, np.abs(dynamics.inverters.V[0]) / V_B
+
+    assert 0.5 < current[0] <= 1.2 + 1e-9
+    assert V[0] == pytest.approx(current[0] / 3.0, abs=1e-9)
+    assert current[1:] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert out[0, 0, 6] == 1.0
+
+
+def test_the_controller_goes_on_unlimited_once_the_overload_ends() -> None:
+    """The limit leaves no trace in the injection: without overload the next step has full voltage again."""
+    dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
+    dynamics.connect(loaded(3.0))
+    dynamics.run(1)
+    dynamics.connect(loaded(0.5))
+
+    out = dynamics.run(1)
+
+    assert out[0, 0, 6] == 0.0
+    assert out[0, 0, 3] / V_B > 0.9
+
+
+def test_a_limit_that_does_not_act_changes_no_number() -> None:
+    """The same bytes with 2 pu and with 1000 pu, through an islanding in which phases reach 1.9 pu."""
+
+    def rows(I_max: float) -> tuple[tuple[float, ...], ...]:
+        return islanded(I_max).take_rows()
+
+    assert rows(2.0) == rows(1000.0)
+
+
+def islanded(I_max: float) -> Plant:
+    """Microgrid123 0.1 s after islanding."""
+    settings = PlantSettings(
+        gfm=GfmParameters(I_max=I_max),
+        protection=Protection(category="off"),
+        events=(SwitchEvent(t=0.02, switch="13-152", action="open"),),
+    )
+    plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.002)
+    for _ in range(6):
+        plant.advance()
+    return plant
+
+
+def test_limiting_is_an_event_once_a_spell() -> None:
+    """An inverter that limits in many steps says so once, with its limit."""
+    events = [event for event in islanded(1.7).take_events() if event.kind == "limit"]
+
+    assert events
+    assert len({event.subject for event in events}) == len(events)
+    assert events[0].text == f"{events[0].subject} limits its phase currents to 1.7 pu"
+
+
+def test_a_start_beyond_the_limit_is_refused() -> None:
+    """At rest no phase may be beyond its limit; the error says the currents and what to change."""
+    settings = PlantSettings(gfm=GfmParameters(I_max=0.6))
+
+    with pytest.raises(PlantError, match=r"inv1 would have to carry \d+(\.\d+)? A in a phase, .*I_max_pu"):
+        Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

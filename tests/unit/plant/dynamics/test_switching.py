@@ -1,0 +1,204 @@
+"""Small circuits around a switching: what the inverters are an instant later."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from plant.dynamics import Circuit, Dynamics
+from plant.dynamics.inverters import Inverters
+from plant.dynamics.load_law import LoadLaw
+from tests.unit.plant.dynamics.circuits import (
+    BALANCED,
+    GFL_D,
+    GFM_D,
+    S_B,
+    V_B,
+    at_rest,
+    loaded,
+    lone,
+    on_stiff_bus,
+    pair,
+)
+
+OMEGA_0 = 2.0 * np.pi * 60.0
+"""Nominal speed (rad/s)."""
+
+
+def constant_power(p: float) -> Circuit:
+    """One terminal with a constant-power load of p (pu)."""
+    return replace(
+        loaded(0.05),
+        C=sp.csc_array(np.eye(3)),
+        loads=LoadLaw(S=np.full(3, p * S_B / 3.0 + 0j), I0=np.zeros(3, complex)),
+        V_branch=(V_B * BALANCED).astype(complex),
+    )
+
+
+def currents(units: Inverters, i: int) -> float:
+    """Largest phase current (pu) with the present injections and voltages."""
+    I_b = units.S_b[i] / (3.0 * units.V_b[i])
+    return float(np.abs(units.J[i] - units.y_f[i] * units.V[i]).max() / I_b)
+
+
+def test_going_on_with_the_same_network_changes_nothing() -> None:
+    """However far an island has turned, its branch voltages are known, and the solution is found where it was."""
+    circuit = constant_power(0.4)
+    plant = at_rest(circuit, GFM_D, h=0.002)
+    plant.inverters.set_points[0, 0] += 0.2
+    plant.run(3000)
+    before, noted = plant.inverters.V.copy(), plant.network.V_branch.copy()
+
+    plant.connect(circuit)
+
+    one_step = 0.2 * 0.01 * OMEGA_0 * plant.h
+    assert abs(np.angle(before[0, 0])) > 100 * one_step
+    np.testing.assert_allclose(noted, before[0], rtol=1.1 * one_step)  # the branches are at the terminal
+    np.testing.assert_allclose(plant.inverters.V, before, rtol=1.1 * one_step)
+    np.testing.assert_allclose(np.abs(plant.inverters.V), np.abs(before), rtol=1e-9)
+
+
+def test_a_gfm_alone_starts_a_dead_island_at_its_set_point() -> None:
+    """Taken off, it leaves 0 V behind; put back where there is no voltage, it holds nominal voltage at angle 0."""
+    plant = lone(GFM_D, 0.3)
+    plant.run(100)
+    plant.switch_inverter(0, on=False)
+    off = plant.inverters.V.copy()
+    plant.switch_inverter(0, on=True)
+
+    units = plant.inverters
+    assert not off.any()
+    assert units.set_points[0].tolist() == [0.0, 1.0, 0.0]
+    assert (units.gfm_state["E"][0], units.gfm_state["theta"][0]) == pytest.approx((1.0, 0.0))
+    assert plant.readings()[0, 1] == pytest.approx(0.3 * S_B, rel=0.05)
+
+
+def test_a_gfm_comes_back_in_step() -> None:
+    """Put back on a live island, a GFM carries no current, turns as the island turns, and would rest there."""
+    plant = pair(GFM_D, GFM_D, 0.4)
+    plant.inverters.set_points[:, 0] = 0.3, 0.1
+    plant.run(200)
+    plant.switch_inverter(1, on=False)
+    plant.run(500)
+    plant.switch_inverter(1, on=True)
+
+    units = plant.inverters
+    w = float(units.gfm_state["w"][0])
+    assert abs(w) > 0.1
+    assert units.gfm_state["w"].tolist() == [w, w]
+    assert units.set_points[1, 0] == pytest.approx(w / (0.01 * OMEGA_0))
+    assert currents(units, 1) < 1e-9
+
+
+def test_a_gfl_comes_back_at_no_current() -> None:
+    """Put back on a live bus, a GFL carries no current and its set-points keep it so."""
+    plant = on_stiff_bus(GFL_D)
+    plant.inverters.set_points[0, 0] = 0.3
+    plant.run(1000)
+    plant.switch_inverter(0, on=False)
+    plant.switch_inverter(0, on=True)
+
+    assert currents(plant.inverters, 0) < 1e-9
+    assert plant.inverters.set_points[0] == pytest.approx([0.0, 1.0, 0.0])
+    assert np.abs(plant.run(1000)[:, 0, 1]).max() < 1e-6 * S_B
+
+
+def test_switching_what_is_so_already_changes_nothing() -> None:
+    """Connecting a connected inverter leaves its set-points and its injections alone."""
+    plant = lone(GFM_D, 0.3)
+    before = plant.inverters.set_points.copy(), plant.inverters.J.copy()
+
+    plant.switch_inverter(0, on=True)
+
+    assert np.array_equal(plant.inverters.set_points, before[0])
+    assert np.array_equal(plant.inverters.J, before[1])
+
+
+def test_a_network_is_factored_once_for_the_same_inverters() -> None:
+    """What was factored ahead is used at the switching, unless other inverters are connected by then."""
+    plant = pair(GFM_D, GFM_D, 0.4)
+    circuit = plant.network.circuit
+    ahead = plant.network.reduced(circuit)
+
+    plant.connect(circuit)
+    same = plant.network.reduction is ahead
+    plant.switch_inverter(1, on=False)
+
+    assert same
+    assert plant.network.reduction is not ahead
+    assert plant.network.reduction.online.tolist() == [True, False]
+
+
+def test_an_island_without_solution_is_de_energised() -> None:
+    """A load of twenty times the rating trips the inverter; the plant goes on with a dead island, not with an error."""
+    plant: Dynamics = lone(GFM_D, 0.3)
+    dead_weight = constant_power(20.0)
+    plant.network.V_branch = dead_weight.V_branch.copy()
+
+    plant.connect(dead_weight)
+
+    (trip,) = plant.take_trips()
+    assert (trip.inverters, trip.substation, plant.take_trips()) == ((0,), False, [])
+    assert not plant.inverters.connected.any()
+    assert plant.run(5)[:, 0, :4].tolist() == [[0.0] * 4] * 5  # a dead terminal has no frequency
+
+
+def test_a_tripped_inverter_comes_back_when_the_load_is_gone() -> None:
+    """Connected again with a load that it can feed (0.4 and 0.05 pu), a tripped GFM starts the dead island."""
+    plant: Dynamics = lone(GFM_D, 0.3)
+    plant.network.V_branch = constant_power(20.0).V_branch.copy()
+    plant.connect(constant_power(20.0))
+    plant.connect(constant_power(0.4))
+    plant.switch_inverter(0, on=True)
+
+    assert plant.take_trips()[0].inverters == (0,)
+    assert plant.run(500)[-1, 0, 1] == pytest.approx(0.45 * S_B, rel=1e-4)
+
+
+def test_the_substation_trips_only_where_no_inverter_is_left() -> None:
+    """De-energising a bus that the grid feeds takes its inverter off first; the grid itself only the second time."""
+    plant = on_stiff_bus(GFM_D)
+
+    plant.deenergise([0])
+    still_fed = plant.network.reduction.live.all()
+    plant.deenergise([0])
+
+    first, second = plant.take_trips()
+    assert (first.inverters, first.substation, still_fed) == ((0,), False, True)
+    assert (second.inverters, second.substation) == ((), True)
+    assert not plant.network.reduction.live.any()
+
+
+def test_a_tangent_that_leads_nowhere_is_renewed_in_the_middle_of_a_step() -> None:
+    """With the tangent of far too low a voltage the run takes the same course: no step twice, and none left out."""
+    good, bad = at_rest(constant_power(0.9), GFM_D, h=0.002), at_rest(constant_power(0.9), GFM_D, h=0.002)
+    renewed = 0
+    for plant in (good, bad):
+        plant.inverters.set_points[0, 0] += 0.2
+    want = good.run(50)
+    got = []
+    for _ in range(10):
+        network = bad.network
+        x = network.x.copy()
+        network.net = network.reduction.linearise(
+            0.35 * network.V_branch, network.circuit.source_voltage, bad.inverters.theta()
+        )
+        network.x = x
+        spoilt = network.net
+        got.append(bad.run(5))
+        renewed += network.net is not spoilt
+
+    assert renewed == 10
+    assert bad.take_trips() == []
+    np.testing.assert_allclose(np.concatenate(got), want, rtol=1e-8, atol=1e-6)
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_a_set_point_that_is_no_number_takes_its_island_off(column: int) -> None:
+    """Whatever writes nan into a set-point, no row ever holds a number that is not finite."""
+    plant = pair(GFM_D, GFM_D, 0.4)
+    plant.inverters.set_points[0, column] = np.nan
+
+    assert np.isfinite(plant.run(20)).all()
+    assert {i for trip in plant.take_trips() for i in trip.inverters} == {0, 1}

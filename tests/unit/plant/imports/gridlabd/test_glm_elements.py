@@ -1,0 +1,107 @@
+"""Feeders written for GridLAB-D have its voltages after the import, whatever is in them."""
+
+from pathlib import Path
+
+import pytest
+
+from plant.gridlabd.export_glm import export_glm
+from plant.gridlabd.impedance import with_impedances
+from plant.imports.gridlabd.glm_loads import V_MIN
+from plant.imports.gridlabd.read_glm import read_glm
+from plant.network import Network, solve_power_flow
+from plant.plant_config import PlantSettings
+from plant.tables import read_feeder
+from plant.tables.write import write_feeder
+from tests.unit.plant.imports.gridlabd.glm_models import (
+    LOADS,
+    SWITCHES,
+    TOLERANCE,
+    TRANSFORMERS,
+    largest_difference,
+    write,
+)
+
+pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
+
+
+@pytest.mark.parametrize(("model", "count"), [(TRANSFORMERS, 23), (LOADS, 9), (SWITCHES, 16)])
+def test_voltages_are_gridlabds(tmp_path: Path, model: str, count: int) -> None:
+    """Every voltage is GridLAB-D's within 1e-6 pu."""
+    difference, nodes = largest_difference(write(tmp_path, model))
+
+    assert nodes == count
+    assert difference < TOLERANCE
+
+
+@pytest.mark.parametrize(("name", "leave_out"), [("standard123", ()), ("microgrid123", ("inverter_dyn.*",))])
+def test_our_own_feeder_comes_back(tmp_path: Path, name: str, leave_out: tuple[str, ...]) -> None:
+    """The 123-node feeder of our tables, exported for GridLAB-D and imported, has the voltages of the tables."""
+    own = Network(with_impedances(read_feeder(name)))
+    V = dict(zip(own.nodes, solve_power_flow(own, own.closed0, tolerance=1e-11).V, strict=True))
+    path = write(tmp_path, export_glm(read_feeder(name), PlantSettings(), 1, "voltages.csv"))
+    back = Network(read_glm(path, leave_out=leave_out))
+    solved = solve_power_flow(back, back.closed0, tolerance=1e-11)
+
+    differences = [
+        abs(V[bus[1:], phase] - voltage) / V_nom
+        for (bus, phase), voltage, V_nom in zip(back.nodes, solved.V, back.V_nom, strict=True)
+        if "~" not in bus and bus != "n610"  # behind a delta winding: to ground it has no voltage of its own
+    ]
+    assert len(differences) >= 270
+    assert max(differences) < TOLERANCE
+    assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
+
+
+def test_tables_of_an_import_are_read_again(tmp_path: Path) -> None:
+    """The tables that an import is saved as give the same voltages."""
+    feeder = read_glm(write(tmp_path, TRANSFORMERS))
+    write_feeder(feeder, tmp_path / "tables")
+
+    first, again = (Network(each) for each in (feeder, read_feeder(str(tmp_path / "tables"))))
+
+    assert first.nodes == again.nodes
+    ours, theirs = (solve_power_flow(each, each.closed0).V for each in (first, again))
+    assert abs(ours - theirs).max() < 1e-6
+
+
+def test_constant_power_ends_where_the_voltage_collapses(tmp_path: Path) -> None:
+    """Loads of constant power and current have a limit below their usual voltage; impedances need none."""
+    parts = read_glm(write(tmp_path, LOADS)).load_parts
+
+    assert {part.exponents for part in parts} == {(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)}
+    for part in parts:
+        assert part.V_min <= V_MIN
+        assert (part.V_min > 0.6) == (part.exponents != (2.0, 2.0))
+
+
+def test_switches_are_switches(tmp_path: Path) -> None:
+    """Switches and reclosers open and close here, too; a fuse stays, and a note says so."""
+    feeder = read_glm(write(tmp_path, SWITCHES), switches=["overhead_line.back"])
+
+    assert {switch.alias: switch.closed for switch in feeder.switches} == {
+        "sw": True,
+        "rec": True,
+        "tie": False,
+        "back": True,
+    }
+    assert "fuse.lateral: stays as it is" in feeder.notes
+    network = Network(feeder)
+    names = {switch.alias: switch.name for switch in feeder.switches}
+    solved = solve_power_flow(network, network.closed0 - {names["back"]})
+    assert solved.V[network.index("nf", "B")] == 0.0
+    solved = solve_power_flow(network, network.closed0 - {names["back"]} | {names["tie"]})
+    assert abs(solved.V[network.index("nf", "B")]) > 7000.0
+
+
+def test_a_nominal_voltage_that_is_wrong_is_told_and_mended(tmp_path: Path) -> None:
+    """A bus whose nominal voltage is stated line-to-line has the voltage that GridLAB-D finds there."""
+    path = write(
+        tmp_path,
+        SWITCHES.replace("name ne; phases ABCN; nominal_voltage 7200", "name ne; phases ABCN; nominal_voltage 12470"),
+    )
+
+    feeder = read_glm(path)
+
+    assert any(note.startswith("load.ne: nominal_voltage 12470 V, and 72") for note in feeder.notes)
+    assert next(bus.V_nom for bus in feeder.buses if bus.name == "ne") == pytest.approx(7250.0, rel=0.01)
+    assert sum(feeder.load_by_bus().values()) == pytest.approx(2.9e5)

@@ -1,0 +1,157 @@
+"""What cannot be imported from a model is refused by name, several mistakes at once, each in one line."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from plant.imports.gridlabd.read_glm import read_glm
+from plant.tables.read import FeederError
+from tests.unit.plant.imports.gridlabd.glm_models import CENTRE_TAP, HEAD, LOADS, write
+
+pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
+
+LOAD = "object load { name l1; phases ABCN; parent b; nominal_voltage 7200; constant_power_A 1e4; }\n"
+LINE = "object overhead_line { name NAME; phases ABCN; from FROM; to TO; length LENGTH; configuration uneven; }\n"
+NODE = "object node { name NAME; phases ABCN; nominal_voltage 7200; }\n"
+
+
+def line(name: str, start: str, end: str, length: str = "100") -> str:
+    """An overhead line."""
+    words = {"NAME": name, "FROM": start, "TO": end, "LENGTH": length}
+    text = LINE
+    for key, value in words.items():
+        text = text.replace(key, value)
+    return text
+
+
+def problems(path: Path, **options: list[str]) -> tuple[str, ...]:
+    """What the import says of a model that it refuses."""
+    with pytest.raises(FeederError) as refused:
+        read_glm(path, **options)
+    assert all("\n" not in problem for problem in refused.value.problems)
+    return refused.value.problems
+
+
+ONE_LINE = {
+    "no module": ("object node { name a; }\n", "feeder.glm:1: class 'node' is not known"),
+    "nothing of a feeder": ("module tape;\n", "feeder.glm: does not load GridLAB-D's powerflow"),
+    "an unknown class": (HEAD + "object foo { name v; }\n", "feeder.glm:9: class 'foo' is not known"),
+    "broken syntax": (HEAD + "object load { name l1; phases ABQ; }\n", "feeder.glm:9: "),
+    "an include that is not there": (
+        HEAD + '#include "gone.glm"\n',
+        "feeder.glm:9: gone.glm is included, and cannot be read",
+    ),
+    "a program": (HEAD + "#system rm -rf nothing\n", "feeder.glm:9: #system would run or load a program"),
+    "a script": (HEAD + "script on_init do;\n", "feeder.glm:9: script on_init would run or load a program"),
+    "no substation": (HEAD.replace("bustype SWING;", ""), "NR: no swing bus found"),
+    "two substations": (
+        HEAD + NODE.replace("NAME", "s2").replace("phases", "bustype SWING; phases") + line("l2", "b", "s2"),
+        "feeder.glm:9: node.s2: a second source; make its bustype PQ",
+    ),
+    "a substation of one phase": (
+        HEAD.split("object line_configuration")[0].replace("ABCN", "AN")
+        + "object load { name l1; phases AN; parent sub; nominal_voltage 7200; constant_power_A 1e4; }\n",
+        "node.sub: a source has phases A, B and C",
+    ),
+    "a house": (
+        "module residential { implicit_enduses NONE; }\n"
+        + HEAD
+        + CENTRE_TAP
+        + "object house { name h1; parent tm; }\n",
+        'feeder.glm:24: house.h1: objects of class house are not supported; leave it out (leave_out=["house.h1"])',
+    ),
+    "an inverter": (
+        "module generators;\n"
+        + HEAD
+        + "object inverter_dyn { name i1; parent b; control_mode GRID_FORMING; rated_power 1e5; Pref 1e4; }\n",
+        "feeder.glm:10: inverter_dyn.i1: class inverter_dyn is not taken over; leave it out",
+    ),
+    "an open line": (
+        HEAD
+        + NODE.replace("NAME", "d")
+        + line("l2", "b", "d")
+        + line("l3", "b", "d").replace("phases", "status OPEN; phases"),
+        "feeder.glm:11: overhead_line.l3: status OPEN; leave it out",
+    ),
+    "a line of no length": (HEAD + NODE.replace("NAME", "d") + line("l2", "b", "d", "0"), "zero length"),
+    "no nominal voltage": (
+        HEAD.replace("7200", "nan"),
+        "feeder.glm:8: node.b: nominal_voltage must be above 0 V, got nan V",
+    ),
+    "no solution": (HEAD + LOAD.replace("1e4", "1e9"), "convergence iteration limit reached"),
+}
+
+
+@pytest.mark.parametrize("what", ONE_LINE)
+def test_one_line_says_what_is_refused(tmp_path: Path, what: str) -> None:
+    """Each thing that cannot be represented is named, and nothing is written."""
+    model, told = ONE_LINE[what]
+
+    said = problems(write(tmp_path, model))
+
+    assert told in said[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
+
+
+def test_floating_sections_and_lone_loads_are_named(tmp_path: Path) -> None:
+    """A section without a source is one problem, with its first bus."""
+    model = HEAD + LOAD + NODE.replace("NAME", "d1") + NODE.replace("NAME", "d2") + line("l2", "d1", "d2")
+
+    said = problems(write(tmp_path, model))
+
+    assert any("d1" in problem for problem in said)
+
+
+def test_all_that_is_not_supported_comes_at_once(tmp_path: Path) -> None:
+    """Unsupported objects, wrong patterns, switches and frequency are told together; what is left out is no problem."""
+    model = "module tape;\n" + LOADS + "object player { name p1; parent wye; property constant_power_A; file p.csv; }\n"
+    (tmp_path / "p.csv").write_text("2000-01-01 00:00:00,9e4+1e4j\n")
+    path = write(tmp_path, model)
+
+    with pytest.raises(FeederError) as refused:
+        read_glm(path, f_nom=50.0, leave_out=["house.*"], switches=["nothere"])
+
+    said = refused.value.problems
+    assert len(said) == 4
+    assert any("player.p1: what a player changes in time is not taken over" in problem for problem in said)
+    feeder = read_glm(path, leave_out=["player.*", "load.delta"])
+    assert {part.S for part in feeder.load_parts if part.name == "load.wye"} >= {9e4 + 1e4j}
+    assert all(part.name != "load.delta" for part in feeder.load_parts)
+
+
+def test_what_gridlabd_would_write_is_not_written(tmp_path: Path) -> None:
+    """Recorders and dumps of a model leave nothing in its folder, and assertions do not end it."""
+    write(
+        tmp_path,
+        "module tape;\nmodule assert;\n"
+        + HEAD
+        + LOAD
+        + "object recorder { name r1; parent b; property voltage_A; file out.csv; interval 1; }\n"
+        + "object voltdump { filename volts.csv; }\n"
+        + "object double_assert { parent b; target nominal_voltage; value 1; within 0.1; }\n",
+    )
+
+    feeder = read_glm(tmp_path / "feeder.glm")
+
+    assert len(feeder.load_parts) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    """A missing file and a file of bytes end in few lines."""
+    (missing,) = problems(tmp_path / "missing.glm")
+    assert "there is no such file" in missing
+
+    path = tmp_path / "x.glm"
+    path.write_bytes(bytes(range(256)) * 200)
+    assert len(problems(path)) <= 4
+
+
+def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without GridLAB-D one line says what to install."""
+    monkeypatch.setitem(sys.modules, "gridlabd", None)
+
+    assert problems(write(tmp_path, HEAD + LOAD)) == (
+        "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'",
+    )

@@ -1,0 +1,37 @@
+"""After an import our power flow is held against that of the program that read the feeder."""
+
+from pathlib import Path
+
+import pytest
+
+from plant.imports.import_comparison import difference, loads_without_ground
+from plant.imports.opendss import read_opendss
+from plant.network import Network, solve_power_flow
+from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, write
+
+pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+
+BEHIND = """New Transformer.t phases=3 xhl=4 buses=(b d) conns=(delta CONNECTION) kvs=(12.47 0.48) kvas=(500 500)
+New Load.w bus1=d phases=3 conn=wye kv=0.48 kw=300 pf=1
+"""
+
+
+def test_a_difference_is_found_where_it_is(tmp_path: Path) -> None:
+    """A voltage that is off by a thousandth is found at its node; equal ones do not differ."""
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, "New Load.l bus1=c phases=3 kv=0.48 kw=90 kvar=20"))
+    network = Network(feeder)
+    theirs = dict(zip(network.nodes, solve_power_flow(network, network.closed0).V.tolist(), strict=True))
+
+    assert difference(feeder, theirs)[0] < 1e-9
+    worst, node = difference(feeder, theirs | {("c", "B"): theirs["c", "B"] * 1.001})
+    assert node == ("c", "B")
+    assert worst == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize(("connection", "named"), [("delta", ["load.w"]), ("wye", [])])
+def test_constant_power_without_ground_is_named(tmp_path: Path, connection: str, named: list[str]) -> None:
+    """Behind a delta winding, a wye load of constant power has nothing that holds its voltage to ground."""
+    script = write(tmp_path, LINE, BEHIND.replace("CONNECTION", connection))
+    feeder = read_opendss(script)
+
+    assert loads_without_ground(feeder) == named

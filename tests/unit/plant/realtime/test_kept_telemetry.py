@@ -1,0 +1,207 @@
+"""A recorder that was out of reach gets what it has not got: from the plant's memory, in order, each message once."""
+
+from __future__ import annotations
+
+import random
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from plant.realtime.kept_telemetry import KeptTelemetry
+from scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
+from tests.unit.plant.realtime.test_realtime_plant import KEYS, Lab, running
+from wire.messages import Answer, Command, LinkReport, Message, Telemetry
+
+
+class Link:
+    """The recorder of a plant on a fake clock; what is sent while its link is down is lost."""
+
+    def __init__(self, lab: Lab) -> None:
+        self.lab, self.stream = lab, TelemetryStream()
+        self.up = True
+        self.got: list[Message] = []
+        self._taken = self._questions = 0
+
+    def carry(self) -> None:
+        """Deliver what the plant has sent since, and ask if something is missing."""
+        while True:
+            news = self.lab.sent[self._taken :]
+            self._taken = len(self.lab.sent)
+            for key, message in news if self.up else ():
+                if key == KEYS.answer("me") and isinstance(message, Answer) and message.seq == self._questions:
+                    self.stream.answered(message, self.lab.now)
+                elif key == KEYS.telemetry and isinstance(message, Telemetry | LinkReport):
+                    self.got += self.stream.take(message, self.lab.now)
+            question = self.stream.question(self.lab.now)
+            if question is None:
+                return
+            self._questions += 1
+            if self.up:
+                command = Command(
+                    sender="me",
+                    epoch=1,
+                    seq=self._questions,
+                    t=0.0,
+                    verb="telemetry",
+                    argument=question,
+                    reply_to="me",
+                )
+                self.lab.hear(KEYS.command, command)
+
+    @property
+    def rows(self) -> list[float]:
+        """Times of the rows that came."""
+        return [row[0] for message in self.got if isinstance(message, Telemetry) for row in message.rows]
+
+
+def report(number: int) -> LinkReport:
+    """What an agent's links did."""
+    return LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=str(number).encode())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(seed: int) -> None:
+    """However often and long the link was down, and even if the last word fell into it."""
+    draw = random.Random(seed)
+    lab = running(end=None)
+    link, reports = Link(lab), 0
+    for _ in range(40):
+        link.up = draw.random() < 0.6
+        for _ in range(draw.randrange(1, 60)):
+            lab.step()
+            if draw.random() < 0.1:
+                lab.hear(KEYS.report("inv1"), report(reports))
+                reports += 1
+            link.carry()
+    link.up = True
+    lab.step(200)
+    link.carry()
+    for _ in range(300):
+        lab.step()
+        link.carry()
+    lab.side.close("enough", lab.now)
+    for name in lab.toy.inverters:
+        lab.token(name, gone=True)
+    link.carry()
+
+    assert [m.data for m in link.got if isinstance(m, LinkReport)] == [str(n).encode() for n in range(reports)]
+    assert link.rows == pytest.approx([0.02 * k for k in range(len(link.rows))])
+    last = link.got[-1]
+    assert isinstance(last, Telemetry)
+    assert last.final
+    assert not link.stream.lost
+
+
+def test_what_the_plant_has_no_more_is_a_gap_that_is_known() -> None:
+    """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
+    lab = running(end=None)
+    lab.side.recorder_feed.kept = KeptTelemetry(limit=4_000)
+    link = Link(lab)
+    lab.step(50)
+    link.carry()
+    link.up = False
+    for _ in range(40):
+        lab.step(50)
+        link.carry()
+    link.up = True
+    for _ in range(200):
+        lab.step()
+        link.carry()
+    steps = {round((b - a) / 0.02) for a, b in pairwise(link.rows)}
+
+    assert link.stream.lost
+    assert min(steps) == 1
+    assert len(steps) == 2
+
+
+def test_the_memory_of_the_plant_is_bounded() -> None:
+    """However long it runs and whatever it is asked; what counts to one Telemetry goes together."""
+    kept = KeptTelemetry(limit=1_000)
+    for number in range(5_000):
+        kept.add(number, bytes(10))
+        kept.add(number, bytes(90))
+        if number % 700 == 0:
+            kept.again_from(0)
+        kept.take(3)
+    first = kept.again_from(0)
+
+    assert 4_990 <= first <= 4_991
+    assert len(kept.take_all()) == 2 * (5_000 - first)
+
+
+@pytest.mark.parametrize("argument", ["", "x", "-1", "1" * 30, "٣"])
+def test_a_question_that_makes_no_sense_is_answered_and_changes_nothing(argument: str) -> None:
+    """Somebody else's problem is theirs."""
+    lab = running(end=None)
+    lab.step(50)
+    lab.take(Telemetry)
+    answer = lab.ask("telemetry", argument)
+    lab.step(5)
+
+    assert not answer.ok
+    assert "is no number of a Telemetry" in answer.text
+    assert all(message.seq >= 5 for message in lab.take(Telemetry))
+
+
+def test_a_plant_waits_at_its_end_for_a_recorder_that_is_out_of_reach() -> None:
+    """For a moment only; one that went after the last word has all."""
+    ends: list[Any] = []
+    for lost in (True, False):
+        lab = Lab(end=None, recorders=("me",))
+        lab.side.appeared(KEYS.alive_recorder("me"), lab.now)
+        lab.join(*lab.toy.inverters)
+        lab.step(5)
+        if lost:
+            lab.side.vanished(KEYS.alive_recorder("me"), lab.now)
+        lab.step(5)
+        lab.side.close("enough", lab.now)
+        for name in lab.toy.inverters:
+            lab.token(name, gone=True)
+        if not lost:
+            lab.side.vanished(KEYS.alive_recorder("me"), lab.now)
+        ends.append(lab.side.finished)
+        for _ in range(2):  # what is waited for agents, then for recorders
+            lab.side.expire(lab.side.deadline)
+        ends.append(lab.side.finished)
+
+    assert ends == [False, True, True, True]
+
+
+def test_a_session_that_brings_nothing_is_opened_anew_ever_more_seldom() -> None:
+    """Questions without an answer: the link may be stale on one side, or the plant frozen for long."""
+    stream, now, opened = TelemetryStream(), 0.0, []
+    first = Telemetry(
+        sender="plant", epoch=1, seq=0, t=0.0, inverters=(), rows=(), events=(), final=False, outcome="",
+        reproducible=False,
+    )  # fmt: skip
+    assert not stream.is_astray(1e6)
+    stream.take(first, now)
+    while now < 50.0:
+        now += 0.5
+        stream.question(now)
+        if stream.is_astray(now):
+            opened.append(now)
+    stream.answered(Answer(sender="plant", epoch=1, seq=9, t=0.0, ok=True, text="1"), now)
+
+    assert opened[0] == pytest.approx(1.5 + ASTRAY)
+    assert [b - a for a, b in pairwise(opened)] == [6.0, 12.0, 24.0]
+    assert stream.take(replace(first, seq=1, final=True), now)
+    assert stream.question(now + 100.0) is None
+    assert not stream.is_astray(now + 100.0)
+
+
+@pytest.mark.parametrize("end", ["close", "interrupt"])
+def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) -> None:
+    """A plant that is told to end while a recorder is being served sends all of it, and the last word, at once."""
+    lab = running(end=None)
+    lab.step(2000)
+    assert lab.ask("telemetry", "0").ok
+    lab.step(2)
+    (lab.side.close if end == "close" else lab.side.interrupt)("enough", lab.now)
+    lab.do()
+    told: list[Telemetry] = lab.take(Telemetry)
+
+    assert told[-1].final
+    assert [message.seq for message in told[-150:]] == list(range(told[-1].seq - 149, told[-1].seq + 1))

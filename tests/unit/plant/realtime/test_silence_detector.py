@@ -1,0 +1,183 @@
+"""The plant notices who is not heard: an agent that stands still, and two agents between whom the path is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+from msgspec.structs import replace
+
+from plant.realtime.silence_detector import SilenceDetector
+from tests.unit.plant.realtime.test_realtime_plant import KEYS, T_C, Lab, running
+from wire.messages import AgentStatus
+
+NAMES = ("inv1", "inv2", "inv3")
+MAX_AGE = 0.25
+
+
+def status(name: str, ages: dict[str, float], seq: int = 0) -> AgentStatus:
+    """What an agent says of its neighbours."""
+    return AgentStatus(
+        sender=name,
+        epoch=1,
+        seq=seq,
+        t=0.0,
+        phase="running",
+        waits_for="",
+        island="",
+        neighbours=tuple(ages),
+        ages=tuple(ages.values()),
+        used=(),
+        received=0,
+        sent=0,
+        rejected=0,
+        lost=0,
+        ticks=0,
+        missed=0,
+        lateness=0.0,
+    )
+
+
+def all_tick(lab: Lab, steps: int, names: Iterable[str] = NAMES) -> None:
+    """Steps of the plant, before each of which these agents send a state."""
+    for _ in range(steps):
+        for name in names:
+            lab.state(name, lab.side.tick, 50e3)
+        lab.step()
+
+
+def told(lab: Lab) -> list[tuple[float, str]]:
+    """Run time and text of what was told of silence, without the joins at the start."""
+    return [(event.t, event.text) for event in lab.events("roster") if " joined" not in event.text]
+
+
+def test_an_agent_whose_law_has_failed_is_silent_for_that_reason() -> None:
+    """It says so in its last state; nobody looks for a broken path then."""
+    lab = running(end=None)
+    all_tick(lab, 100)
+    lab.state("inv2", lab.side.tick, 50e3, fault="law mine:Mine: step raised")
+    all_tick(lab, 20, ("inv1", "inv3"))
+
+    assert [text.partition(", at")[0] for _, text in told(lab)] == [
+        "inv2 is silent: no state for 0.25 s, as its law has failed"
+    ]
+
+
+def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_speaks_again() -> None:
+    """As soon as its state is older than the neighbours use, long before its token goes; not for a lost message."""
+    lab = running(end=None)
+    all_tick(lab, 100)
+    all_tick(lab, 10, ("inv1", "inv3"))
+    all_tick(lab, 50)
+    frozen = lab.side.t - T_C
+    all_tick(lab, 60, ("inv1", "inv3"))
+    woken = lab.side.t
+    all_tick(lab, 10)
+
+    (silent_at, silent), (again_at, again) = told(lab)
+    assert silent.startswith("inv2 is silent: no state for 0.25 s, nothing comes from it")
+    assert MAX_AGE <= silent_at - frozen <= MAX_AGE + 0.04
+    assert again.startswith("inv2 is heard again")
+    assert woken <= again_at <= woken + 0.04
+
+
+@pytest.mark.parametrize("stalls", [(3.0,), (0.18, 0.18, 0.18)])
+def test_a_plant_that_stood_still_blames_nobody(stalls: tuple[float, ...]) -> None:
+    """What it missed while it slept, or rushed through, says nothing of the agents; a death or a leave is told once."""
+    lab = running(end=None)
+    all_tick(lab, 50)
+    for delay in stalls:
+        lab.step(delay=delay)
+        all_tick(lab, round(delay / T_C) - 1 if delay < 1.0 else 0, ())
+    all_tick(lab, 20)
+    lab.leave("inv2")
+    lab.token("inv3", gone=True)
+    all_tick(lab, 50, ("inv1",))
+
+    assert [text.split(",")[0].split(";")[0] for _, text in told(lab)] == ["inv2 left", "inv3 died"]
+
+
+def test_two_agents_that_cannot_hear_each_other_are_told_though_the_plant_hears_both() -> None:
+    """A cut between hosts: the neighbour's ages say so. It holds on when the token of the one is gone at the other."""
+    lab = running(end=None)
+    all_tick(lab, 100)
+    cut = lab.side.t
+    lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": 0.27, "inv3": 0.01}))
+    lab.hear(KEYS.status("inv2"), status("inv2", {"inv1": 0.27, "inv3": 0.01}))
+    all_tick(lab, 100)
+    lab.hear(KEYS.status("inv1"), status("inv1", {"inv3": 0.01}))
+    all_tick(lab, 50)
+    lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": 0.0, "inv3": 0.01}))
+    all_tick(lab, 5)
+
+    (t1, first), (t2, second), (_, third) = told(lab)
+    assert first.startswith("inv1 does not hear inv2: no state for 0.25 s, though one came here")
+    assert second.startswith("inv2 does not hear inv1")
+    assert third.startswith("inv1 hears inv2 again")
+    assert cut <= t1 == t2 <= cut + 0.2
+
+
+def test_neighbours_of_a_frozen_agent_are_not_told_of_too() -> None:
+    """That it is silent says all; who joined a moment ago, or has just woken, may not have heard anybody yet."""
+    lab = running(end=None)
+    lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": -1.0}))
+    all_tick(lab, 1)
+    lab.hear(KEYS.status("inv1"), status("inv1", {"inv2": 0.0, "inv3": 0.0}))
+    all_tick(lab, 100)
+    for seq, name in enumerate(("inv1", "inv3")):
+        lab.hear(KEYS.status(name), status(name, {"inv2": 0.26}, seq))
+    all_tick(lab, 60, ("inv1", "inv3"))
+
+    assert [text.split(":")[0] for _, text in told(lab)] == ["inv2 is silent"]
+
+
+@pytest.mark.parametrize(("at", "why"), [(2, "nothing comes from it"), (90, "it says that it has no measurement")])
+def test_an_agent_that_has_no_measurement_is_told_from_one_that_is_frozen(at: int, why: str) -> None:
+    """Its status says so; but that of a start, when all wait for the first measurement, proves nothing."""
+    silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
+    silence.joined("inv1")
+    for tick in range(90):
+        silence.heard("inv1")
+        if tick == at - 1:
+            silence.reported(replace(status("inv1", {}), phase="waiting"))
+        assert list(silence.take(0.02 * tick)) == []
+    if at == 90:
+        silence.reported(replace(status("inv1", {}), phase="waiting"))
+
+    assert [text for tick in range(90, 120) for _, text in silence.take(0.02 * tick)] == [
+        f"inv1 is silent: no state for 0.25 s, {why}"
+    ]
+
+
+def test_nothing_is_remembered_of_who_has_gone() -> None:
+    """A name that comes again begins anew, on both ends of a path that was cut."""
+    silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
+    for name in NAMES:
+        silence.joined(name)
+    assert list(silence.take(0.0)) == []
+    silence.reported(status("inv1", {"inv2": 3.0}))
+    silence.forget("inv2")
+    silence.joined("inv2")
+
+    for tick in range(1, 20):
+        for name in NAMES:
+            silence.heard(name)
+        assert list(silence.take(0.02 * tick)) == []
+
+
+@pytest.mark.parametrize("period", [0.02, 0.001])
+def test_who_was_never_heard_is_told_of_once_both_had_time_to_meet(period: float) -> None:
+    """-1 means never: a second of wall time after a join, at every speed, that is news."""
+    silence = SilenceDetector(max_age=0.25, T_c=0.02, period=period)
+    for name in NAMES:
+        silence.joined(name)
+    silence.reported(status("inv1", {"inv2": -1.0}))
+
+    said = []
+    for tick in range(round(1.1 / period)):
+        for name in NAMES:
+            silence.heard(name)
+        said += [(tick * period, name) for name, _ in silence.take(tick * period)]
+    [(when, who)] = said
+    assert who == "inv1"
+    assert 1.0 - 1e-9 <= when <= 1.0 + 2.0 * period
