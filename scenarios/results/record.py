@@ -31,6 +31,8 @@ PARTIAL = "history.partial.csv"
 Row = tuple[float, ...]
 """As in `wire.messages.Telemetry.rows`."""
 
+_encoder = msgspec.json.Encoder()
+
 
 class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """One case as recorded."""
@@ -72,6 +74,27 @@ def header(inverters: tuple[str, ...]) -> tuple[str, ...]:
     ('t_s', 'inv1_f_Hz', 'inv1_P_W', 'inv1_Q_var', 'inv1_V_V', 'inv1_P_set_W', 'inv1_V_set_V')
     """
     return ("t_s", *(f"{name}_{quantity}" for name in inverters for quantity in QUANTITIES))
+
+
+def csv_line(row: Row) -> bytes:
+    r"""Return a row of history.csv: of each number the shortest text that reads back to the same bits, as by `repr`.
+
+    JSON has the same texts, at a tenth of the cost, but for infinite numbers, NaN, and those that it writes with an
+    exponent or Python does: below 1e-4, and from 1e16 on.
+
+    Examples
+    --------
+    >>> csv_line((0.1, -0.0, 2.5e-07, 1e22, float("nan")))
+    b'0.1,-0.0,2.5e-07,1e+22,nan\n'
+    """
+    text = _encoder.encode(row)[1:-1]
+    if b"e" in text or b"0.0000" in text or b"n" in text:
+        parts = zip(row, text.split(b","), strict=True)
+        text = b",".join(
+            repr(number).encode() if b"e" in part or b"0.0000" in part or part == b"null" else part
+            for number, part in parts
+        )
+    return text + b"\n"
 
 
 class Recorder:
@@ -139,14 +162,14 @@ class Recorder:
     def _take(self, telemetry: Telemetry) -> None:
         if not self._inverters:
             self._inverters = telemetry.inverters
-            self._write(",".join(header(telemetry.inverters)) + "\n")
+            self._write((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
             self._note_time(row[0])
             if self._file is None:
                 self.rows.append(row)
-            self._write(",".join(map(repr, row)) + "\n")
+            self._write(csv_line(row))
         self.events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible
@@ -220,8 +243,7 @@ class Recorder:
         self.ended = t
         self.count += 1
 
-    def _write(self, text: str) -> None:
-        bytes_ = text.encode("ascii")
+    def _write(self, bytes_: bytes) -> None:
         self._hash.update(bytes_)
         if self._file is not None:
             self._file.write(bytes_)
