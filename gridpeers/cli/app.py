@@ -1,4 +1,4 @@
-"""The command `gridpeers`. Heavy modules are imported where they are used, so that help comes at once.
+"""The command `gridpeers`. A command is imported when it is called, so that help comes at once.
 
 Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage, a bad file, or output that cannot be written,
 3 the run broke, 130 interrupted by Ctrl-C, 141 nobody reads the output any more, 143 by SIGTERM.
@@ -11,23 +11,13 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.bridge_command import app as bridges
-from gridpeers.cli.commands.compare_command import compare
-from gridpeers.cli.commands.feeder_commands import app as feeders
-from gridpeers.cli.commands.init import init
-from gridpeers.cli.commands.live_commands import register
-from gridpeers.cli.commands.predict import predict
-from gridpeers.cli.commands.run_command import run
-from gridpeers.cli.commands.show import check, doc, list_
-from gridpeers.cli.commands.sweep_command import sweep
-from gridpeers.cli.contributed import contributed
-from gridpeers.cli.suggestions import Commands
+from gridpeers.cli.lazy_commands import LazyCommands
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
 from wire.driver.leftover import leave
 from wire.driver.output import speaking
 
 app = typer.Typer(
-    cls=Commands,
+    cls=LazyCommands,
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -82,14 +72,3 @@ def gridpeers(
 
     Example:  gridpeers run islanding
     """
-
-
-app.command()(run)
-app.command("list")(list_)
-for command in (check, doc, sweep, predict, compare, init):
-    app.command()(command)
-for name, command in contributed():
-    app.command(name)(command)
-register(app)
-app.add_typer(feeders, name="feeder")
-app.add_typer(bridges, name="bridge")

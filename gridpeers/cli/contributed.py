@@ -1,13 +1,14 @@
-"""Commands from outside of the command line: those of the papers, and of installed distributions.
+"""Commands from outside of gridpeers: those of installed distributions.
 
 A command is a function that typer can read. It is added by an entry point of the group "gridpeers.commands".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
+from gridpeers.cli.own_commands import OWN_COMMANDS
 from wire.plugins.registry import PluginError, Registry
 
 Command = Callable[..., None]
@@ -18,24 +19,17 @@ def _objection(it: Any) -> str:
 
 
 COMMANDS: Registry[Command] = Registry(
-    "command",
-    "commands",
-    _objection,
-    own={
-        "reproduce": "papers.singhal2022.reproduce.reproduce_command:reproduce",
-        "experiment": "papers.singhal2022.experiments.experiment_command:experiment",
-    },
+    "command", "commands", _objection, own={name: command.reference for name, command in OWN_COMMANDS.items()}
 )
-"""Commands by name; those that come with gridpeers are references."""
+"""Commands by name."""
 
 
-def contributed() -> Iterator[tuple[str, Command]]:
-    """Yield the name and the function of each; one that cannot be imported says so when it is called."""
-    for name in COMMANDS.names:
-        try:
-            yield name, COMMANDS.resolve(name)
-        except PluginError as error:
-            yield name, _broken(str(error))
+def command_of(name: str) -> Command:
+    """Return the function of a command, or its `typer.Typer`; one that cannot be imported says so when it is called."""
+    try:
+        return COMMANDS.resolve(name)
+    except PluginError as error:
+        return _broken(str(error))
 
 
 def _broken(why: str) -> Command:

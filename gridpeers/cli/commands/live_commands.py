@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gridpeers.cli.commands.link import link
 from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from wire.driver.output import watch_readers
@@ -39,13 +38,6 @@ _Record = Annotated[
     Path | None,
     typer.Option("--record", metavar="FILE", help="Write a scenario that replays what gridpeers link did, for run."),
 ]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    for command in (plant, agent, up, down, status, watch, stop, event):
-        app.command()(command)
-    app.add_typer(link, name="link")
 
 
 def _start(

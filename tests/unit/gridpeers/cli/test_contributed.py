@@ -1,25 +1,30 @@
-"""Commands that come from outside of the command line."""
+"""Commands that come from outside of the command line, and those that are imported when they are called."""
+
+from typing import Any
 
 import pytest
+import typer
 
-from gridpeers.cli.contributed import COMMANDS, contributed
+from gridpeers.cli.app import app
+from gridpeers.cli.contributed import COMMANDS
+from gridpeers.cli.own_commands import OWN_COMMANDS
+from tests.command_line import invoke
 
 
-def test_the_papers_commands_are_there() -> None:
-    """`reproduce` and `experiment` come with gridpeers, and are known without a paper in the command line."""
-    assert {"reproduce", "experiment"} <= {name for name, _ in contributed()}
+@pytest.mark.parametrize("name", OWN_COMMANDS)
+def test_the_help_of_all_commands_has_the_first_sentence_of_each(name: str) -> None:
+    """The line that is known without the command's module is the one that the module has."""
+    group: Any = typer.main.get_command(app)
+
+    assert group.get_command(None, name).get_short_help_str(200).startswith(OWN_COMMANDS[name].summary)
 
 
-def test_a_command_that_cannot_be_imported_leaves_the_others_alone(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It says why when it is called, with exit code 2; the command line starts."""
+def test_a_command_that_cannot_be_imported_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says why when it is called, with exit code 2; the command line starts, and lists it."""
     monkeypatch.setitem(COMMANDS.own, "mine", "no_such_module:command")
-    commands = dict(contributed())
 
-    with pytest.raises(SystemExit) as ended:
-        commands["mine"]()
+    code, text = invoke("mine")
 
-    assert ended.value.code == 2
-    assert 'there is no module "no_such_module"' in capsys.readouterr().err
-    assert "reproduce" in commands
+    assert code == 2
+    assert 'there is no module "no_such_module"' in text
+    assert {"mine", "reproduce"} <= {line.split()[0] for line in invoke("--help")[1].splitlines() if line.strip()}

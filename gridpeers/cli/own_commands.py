@@ -1,0 +1,53 @@
+"""The commands that come with gridpeers, in the order of the help. Their modules are imported when they are called."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class OwnCommand(NamedTuple):
+    """One command, without its module."""
+
+    reference: str
+    """`module:name` of a function that typer can read, or of a `typer.Typer` with commands below this one."""
+    summary: str
+    """Its line in the help of `gridpeers`: the first sentence of its docstring."""
+
+
+_HERE = "gridpeers.cli.commands"
+
+OWN_COMMANDS = {
+    name: OwnCommand(reference if reference.startswith("papers.") else f"{_HERE}.{reference}", summary)
+    for name, reference, summary in (
+        ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
+        ("list", "show:list_", "List the scenarios that come with gridpeers."),
+        ("check", "show:check", "Check a scenario file and its feeder for problems."),
+        ("doc", "show:doc", "Print a reference page that is made from the code."),
+        ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+        ("predict", "predict:predict", "Predict from theory how a scenario will go."),
+        ("compare", "compare_command:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
+        ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
+        (
+            "reproduce",
+            "papers.singhal2022.reproduce.reproduce_command:reproduce",
+            "Run all experiments of the paper, and write one report.",
+        ),
+        (
+            "experiment",
+            "papers.singhal2022.experiments.experiment_command:experiment",
+            "Run an experiment on late, lossy or broken links.",
+        ),
+        ("plant", "live_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
+        ("agent", "live_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
+        ("up", "live_commands:up", "Run the plant and all its agents at once, in real time."),
+        ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
+        ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
+        ("watch", "live_commands:watch", "Watch a run as a live table; q quits."),
+        ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
+        ("event", "live_commands:event", "Open or close a switch of a running plant."),
+        ("link", "link:link", "Hurt and heal links while a run goes on."),
+        ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
+        ("bridge", "bridge_command:app", "Offer our plant to simulators of others."),
+    )
+}
+"""All of them, by name."""
