@@ -9,16 +9,15 @@ from math import pi, sqrt
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from plant.dynamics.load_law import LoadLaw
 from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
+from plant.equipment.bus_islands import bus_islands, switch_name
 from plant.equipment.imported_equipment import LoadPart
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
-from wire.schema.suggestion import suggestion
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""
@@ -114,12 +113,7 @@ class Network:
         ValueError
             If no switch has this name.
         """
-        known = {name: switch.name for switch in self.switches.values() for name in switch.names}
-        if text not in known:
-            shown = [switch.alias or switch.name for switch in self.switches.values()]
-            hint = suggestion(text, shown, "switches", also=known)
-            raise ValueError(f'switch "{text}": no such switch in feeder "{self.feeder.name}"; {hint}')
-        return known[text]
+        return switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
         """Return the nodes that these closed switches and the regulators merge, with their ratios.
@@ -152,17 +146,7 @@ class Network:
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
         """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
-        feeder = self.feeder
-        ends = [(one, other) for one, other, _ in feeder.branches()]
-        ends += [(switch.from_bus, switch.to_bus) for switch in self._closed_switches(closed)]
-        number = {bus.name: i for i, bus in enumerate(feeder.buses)}
-        rows, columns = ([number[end[side]] for end in ends] for side in (0, 1))
-        graph = sp.coo_array((np.ones(len(ends)), (rows, columns)), shape=(len(number), len(number)))
-        _, label = connected_components(graph, directed=False)
-        members: dict[int, list[str]] = {}
-        for bus, of in zip(number, label, strict=True):
-            members.setdefault(int(of), []).append(bus)
-        return tuple(frozenset(buses) for buses in members.values())
+        return bus_islands(self.feeder, {switch.name for switch in self._closed_switches(closed)})
 
     def _without_load(self) -> NDArray[np.complex128]:
         """Phasors (V) with all switches closed and no load: what transformers of any connection make of the source."""

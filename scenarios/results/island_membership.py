@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from plant.equipment import Feeder
-from plant.network import Network
+from plant.equipment.bus_islands import islands_after
 from scenarios.results.history import Floats, History, Nameplates
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import inverters_of
@@ -44,14 +44,11 @@ def islands_of(scenario: ScenarioModel, feeder: Feeder) -> dict[str, IslandMembe
     >>> islands_of(*load_scenario("microgrid-switching"))["event2"]["inv4"]
     ('inv4', 'inv5', 'inv6')
     """
-    network = Network(feeder)
-    closed = network.closed0
     rows = inverters_of(scenario, feeder)
     islands = {}
-    for event in scenario.events:
-        closed = closed - {network.switch_name(name) for name in event.open}
-        closed = closed | {network.switch_name(name) for name in event.close}
-        members = [tuple(row.name for row in rows if row.bus in buses) for buses in network.islands(closed)]
+    after = islands_after(feeder, ((event.open, event.close) for event in scenario.events))
+    for event, parts in zip(scenario.events, after, strict=True):
+        members = [tuple(row.name for row in rows if row.bus in buses) for buses in parts]
         known = {names[0]: names for names in members if names}
         islands[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
     return islands

@@ -11,6 +11,7 @@ from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.trace_file import with_traces
 from plant.equipment import Feeder
+from plant.equipment.bus_islands import SwitchOperations, islands_after
 from plant.plant_config import ScheduledAction
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.schema.participants import inverters_of
@@ -44,15 +45,10 @@ def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
 
 def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
     """Return from when on (s) each inverter stands in which island."""
-    from plant.network import Network  # scipy: only for partitions by island
-
-    network = Network(feeder)
-    closed = set(network.closed0)
+    times = [0.0, *(event.t_s for event in scenario.events)]
+    operations: list[SwitchOperations] = [((), ()), *((event.open, event.close) for event in scenario.events)]
     timeline = []
-    for t_s, opened, shut in [(0.0, (), ()), *((event.t_s, event.open, event.close) for event in scenario.events)]:
-        closed.difference_update(map(network.switch_name, opened))
-        closed.update(map(network.switch_name, shut))
-        islands = network.islands(frozenset(closed))
+    for t_s, islands in zip(times, islands_after(feeder, operations), strict=True):
         rows = (*feeder.inverters, *feeder.spares)
         of = {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows}
         timeline.append((t_s, of))

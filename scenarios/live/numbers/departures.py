@@ -11,7 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from plant.equipment import Feeder
-from plant.network import Network
+from plant.equipment.bus_islands import switch_name
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
 from scenarios.live.show.snapshot import line_of
@@ -121,9 +121,8 @@ def compare(
 
 def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
     """Yield the switches that people operated; opening an open switch changes nothing."""
-    network = Network(feeder)
     planned = [
-        (event.t_s, network.switch_name(name)) for event in scenario.events for name in (*event.open, *event.close)
+        (event.t_s, switch_name(feeder, name)) for event in scenario.events for name in (*event.open, *event.close)
     ]
     for event in events:
         if event.kind != "switch" or event.text.endswith(" already"):
