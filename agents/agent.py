@@ -26,21 +26,31 @@ SIGN_OF_LIFE = 0.5
 """Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
 
 
+_converted: dict[str, tuple[State, Nameplate, float, float, Neighbour]] = {}
+"""The last conversion of each sender: its neighbours in one process get the same state, one after the other."""
+
+
 def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
     """Return a neighbour as a law sees it, per unit of the neighbour's own rating."""
-    return Neighbour(
-        name=nameplate.sender,
-        leader=nameplate.kind == "GFM",
-        age=age,
-        weight=weight,
-        P_set=state.P_set / nameplate.P_rated,
-        V_set=state.V_set / nameplate.V_nom,
-        Q=state.Q / nameplate.P_rated,
-        m_p=nameplate.m_p,
-        m_q=nameplate.m_q,
-        P_rated=nameplate.P_rated,
-        shared=state.shared,
+    name = nameplate.sender
+    known = _converted.get(name)
+    if known is not None and known[0] is state and known[1] is nameplate and known[2] == age and known[3] == weight:
+        return known[4]
+    neighbour = Neighbour(
+        name,
+        nameplate.kind == "GFM",
+        age,
+        weight,
+        state.P_set / nameplate.P_rated,
+        state.V_set / nameplate.V_nom,
+        state.Q / nameplate.P_rated,
+        nameplate.m_p,
+        nameplate.m_q,
+        nameplate.P_rated,
+        state.shared,
     )
+    _converted[name] = state, nameplate, age, weight, neighbour
+    return neighbour
 
 
 class Agent:
@@ -218,7 +228,7 @@ class Agent:
         shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
-            around = [neighbour_of(self._known[name], self._heard[name], *of) for name, of in counted.items()]
+            around = [neighbour_of(self._known[name], self._heard[name], *of) for name, *of in counted]
             try:
                 if not self._law_runs:
                     start_law(self._law, own)
@@ -296,11 +306,19 @@ class Agent:
 
     def _counted(
         self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None
-    ) -> dict[str, tuple[float, float]]:
-        """Return age (s) and weight of the last state of each neighbour that counts."""
-        heard = {name: self._heard[name] for name in neighbours if self.shares_island(name)}
-        aged = {name: t - state.t if ages is None else ages[name] for name, state in heard.items()}
-        return {name: (aged[name], weight) for name, weight in self._weights.at_tick(aged).items()}
+    ) -> list[tuple[str, float, float]]:
+        """Return each neighbour that counts, with the age (s) and the weight of its last state."""
+        heard, islands = self._heard, self._islands
+        if self._detector is None and self._islands_from_switches and islands[0]:  # as `shares_island`, in one go
+            here = [
+                name
+                for name in neighbours
+                if (state := heard.get(name)) is not None and (state.island in islands or not state.island)
+            ]
+        else:
+            here = [name for name in neighbours if self.shares_island(name)]
+        aged = {name: t - heard[name].t for name in here} if ages is None else {name: ages[name] for name in here}
+        return [(name, aged[name], weight) for name, weight in self._weights.at_tick(aged).items()]
 
     def _saturated_sides(self, measurement: Measurement, e: float) -> tuple[int, int]:
         """Return the saturated sides of P by (3), (7) and V by (4), (8), for the set-points that the plant holds."""

@@ -146,18 +146,17 @@ class AgentNode(PlantFollower):
     def _hear(self, message: State | Measurement, payload: bytes, at: float) -> None:
         """Use a message off the wire at this time (s of run time), unless an emulated link takes it."""
         if is_usable(self._links, message, payload, at, self.admission):
-            self._keep(message, at)
+            if type(message) is State:
+                self._agent.hear(message)
+            self.states.keep(message, at)
 
     def _hear_late(self, at: float) -> None:
         """Use the messages that the emulated links have delivered by now (s of run time)."""
         for message in arrived(self._links, at, self.rejects, self.admission):
             if isinstance(message, State | Measurement):
-                self._keep(message, at)
-
-    def _keep(self, message: State | Measurement, at: float) -> None:
-        if isinstance(message, State):
-            self._agent.hear(message)
-        self.states.keep(message, at)
+                if isinstance(message, State):
+                    self._agent.hear(message)
+                self.states.keep(message, at)
 
     # ---------------------------------------------------------------- reports
 

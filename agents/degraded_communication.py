@@ -61,7 +61,8 @@ class StalenessWeights:
 
     def arrived(self, name: str) -> None:
         """Note that a newer state of a neighbour has arrived."""
-        self._fresh.add(name)
+        if self._stale != "hold":
+            self._fresh.add(name)
 
     def forget(self, name: str) -> None:
         """Forget a neighbour and its link."""
@@ -76,13 +77,14 @@ class StalenessWeights:
         ages : Mapping[str, float]
             Age (s of run time) of each neighbour's last state.
         """
-        weights = {name: self._of(name, age) for name, age in ages.items() if age <= self._max_age}
+        most = self._max_age
+        if self._stale == "hold":
+            return {name: 1.0 for name, age in ages.items() if age <= most}
+        weights = {name: self._of(name, age) for name, age in ages.items() if age <= most}
         self._fresh.clear()
         return weights
 
     def _of(self, name: str, age: float) -> float:
-        if self._stale == "hold":
-            return 1.0
         fresh = name in self._fresh
         if self._stale == "skip":
             return float(fresh)

@@ -279,12 +279,10 @@ class LockstepAgent(AgentNode):
         if seq != self._tick - 1:
             raise RejectedError("stale", f"State({seq}) of {name} before tick {self._tick}")
         self._barrier.came(name)
-        self._use(message, payload)
-        self._compute(now)
-
-    def _use(self, state: State, payload: bytes) -> None:
-        if not state.quiet:  # no link carries what its law did not send
-            self._hear(state, payload, state.t)
+        if not message.quiet:  # no link carries what its law did not send
+            self._hear(message, payload, message.t)
+        if (self._grant is not None and self._barrier.is_open) or self._ending:
+            self._compute(now)
 
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if no message is missing."""
@@ -300,8 +298,12 @@ class LockstepAgent(AgentNode):
         if measured is None or (self._links is not None and self._links.stalled(grant.t)):
             state = self._agent.idle_state(grant)
         else:
-            neighbours = tuple(name for name in self._neighbours if name in self._processes)
-            state = self._agent.tick(replace(measured, seq=grant.seq, t=grant.t), neighbours)
+            neighbours = self._neighbours
+            if self._neighbours_of is not self._processes:
+                neighbours = tuple(name for name in neighbours if name in self._processes)
+            if measured is not grant:
+                measured = replace(measured, seq=grant.seq, t=grant.t)
+            state = self._agent.tick(measured, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         if (grant.seq + 1) % REPORT_TICKS == 0:
             self._report_links()
@@ -314,11 +316,12 @@ class LockstepAgent(AgentNode):
             self._neighbours = self._agent.in_neighbours(self._processes)
         early, self._early = self._early, {}
         self._grant, self._tick = None, grant.seq + 1
-        awaited = {
-            name: f"State({grant.seq})"
-            for name in self._neighbours
-            if name not in early and self.members.instance(name) == self._processes.get(name)
-        }
-        self._barrier.wait_for({PLANT: f"Measurement({self._tick})", **awaited}, now)
+        needed, counts = f"State({grant.seq})", self.members.instance
+        awaited = {PLANT: f"Measurement({self._tick})"}
+        for name in self._neighbours:
+            if name not in early and counts(name) == self._processes.get(name):
+                awaited[name] = needed
+        self._barrier.wait_for(awaited, now)
         for state, payload in early.values():
-            self._use(state, payload)
+            if not state.quiet:
+                self._hear(state, payload, state.t)

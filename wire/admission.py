@@ -55,7 +55,7 @@ class Admission:
 
     def __init__(self, rate: float = inf) -> None:
         self._rate = rate
-        self._epochs: dict[str, int] = {}
+        self.epochs: dict[str, int] = {}
         """Valid epoch of each name."""
         self._numbered: dict[str, int] = {}
         """Epoch of the numbers below; it outlasts a token that vanishes and reappears."""
@@ -72,28 +72,28 @@ class Admission:
             self._numbered[name] = epoch
             for numbers in (self._arrived, self._behind, self._passed):
                 numbers.pop(name, None)
-        self._epochs[name] = epoch
+        self.epochs[name] = epoch
 
     def release(self, name: str) -> None:
         """Note that a name has no valid epoch any more, because its token is gone."""
-        self._epochs.pop(name, None)
+        self.epochs.pop(name, None)
 
     def epoch(self, name: str) -> int | None:
         """Return the valid epoch of a name; None if there is none."""
-        return self._epochs.get(name)
+        return self.epochs.get(name)
 
     def lives(self, message: AnyMessage) -> bool:
         """Whether a message has the valid epoch of its sender."""
-        return self._epochs.get(message.sender) == message.epoch
+        return self.epochs.get(message.sender) == message.epoch
 
     def check(self, message: AnyMessage) -> None:
         """Raise RejectedError if a message is a ghost's, or its sender's epoch is not known (yet)."""
         name = message.sender
-        if self._epochs.get(name) == message.epoch:
+        if self.epochs.get(name) == message.epoch:
             return
         what = f"{type(message).__name__}({message.seq}) of epoch {message.epoch} of {name}"
-        if name in self._epochs:
-            raise RejectedError("ghost", f"{what}, whose epoch is {self._epochs[name]}")
+        if name in self.epochs:
+            raise RejectedError("ghost", f"{what}, whose epoch is {self.epochs[name]}")
         if self._numbered.get(name) == message.epoch:
             raise RejectedError("ghost", f"{what}, which is gone")
         raise RejectedError("unexpected", f"{what}, of which no process is known")
@@ -131,8 +131,8 @@ class Admission:
 
     def passes(self, message: AnyMessage) -> bool:
         """Whether a delivered message is usable: of the valid epoch, and later than all usable ones before."""
-        name = message.sender
-        if not self.lives(message) or message.seq <= self._passed.get(name, -1):
+        name, seq = message.sender, message.seq
+        if self.epochs.get(name) != message.epoch or seq <= self._passed.get(name, -1):
             return False
-        self._passed[name] = message.seq
+        self._passed[name] = seq
         return True

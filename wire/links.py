@@ -119,7 +119,7 @@ def is_usable(links: Links | None, message: State | Measurement, payload: bytes,
     who : Admission
         Epochs and numbers of all senders.
     """
-    if isinstance(message, State) and message.idle:
+    if type(message) is State and message.idle:
         return False
     if links is not None and message.sender not in links.clear and links.offer(message, payload, at):
         return False

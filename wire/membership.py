@@ -82,7 +82,8 @@ class Membership:
 
     def instance(self, name: str) -> str:
         """Return the process that counts for a name; empty if there is none."""
-        return next(iter(self._instances.get(name, ())), "")
+        instances = self._instances.get(name)
+        return instances[0] if instances else ""
 
     def meet(self, instance: str, nameplate: Nameplate) -> bool:
         """Take the answer of a process; return whether it is the first answer of a process that counts.

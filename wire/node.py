@@ -97,6 +97,8 @@ class Node:
 
     def take_actions(self) -> list[Action | Log]:
         """Take out the actions to perform now, in this order."""
+        if not self._actions:
+            return []
         actions, self._actions = self._actions, []
         return actions
 
@@ -109,7 +111,9 @@ class Node:
             if route is None:
                 raise RejectedError("foreign", "this node has no subscription or query on this key")
             message = decode(payload)
-            self._admit(route, message, now)
+            sender = message.sender
+            if sender != route.sender or self.admission.epochs.get(sender) != message.epoch:
+                self._admit(route, message, now)  # the rule, or the refusal, of all but the usual message
             if not isinstance(message, route.types):
                 types = " or ".join(expected.__name__ for expected in route.types)
                 raise RejectedError("unexpected", f"a {type(message).__name__} instead of a {types}")

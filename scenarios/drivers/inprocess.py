@@ -10,7 +10,6 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from time import perf_counter
-from typing import NamedTuple
 
 import msgspec
 
@@ -31,12 +30,7 @@ SHOWN = 5
 """Missing messages that an error names."""
 
 
-class _Delivery(NamedTuple):
-    """One message on its way to one receiver."""
-
-    to: LockstepPlant | LockstepAgent
-    key: str
-    payload: bytes
+_Node = LockstepPlant | LockstepAgent
 
 
 class InprocessBus:
@@ -68,9 +62,11 @@ class InprocessBus:
         self._newcomer = newcomer
         self._awaited: list[str] = []
         self._on_telemetry, self._on_links = on_telemetry, on_links
-        self._subscribers: defaultdict[str, list[LockstepPlant | LockstepAgent]] = defaultdict(list)
+        self._subscribers: defaultdict[str, list[_Node]] = defaultdict(list)
+        self._telemetry = plant.keys.telemetry
         self._nameplates: dict[str, bytes] = {}
-        self._queue: deque[_Delivery] = deque()
+        self._queue: deque[tuple[tuple[_Node, ...], str, bytes]] = deque()
+        """Messages on their way: receivers, key and bytes."""
 
     def run(self) -> None:
         """Run until the plant is over. There is no clock: `now` is 0, and no deadline passes."""
@@ -82,9 +78,11 @@ class InprocessBus:
         while not plant.finished:
             self._do(plant, plant.take_actions())
             while self._queue:
-                to, key, payload = self._queue.popleft()
-                to.received(key, payload, 0.0)
-                self._do(to, to.take_actions())
+                receivers, key, payload = self._queue.popleft()
+                for to in receivers:
+                    to.received(key, payload, 0.0)
+                    if actions := to.take_actions():
+                        self._do(to, actions)
             self._end_the_stopped()
             self._start_the_awaited()
             if not (plant.finished or plant.work(0.0) or self._queue):
@@ -121,13 +119,13 @@ class InprocessBus:
             self._do(other, other.take_actions())
         self._do(agent, agent.take_actions())
 
-    def _do(self, side: LockstepPlant | LockstepAgent, actions: Sequence[Action | Log]) -> None:
+    def _do(self, side: _Node, actions: Sequence[Action | Log]) -> None:
         for action in actions:
             if isinstance(action, Publish):
                 key, payload = action
-                for to in self._subscribers.get(key, ()):
-                    self._queue.append(_Delivery(to, key, payload))
-                if key == self._plant.keys.telemetry:
+                if receivers := self._subscribers.get(key):
+                    self._queue.append((tuple(receivers), key, payload))
+                if key == self._telemetry:
                     message = decode(payload)
                     if isinstance(message, Telemetry):
                         self._awaited += message.awaited
@@ -136,7 +134,7 @@ class InprocessBus:
                         self._on_links(message)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
-                    self._queue.append(_Delivery(side, action.key, self._nameplates[action.key]))
+                    self._queue.append(((side,), action.key, self._nameplates[action.key]))
             elif isinstance(action, Listen):
                 self._subscribers[action.key].append(side)
 

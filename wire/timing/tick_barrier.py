@@ -62,7 +62,7 @@ class TickBarrier:
     def wait_for(self, awaited: Mapping[str, str], now: float) -> None:
         """Start a new wait for a message of each of these senders."""
         self._awaited = dict(awaited)
-        self._from_outside = len(self._awaited.keys() - self.siblings)
+        self._from_outside = len(self._awaited.keys() - self.siblings) if self.siblings else len(self._awaited)
         self.renew(now)
 
     def awaits(self, name: str) -> bool:
