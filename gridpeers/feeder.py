@@ -114,6 +114,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         kind: Literal["GFM", "GFL"],
         P_rated: float,
         *,
+        phases: Literal["ABC", "A", "B", "C"] = "ABC",
         microgrid: str = "MG1",
         m_p: float = 0.01,
         m_q: float = 0.05,
@@ -126,11 +127,13 @@ class Feeder(Tables, frozen=True, kw_only=True):
         name : str
             Its name, unique.
         bus : str
-            A bus with phases A, B and C and no other inverter.
+            A bus that has these phases, without another inverter on them.
         kind : {"GFM", "GFL"}
             Grid-forming or grid-following.
         P_rated : float
-            Rated power (W).
+            Rated power (W, of all its phases).
+        phases : {"ABC", "A", "B", "C"}, optional
+            All three, or one for a single-phase inverter.
         microgrid : str, optional
             Microgrid it belongs to.
         m_p, m_q : float, optional
@@ -142,7 +145,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         Raises
         ------
         ValueError
-            If the name or the bus is taken, the bus is not there or lacks a phase, or a value is wrong.
+            If the name or a phase of the bus is taken, the bus is not there or lacks a phase, or a value is wrong.
         """
         from plant.tables.parameter_sets import as_set
         from plant.tables.shunts import problems_of
@@ -151,13 +154,6 @@ class Feeder(Tables, frozen=True, kw_only=True):
         found = {one.name: one for one in self.buses}.get(bus)
         if found is None:
             raise ValueError(f'bus "{bus}": no such bus; {suggestion(bus, [one.name for one in self.buses], "buses")}')
-        if not set("ABC") <= set(found.phases):
-            raise ValueError(f'bus "{bus}" has phases {found.phases}; an inverter needs A, B and C')
-        for row in (*self.inverters, *self.spares):
-            if name == row.name or bus == row.bus:
-                raise ValueError(
-                    f'inverter "{row.name}" at bus {row.bus} is there already; names and buses must differ'
-                )
         row = InverterRow(
             name=name,
             kind=kind,
@@ -167,9 +163,10 @@ class Feeder(Tables, frozen=True, kw_only=True):
             V_nom=found.V_nom,
             m_p=m_p,
             m_q=m_q,
+            phases=phases or "ABC",
         )
         load = sum(S.real for load in self.loads for S in load.S if S.real > 0.0)
-        if problems := problems_of(row, found, load):
+        if problems := problems_of(row, found, load, (*self.inverters, *self.spares)):
             raise ValueError("; ".join(problems))
         set_name, sets = as_set(name, kind, params, self.parameter_sets)
         row = msgspec.structs.replace(row, parameters=set_name)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.phasors import PHASES
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,7 +32,7 @@ class Circuit:
     source_voltage: NDArray[np.complex128]
     """Their phasors (V)."""
     terminals: NDArray[np.int64]
-    """Inverter terminals: n_inv x 3 nodes, phases A, B, C."""
+    """Inverter terminals: n_inv x 3 nodes, phases A, B, C; of a single-phase inverter its one node three times."""
     C: sp.csc_array
     """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
     I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
@@ -42,6 +44,23 @@ class Circuit:
     def __deepcopy__(self, memo: object) -> Circuit:
         """Return itself: it is never written, so copies of a plant share it, and its factorisation."""
         return self
+
+    @cached_property
+    def copies(self) -> NDArray[np.bool_]:
+        """Which terminals are copies, n_inv x 3: the second and the third of a single-phase inverter.
+
+        The models have three phases. To them a single-phase inverter is one with three equal phases: its copies have
+        the voltage and the current of its own terminal, turned by -120 and 120 degrees. They inject nothing into the
+        network.
+        """
+        copies = np.zeros(self.terminals.shape, bool)
+        copies[:, 1:] = (self.terminals[:, 0] == self.terminals[:, 1])[:, None]
+        return copies
+
+    @cached_property
+    def turn(self) -> NDArray[np.complex128]:
+        """Factors from each terminal's node to the terminal, n_inv x 3: 1, and `PHASES` of a copy."""
+        return np.where(self.copies, PHASES, 1.0 + 0.0j)
 
     def without_source(self) -> Circuit:
         """Return the same network with its substation disconnected."""

@@ -1,7 +1,8 @@
 """The initial operating point of a run: an exact equilibrium of network and inverters (section 7).
 
 The real power of each inverter is given; its reactive power is either given too, or follows from a given V_set through
-the droop (4), (8). In an island without a source one GFM (its swing) first holds its terminal, and is then released.
+the droop (4), (8). In an island without a source one GFM (its swing) first holds its terminal, and is then released;
+where all its GFM are single-phase, one on each phase.
 """
 
 from __future__ import annotations
@@ -75,9 +76,9 @@ class _PowerFlow:
     def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, y = self.units, self.y[:, None]
-        S = ((P + 1j * Q) * units.S_b)[:, None]
+        S = ((P + 1j * Q) * units.S_3)[:, None]
         keep = (frozen | ~self.reduction.online)[:, None]
-        scale = units.S_b / units.V_b
+        scale = units.S_3 / units.V_b
         for iteration in range(500):
             V = self.voltages(J)
             V_1 = aligned_sum(V)[:, None] / 3.0
@@ -137,10 +138,12 @@ def equilibrium(
     sourced = np.isin(island, label[circuit.sources])
     swing = np.zeros(n, bool)
     for k in np.unique(island[units.forming & online & ~sourced]):
-        swing[np.flatnonzero((island == k) & units.forming & online)[0]] = True
+        swing[_swings(units, np.flatnonzero((island == k) & units.forming & online))] = True
 
-    nodes = circuit.terminals[swing].ravel()
-    at_swing = (units.V_b[swing, None] * swing_voltage).ravel()
+    own = ~circuit.copies[swing]
+    nodes = circuit.terminals[swing][own]
+    of_phase = swing_voltage[(units.phase[swing, None] + np.arange(3)) % 3]
+    at_swing = (units.V_b[swing, None] * of_phase)[own]
     held = replace(
         circuit,
         sources=np.concatenate([circuit.sources, nodes]),
@@ -157,15 +160,21 @@ def equilibrium(
         # the swings' powers determine their EMF; then their buses are released
         node_voltage = flow.reduction.all_voltages(J, flow.I_b, held.source_voltage)
         drawn = circuit.Y @ node_voltage + circuit.C[:, flow.reduction.branches] @ flow.I_b
-        S = np.sum(V * np.conj(drawn[circuit.terminals]), axis=1)
-        own = np.sum(V * np.conj(units.y_f[:, None] * V), axis=1)
+        S = np.sum(V * np.conj(circuit.turn * drawn[circuit.terminals]), axis=1)
+        in_filter = np.sum(V * np.conj(units.y_f[:, None] * V), axis=1)
         V_1 = aligned_sum(V) / 3.0
-        J[swing] = np.conj((S + own) / (3.0 * V_1))[swing, None] * PHASES
+        J[swing] = np.conj((S + in_filter) / (3.0 * V_1))[swing, None] * PHASES
         flow = _PowerFlow(circuit, units, np.zeros(n, bool))
         J, V = flow.solve(J, P, Q, swing)
 
     I_out = J - flow.y[:, None] * V
     return OperatingPoint(J=I_out + units.y_f[:, None] * V, V=V, I=I_out, V_branch=flow.V_b)
+
+
+def _swings(units: Inverters, forming: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the swings among the GFM of an island: the first with three phases, else the first on each phase."""
+    whole = forming[~units.single[forming]]
+    return whole[:1] if whole.size else forming[np.unique(units.phase[forming], return_index=True)[1]]
 
 
 def set_equilibrium(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel import gfl as gfl_model
 from plant.dynamics.kernel import gfm as gfm_model
 from plant.dynamics.kernel.second_order_step import FeedForward
-from plant.dynamics.phasors import aligned_sum
+from plant.dynamics.phasors import PHASES, aligned_sum
 from plant.dynamics.reduction.reduced import Complex, Real
 from plant.equipment import F_NOM
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
@@ -26,6 +26,8 @@ class Inverter:
     name: str
     """Name, for messages."""
     kind: Literal["GFM", "GFL"]
+    phases: str = "ABC"
+    """Phases of its terminal: all three, or one."""
     S_b: float
     """Rating, base of its per-unit quantities (VA)."""
     V_b: float
@@ -64,6 +66,12 @@ class Inverters:
         The same for `plant.dynamics.kernel.gfl`.
     S_b, V_b, m_p, m_q : float64[n]
         Ratings (VA), nominal voltages (V) and droops (pu per pu).
+    single : bool[n]
+        Single-phase inverters. To the models they have three equal phases (`plant.dynamics.circuit.Circuit.copies`).
+    S_3 : float64[n]
+        Base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter.
+    phase : int64[n]
+        Phase of the first terminal: 0, 1, 2 for A, B, C.
     positive_sequence, direct : bool[n]
         Whether each is a GFM that measures the positive sequence, and one without voltage controller (section 3.8).
     balanced : bool[n]
@@ -100,6 +108,9 @@ class Inverters:
         self.gfm_state = np.zeros(self.gfm_at.size, gfm_model.STATE)
         self.gfl_state = np.zeros(self.gfl_at.size, gfl_model.STATE)
         self.S_b = np.array([unit.S_b for unit in units])
+        self.single = np.array([len(unit.phases) == 1 for unit in units], dtype=bool)
+        self.S_3 = np.where(self.single, 3.0, 1.0) * self.S_b
+        self.phase = np.array(["ABC".index(unit.phases[0]) for unit in units], dtype=np.int64)
         self.V_b = np.array([unit.V_b for unit in units])
         self.m_p = np.array([unit.m_p for unit in units])
         self.m_q = np.array([unit.m_q for unit in units])
@@ -115,7 +126,7 @@ class Inverters:
         self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])
         self.y_f = np.zeros(n, complex)
         self.y_f[self.gfm_at], self.y_f[self.gfl_at] = self.gfm["y_f"], self.gfl["y_f"]
-        self.feed_forward = _feed_forward(units, self.S_b, self.V_b)
+        self.feed_forward = _feed_forward(units, self.S_3, self.V_b)
         self.connected = np.ones(n, bool) if connected is None else np.array(connected, dtype=bool)
         self.set_points = np.zeros((n, 3))
         self.J = np.zeros((n, 3), complex)
@@ -132,6 +143,10 @@ class Inverters:
         theta[self.gfm_at] = self.gfm_state["theta"]
         return theta
 
+    def nominal_angle(self) -> Real:
+        """Return the angle of every first terminal in the balanced set (rad): 0, or that of a single phase."""
+        return np.asarray(np.angle(PHASES)[self.phase])
+
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
         """Return the powers and voltages (pu) that the controllers measure (sections 3.2, 3.8).
 
@@ -141,7 +156,7 @@ class Inverters:
             Terminal voltages (V) and currents out of the inverters (A), n x 3.
         """
         V_1, I_1 = aligned_sum(V) / 3.0, aligned_sum(I) / 3.0
-        S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_b
+        S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_3
         v = np.where(self.positive_sequence, np.abs(V_1), np.mean(np.abs(V), axis=1)) / self.V_b
         return S, v
 
@@ -209,6 +224,7 @@ class Inverters:
             Inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
+        S[self.single] /= 3.0
         S[~online] = 0.0
         f = np.full(S.size, self.f_nom)
         f[self.gfm_at] += np.where(online[self.gfm_at], self.gfm_state["w"], 0.0) / (2.0 * np.pi)
@@ -220,16 +236,17 @@ class Inverters:
 
 def _pack(unit: Inverter, method: Method) -> NDArray[np.void]:
     """Return the record of one unit for the compiled pass of its kind."""
-    own = unit.S_b, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
+    S_3 = unit.S_b if len(unit.phases) > 1 else 3.0 * unit.S_b
+    own = S_3, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
     if isinstance(unit.parameters, GfmParameters):
         return gfm_model.pack(unit.parameters, *own)
     return gfl_model.pack(unit.parameters, *own, method)
 
 
-def _feed_forward(units: tuple[Inverter, ...], S_b: Real, V_b: Real) -> FeedForward:
+def _feed_forward(units: tuple[Inverter, ...], S_3: Real, V_b: Real) -> FeedForward:
     y, a = np.zeros(len(units), complex), np.zeros(len(units), complex)
     for i, unit in enumerate(units):
         if isinstance(unit.parameters, GflParameters) and unit.parameters.model == "voltage_source":
-            y[i] = gfl_model.filter_admittance(unit.parameters, unit.S_b, unit.V_b)
+            y[i] = gfl_model.filter_admittance(unit.parameters, S_3[i], unit.V_b)
             a[i] = gfl_model.own_feedback(unit.parameters)
-    return FeedForward(y, np.reciprocal(1.0 - a), S_b / (3.0 * V_b), float(V_b.max(initial=1.0)))
+    return FeedForward(y, np.reciprocal(1.0 - a), S_3 / (3.0 * V_b), float(V_b.max(initial=1.0)))

@@ -174,7 +174,7 @@ class LiveNetwork:
 
     def _island_angle(self) -> Real:
         """Return the angle (rad) of each branch's island frame; 0 where the island has a source or no GFM."""
-        theta = self._inverters.theta()
+        theta = self._inverters.theta() - self._inverters.nominal_angle()
         angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
         C = self.circuit.C.tocsc()
         first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)

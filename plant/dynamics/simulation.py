@@ -143,6 +143,8 @@ class Dynamics:
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)
         network.note()
+        if self.inverters.single.any():
+            out[:, self.inverters.single, 1:3] /= 3.0  # the kernel's powers are those of three equal phases
         return out
 
     def arrays(self) -> Units:

@@ -76,11 +76,12 @@ class SwitchState:
         """Law of the live branches."""
 
         self.terminals = G = circuit.terminals.T.ravel()
+        injects = np.tile(self.online, 3) & ~circuit.copies.T.ravel()
         y_diagonal = np.zeros(n, complex)
-        np.add.at(y_diagonal, G, np.tile(np.where(self.online, y_f, 0.0), 3))
+        np.add.at(y_diagonal, G, np.where(injects, np.tile(y_f, 3), 0.0))
         self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
         self.C = C[:, self.branches]
-        self.feeding = np.flatnonzero((self.place[G] >= 0) & np.tile(self.online, 3))
+        self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)
         """Rows of `terminals` at which an inverter injects."""
 
     def __deepcopy__(self, memo: object) -> SwitchState:

@@ -121,7 +121,7 @@ def _black_start(units: Inverters, i: int) -> None:
     """Start a returning GFM in step with the voltage there, or at its set-point without voltage."""
     V_1 = complex(aligned_sum(units.V[i])) / 3.0
     if abs(V_1) < 0.1 * units.V_b[i]:
-        V_1 = complex(units.set_points[i, 1] * units.V_b[i])
+        V_1 = complex(units.set_points[i, 1] * units.V_b[i] * PHASES[units.phase[i]])
     units.J[i], units.I[i] = V_1 * PHASES * units.y_f[i], 0.0
     units.rest(i, 0.0, abs(V_1) / units.V_b[i])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from plant.equipment import PHASES, Feeder, Line, Regulator, Switch
+from plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch
 
 Node = tuple[str, str]
 """A bus and one of its phases."""
@@ -14,7 +14,7 @@ class Connectivity:
     """The graph of a feeder's nodes.
 
     Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and a
-    grid-forming inverter join all their three phases. Equipment that feeds nothing by itself, or is connected to
+    grid-forming inverter of three phases join all three. Equipment that feeds nothing by itself, or is connected to
     ground (loads, capacitors, grid-following inverters), joins none.
 
     Parameters
@@ -82,7 +82,7 @@ class Connectivity:
         return tuple(frozenset(nodes) for nodes in parts.values())
 
     def fed(
-        self, closed: Collection[str], forming: Iterable[str]
+        self, closed: Collection[str], forming: Iterable[InverterRow]
     ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
         """Return the parts that the substation or a grid-forming inverter feeds, and the de-energised parts.
 
@@ -91,11 +91,16 @@ class Connectivity:
         closed : Collection[str]
             Names of the closed switches.
         forming : Iterable[str]
-            Buses of the connected grid-forming inverters.
+            The connected grid-forming inverters.
         """
-        feeding = [*forming, *([self._feeder.source.bus] if self._feeder.source else [])]
-        alive = {(bus, "A") for bus in feeding}
-        parts = self.parts(closed, feeding)
+        alive, whole = set[Node](), list[str]()
+        for row in forming:
+            alive.add(row.node)
+            whole += [row.bus] if len(row.phases) > 1 else []
+        if self._feeder.source:
+            alive.add((self._feeder.source.bus, "A"))
+            whole.append(self._feeder.source.bus)
+        parts = self.parts(closed, whole)
         return tuple(part for part in parts if part & alive), tuple(part for part in parts if not part & alive)
 
     def cut_off(self, switch: Switch) -> frozenset[str]:

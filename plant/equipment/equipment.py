@@ -174,23 +174,30 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     kind: Literal["GFM", "GFL"]
     """Grid-forming or grid-following."""
     bus: str
-    """Bus of its terminals (all three phases, only one inverter on a bus)."""
+    """Bus of its terminals; each of its nodes has one inverter at most."""
     microgrid: str
     """Its microgrid."""
     P_rated: float
-    """Rated power (W, three phases), base of its per-unit values."""
+    """Rated power (W, of all its phases), base of its per-unit values."""
     V_nom: float
     """Nominal terminal voltage (V, line-to-neutral)."""
     m_p: float
     """P-f droop (pu frequency per pu power)."""
     m_q: float
     """Q-V droop (pu voltage per pu reactive power)."""
+    phases: Literal["ABC", "A", "B", "C"] = "ABC"
+    """Phases of the bus at which it stands: all three, or one."""
     spare: bool = False
     """Whether it stays off until an agent joins for it."""
     parameters: str = ""
     """Name of its set of parameters (`Feeder.parameter_sets`); empty for none."""
     own: OwnParameters = OwnParameters()
     """Parameters that replace those of its set and of its kind: a scenario gives them."""
+
+    @property
+    def node(self) -> tuple[str, str]:
+        """Bus and phase of its first terminal."""
+        return self.bus, self.phases[0]
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):

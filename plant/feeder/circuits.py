@@ -50,17 +50,20 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
         ),
         shape=(n, m),
     )
-    raw = np.array([[network.index(unit.bus, phase) for phase in "ABC"] for unit in network.inverters], np.int64)
+    raw = np.array(
+        [[network.index(unit.bus, phase) for phase in (3 * unit.phases)[:3]] for unit in network.inverters], np.int64
+    )
     raw = raw.reshape(-1, 3)
     terminals = merge.representative[raw]
     owner: dict[int, str] = {}
     for unit, nodes, at in zip(network.inverters, terminals, raw, strict=True):
-        if int(nodes[0]) in owner or not np.allclose(merge.ratio[at], 1.0):
+        others = [owner[node] for node in nodes.tolist() if node in owner]
+        if others or not np.allclose(merge.ratio[at], 1.0):
             raise PlantError(
-                f"{unit.name} at bus {unit.bus} is tied to {owner.get(int(nodes[0]), 'another source')} by closed "
+                f"{unit.name} at bus {unit.bus} is tied to {others[0] if others else 'another source'} by closed "
                 "switches or a regulator, without any impedance between them: move it behind a line"
             )
-        owner[int(nodes[0])] = unit.name
+        owner.update(dict.fromkeys(nodes.tolist(), unit.name))
     return Circuit(
         Y=network.admittance(closed),
         sources=network.source_nodes,

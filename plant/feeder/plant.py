@@ -90,6 +90,7 @@ class Plant:
                 Inverter(
                     name=unit.name,
                     kind=unit.kind,
+                    phases=unit.phases,
                     S_b=unit.P_rated,
                     V_b=unit.V_nom,
                     m_p=unit.m_p,

@@ -7,7 +7,7 @@ after every step and, when enough are done, holds GridLAB-D until the next reque
 
 Requests are JSON objects, one a line on standard input, answered one a line on standard output:
 
-    {"load": path, "inverters": [[name, bus, kind], ...]}   {"version": ...}; the first step of delta mode is done
+    {"load": path, "inverters": [[name, bus, kind, phases], ...]}    {"version": ...}; the first step is done
     {"write": [[object, property, value], ...]}             {}; acts from the next step on
     {"phasors": bus}                                        {"phasors": [real, imaginary] (V) of its phases A, B, C}
     {"write": ..., "advance": n}                            {"steps": n lists of a reading per inverter}
@@ -109,11 +109,13 @@ class GridlabdCore:
 class GridlabdInverter:
     """Quantities of an inverter, read after every step."""
 
-    def __init__(self, core: GridlabdCore, name: str, bus: str, kind: str) -> None:
+    def __init__(self, core: GridlabdCore, name: str, bus: str, kind: str, phases: str) -> None:
         forming = kind == "GFM"
-        self._f = [core.doubles(name, key) for key in (("freq",) if forming else ("f_PLL_A", "f_PLL_B", "f_PLL_C"))]
+        # a single-phase inverter has the first PLL, whichever its phase
+        plls = [f"f_PLL_{phase}" for phase in "ABC"[: len(phases)]]
+        self._f = [core.doubles(name, key) for key in (["freq"] if forming else plls)]
         self._S = core.doubles(name, "VA_Out", 2)
-        self._V = [core.doubles(bus, f"voltage_{phase}", 2) for phase in "ABC"]
+        self._V = [core.doubles(bus, f"voltage_{phase}", 2) for phase in phases]
         self._P_set, self._V_set = core.doubles(name, "Pset" if forming else "Pref"), core.doubles(name, "Vset")
 
     def read(self) -> Reading:
@@ -121,7 +123,7 @@ class GridlabdInverter:
         V = [abs(complex(*phase)) for phase in self._V]
         set_points = self._P_set[0], self._V_set[0]
         f = sum(each[0] for each in self._f) / len(self._f)
-        return f, self._S[0], self._S[1], sum(V) / 3.0, *set_points, min(V), max(V)
+        return f, self._S[0], self._S[1], sum(V) / len(V), *set_points, min(V), max(V)
 
 
 class Simulation:
@@ -132,10 +134,10 @@ class Simulation:
     model
         Path of the GLM.
     inverters
-        Name, bus and kind of each.
+        Name, bus, kind and phases of each.
     """
 
-    def __init__(self, model: str, inverters: list[tuple[str, str, str]]) -> None:
+    def __init__(self, model: str, inverters: list[tuple[str, str, str, str]]) -> None:
         gridlabd = importlib.import_module("gridlabd")
         self.version = str(gridlabd.__version__)
         self._gridlabd = gridlabd.DirectGridLabD()

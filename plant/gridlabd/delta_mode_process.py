@@ -74,7 +74,7 @@ class DeltaModeProcess:
         """Process id."""
         return self._process.pid
 
-    def load(self, model: str, inverters: Sequence[tuple[str, str, str]]) -> str:
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> str:
         """Load a model and take its first step; return GridLAB-D's version.
 
         Parameters
@@ -82,7 +82,7 @@ class DeltaModeProcess:
         model
             Text of the GLM.
         inverters
-            Name, node and kind of each inverter to read.
+            Name, node, kind and phases of each inverter to read.
         """
         path = Path(self._folder.name) / "feeder.glm"
         path.write_text(model, encoding="utf-8")

@@ -12,7 +12,7 @@ from math import sqrt
 from pathlib import Path
 
 from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.glm_inverters import inverter_blocks
+from plant.gridlabd.glm_inverters import inverter_blocks, node_blocks
 from plant.gridlabd.glm_network import network_blocks
 
 START = "2000-01-01 00:00:00"
@@ -52,11 +52,12 @@ def write_glm(
     table = {path.stem: read_table(path) for path in sorted(folder.glob("*.csv"))}
     V_nom = {row["bus"]: float(row["V_nom_kV_LL"]) * 1e3 / sqrt(3) for row in table["buses"]}
     inverters = [row for row in table["inverters"] if row.get("spare") != "yes"]
-    leaders = {row["bus"] for row in inverters if row["kind"] == "GFM"}
+    leaders = {row["bus"] for row in inverters if row["kind"] == "GFM" and row.get("phases", "") in ("", "ABC")}
     return "\n".join(
         (
             _header(h, seconds, table["buses"][0]["bus"]),
             *network_blocks(table, load_set, V_nom, leaders),
+            *node_blocks(inverters, V_nom),
             *inverter_blocks(inverters, start, parameters),
         )
     )

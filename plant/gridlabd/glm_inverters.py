@@ -10,6 +10,29 @@ from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.glm_network import F_NOM, TableRow, block
 
 
+def node_of(bus: str, phases: str) -> str:
+    """Return the node of an inverter: that of its bus, or one of its own at a single phase (empty phases are all).
+
+    Examples
+    --------
+    >>> node_of("13", ""), node_of("13", "B")
+    ('n13', 'n13_B')
+    """
+    return f"n{bus}" if phases in ("", "ABC") else f"n{bus}_{phases}"
+
+
+def node_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Return the nodes of single-phase inverters, from the buses' nominal voltages (V).
+
+    An inverter of GridLAB-D has the phases of its node, so it gets a child of its bus with its own phase alone.
+    """
+    return [
+        block("node", name=node, parent=bus, phases=f"{row['phases']}N", nominal_voltage=V_nom[row["bus"]])
+        for row in rows
+        if (node := node_of(row["bus"], row.get("phases", ""))) != (bus := f"n{row['bus']}")
+    ]
+
+
 def inverter_blocks(
     rows: Iterable[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
 ) -> list[str]:
@@ -22,7 +45,7 @@ def inverter_blocks(
             block(
                 "inverter_dyn",
                 name=row["name"],
-                parent=f"n{row['bus']}",
+                parent=node_of(row["bus"], row.get("phases", "")),
                 flags="DELTAMODE",
                 Pref=S.real,
                 Qref=S.imag,

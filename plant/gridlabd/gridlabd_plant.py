@@ -101,7 +101,7 @@ class GridlabdPlant:
         self.process = DeltaModeProcess(python, deadline)
         """GridLAB-D."""
         try:
-            units = [(unit.name, f"n{unit.bus}", unit.kind) for unit in self._units.values()]
+            units = [(unit.name, f"n{unit.bus}", unit.kind, unit.phases) for unit in self._units.values()]
             self.version = self.process.load(model, units)
             # GridLAB-D chose set-points that give the powers it was started with; now the run's own take over
             for name, unit in self._units.items():

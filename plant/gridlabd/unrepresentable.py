@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from plant.equipment import Feeder
 from plant.equipment.inverter_parameters import GfmParameters
+from plant.gridlabd.glm_inverters import node_of
 from plant.gridlabd.glm_network import F_NOM
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
@@ -53,4 +54,6 @@ def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:
     for name in dict.fromkeys(row.name for row in feeder.regulators):
         yield from (("regulator", name, in_model) for in_model in (name, f"c{name}"))
     yield from (("inverter", row.name, row.name) for row in feeder.inverters)
+    single = [row for row in feeder.inverters if len(row.phases) == 1]
+    yield from (("node of inverter", row.name, node_of(row.bus, row.phases)) for row in single)
     yield from (("object", name, name) for name in ("islands", "ticker"))

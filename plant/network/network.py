@@ -94,7 +94,7 @@ class Network:
         if feeder.elements:
             self.nominal = self._without_load()
         self._wanted = [int(node) for node in self.source_nodes] + [
-            self.index(inverter.bus, phase) for inverter in self.inverters for phase in PHASES
+            self.index(inverter.bus, phase) for inverter in self.inverters for phase in inverter.phases
         ]
 
     def index(self, bus: str, phase: str) -> int:

@@ -182,22 +182,24 @@ class CapacitorColumns(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
-    """inverters.csv: nameplates and places, at most one inverter on a bus."""
+    """inverters.csv: nameplates and places, at most one inverter on each phase of a bus."""
 
     name: str
     """Name, a part of keys on the wire."""
     kind: Annotated[Literal["GFM", "GFL"], Label("kind of inverter")]
     """Grid-forming or grid-following."""
     bus: str
-    """Its bus, of three phases."""
+    """Its bus."""
     microgrid: str
     """Name of its microgrid."""
     P_rated_kW: Annotated[float, Unit("kW"), Plausible("the rating of an inverter", 0.01, 1e6, above_zero=True)]
-    """Rated power, the base of its per-unit values."""
+    """Rated power of all its phases, the base of its per-unit values."""
     m_p_pu: Annotated[float, Unit("pu"), Plausible("a P-f droop", 0.001, 0.2, above_zero=True)]
     """P-f droop (pu frequency per pu power)."""
     m_q_pu: Annotated[float, Unit("pu"), Plausible("a Q-V droop", 0.001, 0.5, above_zero=True)]
     """Q-V droop (pu voltage per pu reactive power)."""
+    phases: Literal["ABC", "A", "B", "C"] = "ABC"
+    """Phases of the bus at which it stands: all three, or one for a single-phase inverter."""
     spare: Literal["", "yes"] = ""
     """"yes" if it stands by, switched off, until an agent comes for it."""
     parameters: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,8 @@ TAKEN = {
     OFF: "it stands in place of an island for an inverter that is out of service",
 }
 """Names that no inverter can have, and why."""
+
+ONE_EACH = "only one can stand on each phase of a bus"
 
 _POWERS = ("P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")
 
@@ -116,11 +118,11 @@ def read_inverters(
     """
     total = sum(S.real for load in loads for S in load.S if S.real > 0.0) / 1e3
     inverters: dict[str, InverterRow] = {}
-    at: dict[str, str] = {}
+    at: dict[tuple[str, str], str] = {}
     for row in CsvTable(folder, "inverters.csv", InverterColumns, problems):
         it, name, bus = row.columns, row.columns.name, buses.find(row)
         if bus is not None and not math.isnan(bus.V_nom):
-            row.require("P_rated_kW", _rating(bus, total))
+            row.require("P_rated_kW", _rating(bus, it.phases, total))
         if name:
             _require_name(row, name)
         if it.parameters and sets is not None:
@@ -129,11 +131,14 @@ def read_inverters(
             row.problem(f'inverter "{name}": there is one of this name already; names must differ')
         if bus is None:
             continue
-        buses.require_phases(row, bus, "ABC")
+        phases = "" if "phases" in row.wrong else it.phases
+        buses.require_phases(row, bus, phases)
         buses.require_ground(row, bus, "an inverter")
-        if bus.name in at:
-            row.problem(f'bus "{bus.name}" has inverter "{at[bus.name]}" already; only one can stand on a bus')
-        at.setdefault(bus.name, name)
+        nodes = [(bus.name, phase) for phase in phases]
+        if taken := next((node for node in nodes if node in at), None):
+            row.problem(f'bus "{bus.name}" has inverter "{at[taken]}" on phase {taken[1]} already; {ONE_EACH}')
+        for node in nodes:
+            at.setdefault(node, name)
         inverters.setdefault(
             name,
             InverterRow(
@@ -145,6 +150,7 @@ def read_inverters(
                 V_nom=bus.V_nom,
                 m_p=it.m_p_pu,
                 m_q=it.m_q_pu,
+                phases=it.phases,
                 spare=it.spare == "yes",
                 parameters=it.parameters,
             ),
@@ -154,16 +160,24 @@ def read_inverters(
     return tuple(inverters.values())
 
 
-def problems_of(inverter: InverterRow, bus: Bus, load: float) -> list[str]:
-    """Return what the tables would refuse of an inverter at a bus of a feeder with so much load (W)."""
+def problems_of(inverter: InverterRow, bus: Bus, load: float, others: Iterable[InverterRow]) -> list[str]:
+    """Return what the tables would refuse of an inverter at a bus, beside so much load (W) and other inverters."""
     problems: list[str] = []
     numbers = {"P_rated_kW": inverter.P_rated / 1e3, "m_p_pu": inverter.m_p, "m_q_pu": inverter.m_q}
     cells: dict[str | None, Any] = {key: getattr(inverter, key) for key in ("name", "kind", "bus", "microgrid")}
     cells.update({key: repr(float(value)) for key, value in numbers.items()})
+    cells["phases"] = inverter.phases
     row = CsvRow(InverterColumns, f'inverter "{inverter.name}"', cells, problems)
-    row.require("P_rated_kW", _rating(bus, load / 1e3))
+    row.require("P_rated_kW", _rating(bus, inverter.phases, load / 1e3))
+    if missing := [phase for phase in inverter.phases if phase not in bus.phases and "phases" not in row.wrong]:
+        row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
     if inverter.name:
         _require_name(row, inverter.name)
+    for other in others:
+        if inverter.name == other.name:
+            row.problem("there is one of this name already; names must differ")
+        if inverter.bus == other.bus and (taken := [phase for phase in inverter.phases if phase in other.phases]):
+            row.problem(f'bus "{bus.name}" has inverter "{other.name}" on phase {taken[0]} already; {ONE_EACH}')
     return problems
 
 
@@ -176,9 +190,9 @@ def _require_set(row: CsvRow[InverterColumns], sets: Mapping[str, OwnParameters]
         row.problem(f'parameters "{name}": a {kind} has no {", ".join(wrong)}; give it a set of its own')
 
 
-def _rating(bus: Bus, load: float) -> Plausible:
-    """Return the range of the rating (kW) of an inverter at a bus of a feeder with so much load (kW)."""
-    most = power_of("an inverter", bus.V_nom, RATED_CURRENT, 3)
+def _rating(bus: Bus, phases: str, load: float) -> Plausible:
+    """Return the range of the rating (kW) of an inverter on phases of a bus, in a feeder with so much load (kW)."""
+    most = power_of("an inverter", bus.V_nom, RATED_CURRENT, len(phases))
     among = load > 0.0 and load * TIMES_THE_LOAD < most.high
     what = f"{most.what} beside {load:.4g} kW of load" if among else most.what
     return Plausible(what, 1.0, load * TIMES_THE_LOAD if among else most.high)

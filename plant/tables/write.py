@@ -78,6 +78,7 @@ def _tables(feeder: Feeder) -> Iterator[Table]:
                 row.P_rated / 1e3,
                 row.m_p,
                 row.m_q,
+                row.phases,
                 "yes" if row.spare else "",
                 row.parameters,
             )

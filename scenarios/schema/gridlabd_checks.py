@@ -82,7 +82,7 @@ def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
     for before, state in pairwise(supply_states(scenario, feeder)):
         assert state.event is not None, "the first state alone has none"
         path, event = f"event[{index[state.event.label]}]", f'event "{state.event.label}"'
-        if idle := [row.name for row in feeder.inverters if (row.bus, "A") in state.new]:
+        if idle := [row.name for row in feeder.inverters if row.node in state.new]:
             problems.add(
                 path,
                 f"{event} de-energises {', '.join(idle)}, and an inverter of GridLAB-D needs a voltage; "

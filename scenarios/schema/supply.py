@@ -55,7 +55,7 @@ def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
                 f"{when} de-energises {what}: no substation and no grid-forming inverter is connected to them any more"
             )
         for part in state.islands:
-            there = [row for row in rows if (row.bus, "A") in part]
+            there = [row for row in rows if row.node in part]
             rated = sum(row.P_rated for row in there if row.name in state.inverters)
             load = _load(part, feeder)
             if load > rated:
@@ -72,7 +72,7 @@ def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplySta
     graph = Connectivity(feeder)
     closed = graph.closed_at_start()
     names = {name: switch.name for switch in feeder.switches for name in switch.names}
-    forming = {row.name: row.bus for row in inverters_of(scenario, feeder) if row.kind == "GFM"}
+    forming = [row for row in inverters_of(scenario, feeder) if row.kind == "GFM"]
     present = frozenset(row.name for row in feeder.inverters)
     source = (feeder.source.bus, "A") if feeder.source else None
     before: frozenset[Node] = frozenset()
@@ -81,7 +81,7 @@ def supply_states(scenario: ScenarioModel, feeder: Feeder) -> Iterator[SupplySta
             closed = closed - {names.get(name, "") for name in event.open}
             closed = closed | {names[name] for name in event.close if name in names}
             present = (present - set(event.leave)) | set(event.join)
-        fed, dead = graph.fed(closed, (bus for name, bus in forming.items() if name in present))
+        fed, dead = graph.fed(closed, (row for row in forming if row.name in present))
         nodes = frozenset(node for part in dead for node in part)
         islands = tuple(part for part in fed if source not in part)
         yield SupplyState(event, nodes, nodes - before, islands, present)
@@ -97,9 +97,7 @@ def _what(nodes: frozenset[Node], inverters: frozenset[str], feeder: Feeder) -> 
     """Buses with their load and inverters; "" where there is nothing that would miss its voltage."""
     buses = [bus.name for bus in feeder.buses if any((bus.name, phase) in nodes for phase in bus.phases)]
     lost = _load(nodes, feeder)
-    idle = [
-        row.name for row in (*feeder.inverters, *feeder.spares) if row.name in inverters and (row.bus, "A") in nodes
-    ]
+    idle = [row.name for row in (*feeder.inverters, *feeder.spares) if row.name in inverters and row.node in nodes]
     if not lost and not idle:
         return ""
     some = ", ".join(buses[:_SHOWN]) + (", ..." if len(buses) > _SHOWN else "")

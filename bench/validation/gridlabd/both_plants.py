@@ -8,7 +8,9 @@ agents.
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +18,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
-from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, shortened
-from plant.equipment import InverterRow
+from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, SinglePhase, shortened
+from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
+from plant.gridlabd.export_glm import write_tables
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
 from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
@@ -59,6 +62,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
         If GridLAB-D is missing, or ended.
     """
     scenario, feeder = load_scenario(run.scenario)
+    feeder = _with_single_phase(feeder, run.single_phase)
     config, agents = configs(scenario, feeder, run.case)
     settings = replace(
         config.settings,
@@ -72,19 +76,50 @@ def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
         config = _reclosing_at_its_angle(network, config, run.reclosing)
     assert config.end is not None
     ours = Plant(network, config.settings, config.T_c, config.record_step)
-    with GridlabdPlant(ours, config.settings, config.T_c, config.end, sys.executable) as theirs:
+    with _started(ours, feeder, run, config) as theirs:
         if run.closed_loop:
             first, second = (_closed_loop(plant, config, agents) for plant in (ours, theirs))
         else:
             closes = {event.switch: round(event.t / config.T_c) for event in config.settings.events}
             tick = closes[run.reclosing.switch] if run.reclosing else -1
-            first, second = (_open_loop(plant, run, config, tick) for plant in (ours, theirs))
+            first, second = (_open_loop(plant, run, config, tick, network.inverters) for plant in (ours, theirs))
     (t, rows), (t_theirs, rows_theirs) = (_arranged(each.rows, network.inverters) for each in (first, second))
     if not np.array_equal(t, t_theirs):
         raise ValueError(f"rows of {t.size} and {t_theirs.size} steps are not of the same times")
     gaps = np.abs(rows - rows_theirs)
     angles = (first.angle, second.angle) if run.reclosing else None
     return Compared(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
+
+
+def _with_single_phase(feeder: Feeder, added: Sequence[SinglePhase]) -> Feeder:
+    """Return the feeder with these inverters beside its own."""
+    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    rows = (
+        InverterRow(
+            name=it.name,
+            kind=it.kind,
+            bus=it.bus,
+            phases=it.phase,
+            microgrid="single-phase",
+            P_rated=it.P_rated,
+            V_nom=V_nom[it.bus],
+            m_p=0.01,
+            m_q=0.05,
+        )
+        for it in added
+    )
+    return replace(feeder, inverters=(*feeder.inverters, *rows))
+
+
+def _started(ours: Plant, feeder: Feeder, run: ComparedRun, config: PlantConfig) -> GridlabdPlant:
+    """Start GridLAB-D, from the shipped tables, or from tables with further inverters."""
+    assert config.end is not None
+    with tempfile.TemporaryDirectory() as folder:
+        settings = config.settings
+        if run.single_phase:
+            write_tables(feeder, Path(folder))
+            settings = replace(settings, feeder=folder)
+        return GridlabdPlant(ours, settings, config.T_c, config.end, sys.executable)
 
 
 class _Ran(NamedTuple):
@@ -130,10 +165,12 @@ def _closed_loop(plant: PlantLike, config: PlantConfig, agents: tuple[AgentConfi
     return _Ran(rows)
 
 
-def _open_loop(plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig, closing: int) -> _Ran:
+def _open_loop(
+    plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig, closing: int, inverters: Sequence[InverterRow]
+) -> _Ran:
     """Go through a run, and read the angle across the switch at the tick at which it closes."""
     assert config.end is not None
-    units = {unit.name: unit for unit in load_scenario(run.scenario)[1].inverters}
+    units = {unit.name: unit for unit in inverters}
     orders = {round(order.t / config.T_c): order for order in run.orders}
     angle = float("nan")
     for tick in range(round(config.end / config.T_c)):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
+from msgspec.structs import replace
 
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.plant_config import PlantConfig, SwitchEvent
@@ -42,6 +43,17 @@ class Reclosing(NamedTuple):
     """Time (s) that the run goes on."""
 
 
+class SinglePhase(NamedTuple):
+    """A single-phase inverter that a run adds to the feeder's own."""
+
+    name: str
+    kind: Literal["GFM", "GFL"]
+    bus: str
+    phase: Literal["A", "B", "C"]
+    P_rated: float
+    """Rating (W)."""
+
+
 class ComparedRun(NamedTuple):
     """One run: the events and limits that both plants go through."""
 
@@ -58,6 +70,8 @@ class ComparedRun(NamedTuple):
     orders: tuple[TimedSetPoints, ...] = ()
     reclosing: Reclosing | None = None
     """Instead of events."""
+    single_phase: tuple[SinglePhase, ...] = ()
+    """Further inverters."""
     impedances: bool = True
     """Whether our switches and regulators have GridLAB-D's impedances."""
     tolerance: float = 1e-8
@@ -65,6 +79,15 @@ class ComparedRun(NamedTuple):
     in_tests: bool = True
     """Whether the tests have it too: three minutes on two cores have to do for all parts."""
 
+
+ON_ONE_PHASE = (
+    SinglePhase("s1", "GFL", "96", "B", 50e3),
+    SinglePhase("s2", "GFL", "103", "C", 40e3),
+    SinglePhase("s3", "GFL", "47", "A", 30e3),
+    SinglePhase("g1", "GFM", "114", "A", 60e3),
+    SinglePhase("g2", "GFM", "38", "B", 60e3),
+)
+"""Four on laterals of their phase, and one at a bus of three phases."""
 
 RUNS = {
     "islanding-I": ComparedRun("constant set-points; islanding, then loss of load", "islanding", "I"),
@@ -88,6 +111,27 @@ RUNS = {
         "islanding",
         "I",
         gfl=GflParameters(mode="balanced_power"),
+    ),
+    "single-phase-IV": ComparedRun(
+        "as islanding-IV, with three GFL and two GFM on single phases, in closed loop too",
+        "islanding",
+        "IV",
+        closed_loop=True,
+        single_phase=ON_ONE_PHASE,
+    ),
+    "single-phase-limits": ComparedRun(
+        "single-phase set-points to 1.3 and -1.3 pu, GFM beyond P_max; GFL as current sources",
+        "islanding",
+        "I",
+        gfl=replace(ONE_RATING, model="current_source"),
+        single_phase=ON_ONE_PHASE,
+        orders=(
+            TimedSetPoints(1.5, ("s1",), 1.3, 1.03),
+            TimedSetPoints(2.5, ("s2",), -1.3, 1.0),
+            TimedSetPoints(3.5, ("g1",), 1.4, 1.02),
+            TimedSetPoints(5.0, ("g1",), -0.3, 1.0),
+        ),
+        in_tests=False,
     ),
     "available-power": ComparedRun(
         "available power below the reference, in closed loop", "wind-up", "clamp", closed_loop=True

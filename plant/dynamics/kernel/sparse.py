@@ -37,6 +37,8 @@ class SparseMaps(NamedTuple):
     """Voltages (V) of the terminals that have no position: a source's, or 0."""
     feeds: NDArray[np.bool_]
     """Which inverters inject."""
+    single: Integers
+    """Single-phase inverters: their second and third terminals have no position, and copy the first."""
     scratch: Real
     """Room for the solution and its right-hand side."""
     increments: Real
@@ -60,6 +62,7 @@ def no_maps() -> SparseMaps:
         terminals,
         fixed,
         held,
+        nowhere,
         values,
         increments,
     )

@@ -55,10 +55,13 @@ class DenseReduction(SwitchState):
         Z_G, Z_C, Z_S = np.split(columns, [G.size, G.size + C_U.shape[1]], axis=1)
 
         seen = np.flatnonzero(place[G] >= 0)
+        turn = circuit.turn.T.ravel()
+        copies = np.flatnonzero(circuit.copies.T.ravel())
 
         def at_terminals(of_unknown: Complex) -> Complex:
             rows = np.zeros((G.size, of_unknown.shape[1]), complex)
             rows[seen] = of_unknown[place[G[seen]]]
+            rows[copies] *= turn[copies, None]
             return rows
 
         self._columns = (Z_G, Z_C, Z_S)
@@ -66,7 +69,7 @@ class DenseReduction(SwitchState):
         self._Z_GG, self._Z_Gb, self._G_S = at_terminals(Z_G), at_terminals(Z_C), at_terminals(Z_S)
         for row, node in enumerate(G):
             if held[node]:
-                self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = 1.0
+                self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = turn[row]
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
         """Return branch voltages (V) by Newton's method, and the islands that have no solution, which keep the guess.

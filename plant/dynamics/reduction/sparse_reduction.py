@@ -44,7 +44,9 @@ class SparseReduction(SwitchState):
         self._lu: SuperLU | None = None
         place = np.full(circuit.Y.shape[0], -1, np.int64)
         place[self.unknown[kept]] = np.arange(kept.size)
-        self._at = place[circuit.terminals]
+        self._at = np.where(circuit.copies, -1, place[circuit.terminals])
+        self._whole_at = np.where(circuit.copies, -1, at)
+        self._single = np.flatnonzero(circuit.copies[:, 1])
         self._feeds = np.zeros(len(circuit.terminals), bool)
         self._feeds[self.feeding % max(self._feeds.size, 1)] = True
 
@@ -68,6 +70,7 @@ class SparseReduction(SwitchState):
                 terminals=self._at,
                 fixed=self._held_voltages(source_voltage),
                 feeds=self._feeds,
+                single=self._single,
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((2, 2 * self._C.shape[1])),
             ),
@@ -104,7 +107,7 @@ class SparseReduction(SwitchState):
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
         """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
-        return self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
+        return self.circuit.turn * self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
 
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
         """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
@@ -112,7 +115,7 @@ class SparseReduction(SwitchState):
         if self.unknown.size:
             if self._lu is None:
                 self._lu = splu(sp.csc_matrix(self._whole))
-            right = self._injected(J, self.place[self.circuit.terminals], self.unknown.size)
+            right = self._injected(J, self._whole_at, self.unknown.size)
             V[self.unknown] = self._lu.solve(right - self._Y_S_whole @ source_voltage - self._C_whole @ I_b)
         V[self.circuit.sources] = source_voltage
         return V

@@ -16,14 +16,14 @@ def folder(tmp_path: Path) -> Path:
 
 
 def edit(folder: Path, file: str, row: int, **cells: str) -> None:
-    """Change cells of one row; the header is row 1, a row beyond the end repeats the last one."""
+    """Change cells of one row, also of a further column; the header is row 1, a row beyond the end repeats the last."""
     with (folder / file).open(newline="") as stream:
         table = list(csv.DictReader(stream))
     if row - 2 == len(table):
         table.append(dict(table[-1]))
     table[row - 2] |= cells
     with (folder / file).open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, list(table[0]))
+        writer = csv.DictWriter(stream, list(table[0] | cells))
         writer.writeheader()
         writer.writerows(table)
 
@@ -171,8 +171,11 @@ MISTAKES: list[tuple[str, int, dict[str, str], str]] = [
     ("capacitors.csv", 3, {"Q_a_kvar": "-50"}, "Q_a_kvar: must be at least 0 kvar, got -50"),
     ("capacitors.csv", 3, {"V_rated_kV_LN": "0"}, "V_rated_kV_LN: a rated voltage must be above 0, got 0 kV"),
     ("inverters.csv", 11, {"spare": "no"}, 'spare "no": must be "yes" or empty'),
-    ("inverters.csv", 3, {"bus": "160"}, 'bus "160" has inverter "inv1" already; only one can stand on a bus'),
+    ("inverters.csv", 3, {"bus": "160"}, 'bus "160" has inverter "inv1" on phase A already; only one'),
     ("inverters.csv", 3, {"bus": "94"}, 'bus "94" has no phase B, C; it has A'),
+    ("inverters.csv", 3, {"bus": "94", "phases": "B"}, 'bus "94" has no phase B; it has A'),
+    ("inverters.csv", 3, {"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C" or empty'),
+    ("inverters.csv", 3, {"bus": "160", "phases": "C"}, 'bus "160" has inverter "inv1" on phase C already; only one'),
     ("inverters.csv", 3, {"name": "inv1"}, 'inverter "inv1": there is one of this name already; names must differ'),
     ("inverters.csv", 3, {"kind": "PV"}, 'kind "PV": no such kind of inverter; choose one of GFM, GFL'),
     ("inverters.csv", 3, {"P_rated_kW": "0"}, "P_rated_kW: the rating of an inverter must be above 0, got 0 kW"),

@@ -31,8 +31,12 @@ def test_own_tables_survive_writing(name: str, tmp_path: Path) -> None:
 def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
     """What `add_inverter` returns can be named by a scenario, once it is saved."""
     feeder = Feeder.read("microgrid123").add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
+    for phase in "ABC":
+        feeder = feeder.add_inverter(f"leg{phase}", bus="47", kind="GFM", P_rated=5e4, phases=phase)  # type: ignore[arg-type]
+    feeder = feeder.add_inverter("lateral", bus="96", kind="GFL", P_rated=5e4, phases="B")
 
     assert Feeder.read(feeder.save(tmp_path / "mine")).inverters == feeder.inverters
+    assert [row.phases for row in feeder.inverters[-5:]] == ["ABC", "A", "B", "C", "B"]
 
 
 @pytest.mark.parametrize(
@@ -42,6 +46,10 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
         ({"P_rated": -1.0, "m_p": 0.0}, "P_rated_kW: .* above 0.*; .*m_p_pu: .* above 0"),
         ({"P_rated": 200.0}, "P_rated_kW: 0.2 kW is not plausible"),
         ({"name": "a/b"}, "cannot be part of a Zenoh key"),
+        ({"bus": "96", "m_p": 0.0}, 'm_p_pu: .* above 0.*; .*bus "96" has no phase A, C; it has B'),
+        ({"bus": "96", "phases": "C"}, 'bus "96" has no phase C; it has B'),
+        ({"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C"'),
+        ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
     ],
 )
 def test_an_inverter_that_the_tables_would_refuse_is_not_added(wrong: dict[str, Any], said: str) -> None:
