@@ -80,8 +80,9 @@ class Agent:
         self.config = config
         self.fault = ""
         """Error of the law; empty if none. After an error the agent is idle, and the inverter is on primary droop."""
-        self._graph_error = self._reported_graph_error = ""
-        """Error of the graph's rule with the present roster, and the last reported one. Meanwhile the agent is idle."""
+        self.graph_error = ""
+        """Error of the graph's rule with the present roster; empty if none. Meanwhile the agent is idle."""
+        self._reported_graph_error = ""
         self._rule = rule_of(config.control)
         self._law = law_in_force(config.control) if law is None else law
         self._law_runs = False
@@ -162,7 +163,7 @@ class Agent:
 
         The same roster object gives the same neighbours without another evaluation, until the known agents change.
         """
-        if roster is self._neighbours[0] and not self._graph_error:
+        if roster is self._neighbours[0] and not self.graph_error:
             return self._neighbours[1]
         members = {name: self._known[name] for name in roster if name in self._known}
         name = self.config.name
@@ -171,9 +172,9 @@ class Agent:
         try:
             neighbours = in_neighbours(self.config.control, name, members, self._rule)
         except GraphError as error:
-            self._graph_error = str(error)
+            self.graph_error = str(error)
             return ()
-        self._graph_error = ""
+        self.graph_error = ""
         self._neighbours = roster, neighbours
         return neighbours
 
@@ -205,9 +206,9 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
-        if self._graph_error:
-            news = self._graph_error if self._graph_error != self._reported_graph_error else ""
-            self._reported_graph_error = self._graph_error
+        if self.graph_error:
+            news = self.graph_error if self.graph_error != self._reported_graph_error else ""
+            self._reported_graph_error = self.graph_error
             return replace(self.idle_state(measurement), fault=news)
         if self.fault:
             return self.idle_state(measurement)

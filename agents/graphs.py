@@ -218,13 +218,37 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     }
 
 
-def own_neighbours_by(rule: Graph, members: Members, name: str, own: str) -> tuple[str, ...]:
-    """Return one agent's in-neighbours by a rule, in the order of `members`; see `neighbours_by`."""
-    linked = _PAIRWISE.get(rule) if isinstance(rule, FunctionType) else None
-    if linked is not None:
-        return tuple(_linked_to(own, members, linked))
-    heard = _evaluated(rule, members, name).get(own, frozenset())
-    return tuple(other for other in members if other != own and other in heard)
+class RosterGraph:
+    """The graph on one roster, agent by agent. A rule by pairs costs one row, any other is evaluated once for all.
+
+    Parameters
+    ----------
+    rule, members, name
+        As of `neighbours_by`.
+    """
+
+    def __init__(self, rule: Graph, members: Members, name: str) -> None:
+        self._rule, self._members, self._name = rule, members, name
+        self._linked = _PAIRWISE.get(rule) if isinstance(rule, FunctionType) else None
+        self._heard_by: dict[str, frozenset[str]] | None = None
+        self._error = ""
+        self._place: dict[str, int] = {}
+
+    def in_neighbours(self, own: str) -> tuple[str, ...]:
+        """Return an agent's in-neighbours, in the order of the members; raise GraphError as `neighbours_by` does."""
+        if self._linked is not None:
+            return tuple(_linked_to(own, self._members, self._linked))
+        if self._error:
+            raise GraphError(self._error)
+        if self._heard_by is None:
+            try:
+                self._heard_by = _evaluated(self._rule, self._members, self._name)
+            except GraphError as error:
+                self._error = str(error)
+                raise
+            self._place = {name: i for i, name in enumerate(self._members)}
+        heard = (other for other in self._heard_by.get(own, ()) if other != own and other in self._place)
+        return tuple(sorted(heard, key=self._place.__getitem__))
 
 
 def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[str]]:

@@ -26,8 +26,10 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from agents.agent_config import AgentConfig
 from agents.agent_node import AgentNode
+from agents.graphs import GraphError
+from agents.known_agents import KnownAgents
 from agents.laws.law import Law
-from agents.topology import is_pairwise
+from agents.topology import in_neighbours, is_pairwise
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
@@ -55,10 +57,22 @@ class LockstepAgent(AgentNode):
         Emulated links to the agent; by default none.
     law : Law, optional
         Law that decides the set-points; by default the paper's.
+    known : KnownAgents, optional
+        What the agents of this process know of the others; by default this agent shares it with nobody.
     """
 
-    def __init__(self, config: AgentConfig, instance: str, links: Links | None = None, law: Law | None = None) -> None:
+    def __init__(
+        self,
+        config: AgentConfig,
+        instance: str,
+        links: Links | None = None,
+        law: Law | None = None,
+        known: KnownAgents | None = None,
+    ) -> None:
         super().__init__(config, instance, links, law)
+        self._known = KnownAgents(config.control) if known is None else known
+        self._known.add(self._agent.nameplate)
+        self.members = self._known.members
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
         self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
@@ -72,6 +86,10 @@ class LockstepAgent(AgentNode):
         """Whether the agent is ready for this roster. It stays so if an agent dies: the next roster changes it."""
         self._proofs: dict[tuple[str, str], bool] = {}
         """Processes asked for proof that they know of the subscription to them; True once they have answered."""
+        self._unproven: dict[str, str] | None = None
+        """In-neighbours on the roster whose processes have not answered; None until the whole roster has been met."""
+        self._roster_neighbours: tuple[str, ...] = ()
+        """In-neighbours on the roster, once it has been met."""
         self._tick: int | None = None
         """Number of the next tick; None before the first measurement."""
         self._grant: Measurement | None = None
@@ -120,7 +138,7 @@ class LockstepAgent(AgentNode):
         if self._roster is None:
             return (Awaited("Prepare", PLANT),)
         if not self._ready:
-            return tuple(Awaited("nameplate", name) for name in self._unmet() or self._unproven())
+            return tuple(Awaited("nameplate", name) for name in self._known.unmet(self._name) or self._unproven or ())
         missing = self._barrier.missing_messages()  # without a measurement, the states do not matter yet
         return missing[:1] if self._barrier.awaits(PLANT) else missing
 
@@ -147,7 +165,17 @@ class LockstepAgent(AgentNode):
             tick = "" if self._tick is None else f" at tick {self._tick}"
             self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
+    def vanished(self, key: str, now: float) -> None:
+        """Note that a token is gone; another agent of this process may have noted it before."""
+        match self.keys.parts(key):
+            case ("alive", "agent", name, instance):
+                if self._forget_process(name, instance) or self._processes.get(name) == instance:
+                    self._agent_gone(name, instance, now)
+            case _:
+                super().vanished(key, now)
+
     def _agent_gone(self, name: str, instance: str, now: float) -> None:
+        self.admission.release(name)
         self._proofs.pop((name, instance), None)
         if self._barrier.awaits(name):
             self._barrier.came(name)
@@ -190,57 +218,68 @@ class LockstepAgent(AgentNode):
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
         super()._on_nameplate(instance, nameplate, payload, now)
-        process = nameplate.sender, instance
+        name = nameplate.sender
+        process = name, instance
         if process in self._proofs:
             self._proofs[process] = True
-        elif self._pairwise and self.members.instance(nameplate.sender) == instance:
-            for name in self._agent.in_neighbours((self._name, nameplate.sender)):
+            if self._unproven and self._unproven.get(name) == instance:
+                del self._unproven[name]
+        elif self._pairwise and self.members.instance(name) == instance:
+            pair = {self._name: self._agent.nameplate, name: nameplate}
+            if in_neighbours(self._config.control, self._name, pair):
                 self._ask_for_proof(name)
         self._get_ready(now)
+
+    def _met(self, nameplate: Nameplate, now: float) -> None:
+        """Do nothing: the roster decides which nameplates count."""
 
     def _prepare(self, message: Prepare) -> None:
         if self._roster is not None and message.seq <= self._roster.seq:
             raise RejectedError("stale", f"roster {message.seq}, {self._roster.seq} is known")
-        instances = dict(zip(message.roster, message.instances, strict=True))
+        instances = self._known.processes(message)
         if instances.get(self._name) != self._instance:
             raise RejectedError("unexpected", f"roster {message.seq} is without this process")
-        self._roster, self._processes, self._ready = message, instances, False
-        for name, instance in instances.items():
-            self.members.prefer(name, instance)
-            if name in self.members.nameplates:
-                self._agent.meet(self.members.nameplates[name])
+        self._roster, self._processes, self._ready, self._unproven = message, instances, False, None
+        self._known.take(message)
 
     def _ask_for_proof(self, name: str) -> None:
         """Listen to an agent, and ask it for proof that it knows of the subscription."""
         instance = self.members.instance(name)
+        self.admission.bind(name, self._known.nameplate(name).epoch)
         self._proofs[name, instance] = False
         self._listen_to(name)
         self._ask(name, instance)
 
-    def _unmet(self) -> list[str]:
-        """Return the members of the roster whose nameplate is missing."""
-        met = self.members.nameplates
-        return [
-            name
-            for name, instance in self._processes.items()
-            if name != self._name and (name not in met or self.members.instance(name) != instance)
-        ]
-
-    def _unproven(self) -> list[str]:
-        """Return the in-neighbours on the roster without proof that they know of the subscription to them."""
-        neighbours = self._agent.in_neighbours(self._processes)
-        return [name for name in neighbours if not self._proofs.get((name, self._processes[name]))]
+    def _meet_neighbours(self) -> dict[str, str]:
+        """Note the in-neighbours on the roster; return those without proof that they know of the subscription."""
+        neighbours: tuple[str, ...] = ()
+        self._agent.graph_error = ""
+        try:
+            neighbours = self._known.in_neighbours(self._name)
+        except GraphError as error:
+            self._agent.graph_error = str(error)
+        for name in neighbours:
+            nameplate = self._known.nameplate(name)
+            self._agent.meet(nameplate)
+            self.admission.bind(name, nameplate.epoch)
+        self._roster_neighbours = neighbours
+        return {
+            name: self._processes[name] for name in neighbours if not self._proofs.get((name, self._processes[name]))
+        }
 
     def _get_ready(self, now: float) -> None:
         """Ask the in-neighbours of this roster for proof; send `Ready` once nothing is missing."""
-        if self._roster is None or self._ready or self._unmet():
+        if self._roster is None or self._ready or self._unproven:
             return
-        unproven = self._unproven()
-        for name in unproven:
-            if (name, self.members.instance(name)) not in self._proofs:
-                self._ask_for_proof(name)
-        if unproven:
-            return
+        if self._unproven is None:
+            if self._known.unmet(self._name):
+                return
+            self._unproven = self._meet_neighbours()
+            for name, instance in self._unproven.items():
+                if (name, instance) not in self._proofs:
+                    self._ask_for_proof(name)
+            if self._unproven:
+                return
         self._ready = True
         if self._tick is None:
             self._barrier.wait_for({PLANT: "Measurement(0)"}, now)
@@ -312,8 +351,7 @@ class LockstepAgent(AgentNode):
     def _await_next(self, grant: Measurement, now: float) -> None:
         """Start the wait for the next tick: it needs the states of this one, and some may be here already."""
         if self._processes is not self._neighbours_of:
-            self._neighbours_of = self._processes
-            self._neighbours = self._agent.in_neighbours(self._processes)
+            self._neighbours_of, self._neighbours = self._processes, self._roster_neighbours
         early, self._early = self._early, {}
         self._grant, self._tick = None, grant.seq + 1
         needed, counts = f"State({grant.seq})", self.members.instance

@@ -15,16 +15,25 @@ from agents.graphs import (
     GFM_only,
     Graph,
     Member,
+    RosterGraph,
     clustered,
     full,
     make_graph,
     natural_order,
     none,
-    own_neighbours_by,
     ring,
 )
 
-__all__ = ["adjacency", "in_neighbours", "is_pairwise", "laplacian", "link_problems", "natural_order", "rule_of"]
+__all__ = [
+    "adjacency",
+    "in_neighbours",
+    "is_pairwise",
+    "laplacian",
+    "link_problems",
+    "natural_order",
+    "rule_of",
+    "without_missing",
+]
 
 _OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "clustered": clustered, "ring": ring}
 
@@ -88,9 +97,14 @@ def in_neighbours(
     >>> in_neighbours(Control(secondary="all", graph="full", without=(("inv4", "inv1"),)), "inv1", members)
     ('inv2', 'inv3')
     """
+    graph = RosterGraph(rule_of(control) if rule is None else rule, members, control.graph)
+    return without_missing(control, name, graph.in_neighbours(name))
+
+
+def without_missing(control: Control, name: str, heard: tuple[str, ...]) -> tuple[str, ...]:
+    """Return an agent's in-neighbours by the rule without those whose links to it the case takes out."""
     missing = {pair[0] if pair[1] == name else pair[1] for pair in control.without if name in pair}
-    heard = own_neighbours_by(rule_of(control) if rule is None else rule, members, control.graph, name)
-    return tuple(other for other in heard if other not in missing)
+    return tuple(other for other in heard if other not in missing) if missing else heard
 
 
 def link_problems(control: Control, names: Sequence[str]) -> tuple[str, ...]:

@@ -135,9 +135,10 @@ class LockstepPlant(PlantNode):
 
     def _unmet(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
         """Return the missing tokens and nameplates of these agents."""
-        here = [name for name in names if self.members.instance(name)]
+        here = {name for name in names if self.members.instance(name)}
         tokens = [Awaited("token", name) for name in names if name not in here]
-        return *tokens, *(Awaited("nameplate", name) for name in here if name not in self.members.nameplates)
+        met = self.members.nameplates
+        return *tokens, *(Awaited("nameplate", name) for name in names if name in here and name not in met)
 
     def _refusal(self, name: str, instance: str) -> str:
         if name not in self._everyone:
@@ -199,7 +200,8 @@ class LockstepPlant(PlantNode):
 
     def _gather(self, now: float) -> None:
         """Prepare the first roster, if all agents and recorders are there."""
-        if self.phase == "gathering" and not self.missing_messages():
+        enough = len(self.members.nameplates) >= len(self.config.agents)  # else it would ask n times for all n
+        if self.phase == "gathering" and enough and not self.missing_messages():
             self._reporter.collect()
             self._prepare(now)
             assert set(self._roster) == set(self.config.agents)

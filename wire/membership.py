@@ -45,6 +45,8 @@ class Membership:
         """Nameplate of each process that has answered."""
         self.nameplates: dict[str, Nameplate] = {}
         """Nameplates of the processes that count."""
+        self.changes = 0
+        """Number of changes so far of the processes that count, or of their nameplates."""
 
     def appeared(self, name: str, instance: str) -> bool:
         """Note a token; return whether its process counts."""
@@ -73,6 +75,7 @@ class Membership:
         """Let the process of a name count no more; its epoch stays valid until its token is gone or replaced."""
         self._dismissed[name] = self._instances[name].pop(0)
         self.nameplates.pop(name, None)
+        self.changes += 1
 
     def prefer(self, name: str, instance: str) -> None:
         """Let one process of a name count as soon as its token is there."""
@@ -112,6 +115,7 @@ class Membership:
 
     def clear(self) -> None:
         """Forget all members."""
+        self.changes += 1
         for name in self.nameplates:
             self._admission.release(name)
         for known in (self._instances, self._preferred, self._dismissed, self._answers, self.nameplates):
@@ -119,12 +123,14 @@ class Membership:
 
     def _put_first(self, name: str) -> None:
         instances, preferred = self._instances.get(name, []), self._preferred.get(name)
+        self.changes += 1
         if preferred in instances:
             instances.remove(preferred)
             instances.insert(0, preferred)
 
     def _update(self, name: str) -> None:
         """Set nameplate and epoch of a name to those of the process that counts."""
+        self.changes += 1
         self._dismissed.pop(name, None)
         nameplate = self._answers.get((name, self.instance(name)))
         if nameplate is None:

@@ -13,8 +13,9 @@ from time import perf_counter
 
 import msgspec
 
-from agents.agent_config import AgentConfig
+from agents.agent_config import AgentConfig, Control
 from agents.carriers.make import close_laws, make_law
+from agents.known_agents import KnownAgents
 from agents.laws.law import Law
 from agents.lockstep_agent import LockstepAgent
 from plant.lockstep_plant import LockstepPlant
@@ -24,7 +25,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulated_links import links_of
 from wire.actions import Action, Fetch, Listen, Log, Publish
 from wire.codec import decode
-from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
+from wire.messages import PLANT, LinkReport, Nameplate, PlantEvent, Telemetry
 
 SHOWN = 5
 """Missing messages that an error names."""
@@ -48,6 +49,8 @@ class InprocessBus:
         Takes the reports of emulated links.
     newcomer : Callable[[str], LockstepAgent]
         Makes the core of an agent that the plant awaits while the run goes on.
+    known : KnownAgents
+        What all agents know of each other.
     """
 
     def __init__(
@@ -57,9 +60,10 @@ class InprocessBus:
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
         newcomer: Callable[[str], LockstepAgent],
+        known: KnownAgents,
     ) -> None:
         self._plant, self._agents = plant, list(agents)
-        self._newcomer = newcomer
+        self._newcomer, self._known = newcomer, known
         self._awaited: list[str] = []
         self._on_telemetry, self._on_links = on_telemetry, on_links
         self._subscribers: defaultdict[str, list[_Node]] = defaultdict(list)
@@ -99,13 +103,13 @@ class InprocessBus:
             self._start(agent)
 
     def _start(self, agent: LockstepAgent) -> None:
-        """Let an agent and all nodes before it see each other."""
+        """Let an agent and the plant see each other, and introduce it to all agents at once."""
         name = agent.token
         for key in agent.subscriptions:
             self._subscribers[key].append(agent)
         nameplate, answer = agent.nameplate
         self._nameplates[nameplate] = answer
-        inverter = self._plant.keys.parts(name)[2]
+        _, _, inverter, instance = self._plant.keys.parts(name)
         keys = self._plant.keys
         for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter)):
             if self._plant not in self._subscribers[key]:
@@ -113,10 +117,9 @@ class InprocessBus:
         self._plant.appeared(name, 0.0)
         self._do(self._plant, self._plant.take_actions())
         agent.appeared(self._plant.token, 0.0)
-        for other in self._agents[: self._agents.index(agent)]:
-            other.appeared(name, 0.0)
-            agent.appeared(other.token, 0.0)
-            self._do(other, other.take_actions())
+        introduced = decode(answer)
+        assert isinstance(introduced, Nameplate)
+        self._known.introduce(inverter, instance, introduced)
         self._do(agent, agent.take_actions())
 
     def _do(self, side: _Node, actions: Sequence[Action | Log]) -> None:
@@ -139,7 +142,7 @@ class InprocessBus:
                 self._subscribers[action.key].append(side)
 
     def _end_the_stopped(self) -> None:
-        stopped = [agent for agent in self._agents if agent.finished]
+        stopped = {agent for agent in self._agents if agent.finished}
         if not stopped:
             return
         self._agents = [agent for agent in self._agents if not agent.finished]
@@ -148,6 +151,7 @@ class InprocessBus:
         for agent in stopped:
             self._nameplates.pop(agent.nameplate[0])
             self._plant.vanished(agent.token, 0.0)
+            self._known.gone(*self._plant.keys.parts(agent.token)[2:])
             for other in self._agents:
                 other.vanished(agent.token, 0.0)
 
@@ -206,10 +210,13 @@ def run_inprocess(
             msgspec.structs.replace(plant_config, recorders=()), plant, links_of(PLANT, plant_config.links)
         )
         stack.callback(close_laws, laws)
+        control = next((config.control for config in known.values()), Control(secondary="none", graph="none"))
+        known_agents = KnownAgents(control)
 
         def agent_of(config: AgentConfig, instance: str) -> LockstepAgent:
+            assert config.control == known_agents.control
             laws.append(make_law(config.control))
-            return LockstepAgent(config, instance, links_of(config.name, config.links), laws[-1])
+            return LockstepAgent(config, instance, links_of(config.name, config.links), laws[-1], known_agents)
 
         agents = [
             agent_of(config, f"p{i}") for i, config in enumerate(known.values()) if config.name in plant_config.agents
@@ -220,7 +227,7 @@ def run_inprocess(
             agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
             return agents[-1]
 
-        InprocessBus(side, agents, note, on_links, newcomer).run()
+        InprocessBus(side, agents, note, on_links, newcomer, known_agents).run()
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(

@@ -1,0 +1,90 @@
+"""The other agents as the agents of one process know them: tokens, nameplates, the last roster and its graph. Pure.
+
+In simulated time, n agents in one process would else keep n copies of n nameplates, and evaluate the rule of the graph
+n times for each roster.
+"""
+
+from __future__ import annotations
+
+from agents.agent_config import Control
+from agents.graphs import RosterGraph
+from agents.topology import rule_of, without_missing
+from wire.admission import Admission
+from wire.membership import Membership
+from wire.messages import Nameplate, Prepare
+
+
+class KnownAgents:
+    """Tokens, nameplates, the last roster and its graph; agents of one process and one rule share them.
+
+    Parameters
+    ----------
+    control : Control
+        The run's rule.
+    """
+
+    def __init__(self, control: Control) -> None:
+        self.control = control
+        self.members = Membership(Admission())
+        """Tokens and nameplates. Each agent itself binds the epochs of the senders that it listens to."""
+        self._rule = rule_of(control)
+        self._own: dict[str, Nameplate] = {}
+        """Nameplates of the agents that share this."""
+        self._latest: tuple[Prepare | None, dict[str, str]] = None, {}
+        self._taken: Prepare | None = None
+        self._graph: RosterGraph | None = None
+        self._unmet: tuple[int, list[str]] = -1, []
+        """Number of changes of the members by then, and the names on the roster without a nameplate."""
+
+    def add(self, nameplate: Nameplate) -> None:
+        """Note the nameplate of an agent that shares this."""
+        self._own[nameplate.sender] = nameplate
+
+    def introduce(self, name: str, instance: str, nameplate: Nameplate) -> None:
+        """Note the token and the nameplate of an agent in one process with all others."""
+        self.members.appeared(name, instance)
+        self.members.meet(instance, nameplate)
+
+    def gone(self, name: str, instance: str) -> None:
+        """Note that a token is gone."""
+        self.members.vanished(name, instance)
+
+    def processes(self, message: Prepare) -> dict[str, str]:
+        """Return the process of each name on a roster, in the order of the inverters; for one message one object."""
+        if message is not self._latest[0]:
+            self._latest = message, dict(zip(message.roster, message.instances, strict=True))
+        return self._latest[1]
+
+    def take(self, message: Prepare) -> None:
+        """Take a new roster, whose processes count from now on."""
+        if message is self._taken:
+            return
+        self._taken, self._graph, self._unmet = message, None, (-1, [])
+        for name, instance in self.processes(message).items():
+            self.members.prefer(name, instance)
+
+    def unmet(self, own: str) -> list[str]:
+        """Return the members of the roster, but for the own agent, whose nameplates are missing."""
+        changes, names = self._unmet
+        if changes != self.members.changes:
+            met, counts = self.members.nameplates, self.members.instance
+            names = [name for name, instance in self._latest[1].items() if name not in met or counts(name) != instance]
+            self._unmet = self.members.changes, names
+        return [name for name in names if name != own] if names else names
+
+    def nameplate(self, name: str) -> Nameplate:
+        """Return the nameplate of an agent of the roster that has been met."""
+        return self.members.nameplates.get(name) or self._own[name]
+
+    def in_neighbours(self, own: str) -> tuple[str, ...]:
+        """Return the in-neighbours of an agent on the roster, all of whose members have been met.
+
+        Raises
+        ------
+        GraphError
+            If the rule is plugged in, and fails or returns no graph.
+        """
+        if self._graph is None:
+            roster = {name: self.nameplate(name) for name in self._latest[1]}
+            self._graph = RosterGraph(self._rule, roster, self.control.graph)
+        return without_missing(self.control, own, self._graph.in_neighbours(own))

@@ -1,0 +1,88 @@
+"""What the agents of one process share: one roster, one evaluation of the graph's rule, and nobody else's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.agent_config import Control
+from agents.graphs import RosterGraph
+from agents.known_agents import KnownAgents
+from agents.lockstep_agent import LockstepAgent
+from tests.toy.toy_configs import agent_config
+from wire.actions import Fetch
+from wire.codec import encode
+from wire.keys import Keys
+from wire.messages import Prepare
+
+NAMES = ("inv1", "inv2", "inv3", "inv4")
+KEYS = Keys("toy")
+RING = Control(secondary="all", graph="ring")
+
+
+def roster(number: int, *names: str) -> Prepare:
+    """A roster whose processes have the names of the inverters."""
+    return Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=names, instances=names)
+
+
+def introduced(*names: str) -> KnownAgents:
+    """Agents on a ring that share what they know."""
+    known = KnownAgents(RING)
+    for name in names:
+        known.introduce(name, name, Agent(agent_config(name, RING)).nameplate)
+    return known
+
+
+def test_a_rule_is_evaluated_once_for_all_agents_of_a_roster() -> None:
+    """Each agent of a ring gets its own two neighbours out of one evaluation."""
+    calls: list[list[str]] = []
+
+    def rule(members: Mapping[str, Any]) -> dict[str, set[str]]:
+        calls.append(list(members))
+        names = list(members)
+        return {name: {names[i - 1]} for i, name in enumerate(names)}
+
+    graph = RosterGraph(rule, dict.fromkeys(NAMES), "mine")  # type: ignore[arg-type]
+
+    assert [graph.in_neighbours(name) for name in NAMES] == [("inv4",), ("inv1",), ("inv2",), ("inv3",)]
+    assert calls == [list(NAMES)]
+
+
+def test_a_new_roster_has_a_new_graph() -> None:
+    """The ring closes over the gap of an agent that has gone."""
+    known = introduced(*NAMES)
+    known.take(roster(0, *NAMES))
+    assert known.in_neighbours("inv1") == ("inv2", "inv4")
+
+    known.gone("inv2", "inv2")
+    known.take(roster(1, "inv1", "inv3", "inv4"))
+    assert known.unmet("inv1") == []
+    assert known.in_neighbours("inv1") == ("inv3", "inv4")
+
+
+def test_a_member_without_a_nameplate_is_missing_to_all_but_itself() -> None:
+    """A process whose token is gone, or another one than the roster's, is not met."""
+    known = introduced("inv1", "inv2", "inv3")
+    known.take(roster(0, *NAMES))
+    known.gone("inv2", "inv2")
+
+    assert known.unmet("inv1") == ["inv2", "inv4"]
+    assert known.unmet("inv2") == ["inv4"]
+
+
+def test_agents_that_share_ask_their_neighbours_alone() -> None:
+    """The one query is the proof of the subscription: nobody asks n agents for n nameplates."""
+    known = introduced(*NAMES)
+    nodes = [LockstepAgent(replace(agent_config(name, RING), epoch=1), name, known=known) for name in NAMES]
+    message = roster(0, *NAMES)
+    for node in nodes:
+        node.start(0.0)
+        node.appeared(KEYS.alive_plant(1), 0.0)
+        node.take_actions()
+        node.received(KEYS.control, encode(message), 0.0)
+
+    asked = [[KEYS.parts(a.key)[1] for a in node.take_actions() if isinstance(a, Fetch)] for node in nodes]
+    assert asked == [["inv2", "inv4"], ["inv1", "inv3"], ["inv2", "inv4"], ["inv1", "inv3"]]
