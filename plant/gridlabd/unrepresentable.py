@@ -27,6 +27,15 @@ def unrepresentable(feeder: Feeder) -> list[str]:
         problems.append(f"{feeder.name} has no source.csv; GridLAB-D needs a substation as its swing bus")
     if feeder.f_nom != F_NOM:
         problems.append(f"{feeder.name} has {feeder.f_nom:g} Hz; the model is written for {F_NOM:g} Hz")
+    at: dict[str, list[str]] = {}
+    for row in feeder.inverters:
+        at.setdefault(row.bus, []).append(row.name)
+    for bus, there in at.items():
+        if len(there) > 1:
+            text = (
+                f'bus "{bus}" has {", ".join(there)}; GridLAB-D takes one inverter a bus: give each a bus behind a line'
+            )
+            problems.append(text)
     names = list(_names(feeder))
     taken = Counter(in_model for _, _, in_model in names)
     for kind, name, in_model in names:

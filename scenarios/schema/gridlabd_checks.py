@@ -76,9 +76,20 @@ def _parameters_beyond(name: str, own: InverterParameters) -> Iterator[tuple[str
 def _check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
     """Note events that leave an inverter without voltage, or give it back to a part that had none.
 
-    An inverter of GridLAB-D does not return from there, and its power flow finds no solution from 0 V.
+    An inverter of GridLAB-D does not return from there, and its power flow finds no solution from 0 V. Nor does an
+    island stay alive there whose GFM are all single-phase.
     """
     index = {event.label: i for i, event in enumerate(scenario.events)}
+    for state in supply_states(scenario, feeder):
+        for part in state.islands:
+            forming = [row for row in feeder.inverters if row.kind == "GFM" and row.node in part]
+            if all(len(row.phases) == 1 for row in forming):
+                when, path = "at t = 0 the switches leave", "plant.feeder"
+                if state.event is not None:
+                    when, path = f'event "{state.event.label}" leaves', f"event[{index[state.event.label]}]"
+                names = ", ".join(row.name for row in forming)
+                text = f"{when} an island to {names}, and in GridLAB-D a GFM of three phases must form one"
+                problems.add(path, f"{text}; leave one connected to it, {_OTHERWISE}")
     for before, state in pairwise(supply_states(scenario, feeder)):
         assert state.event is not None, "the first state alone has none"
         path, event = f"event[{index[state.event.label]}]", f'event "{state.event.label}"'

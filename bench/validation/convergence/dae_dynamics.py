@@ -71,6 +71,8 @@ class DaeDynamics(Dynamics):
             return
         if not self.network.reduction.online.all():
             raise RuntimeError("the reference has no inverter that is off")
+        if units.single.any():
+            raise RuntimeError("the reference has no single-phase inverter")
         self._gfm, self._gfl = GfmEquations(_those(units.units, "GFM")), GflEquations(_those(units.units, "GFL"))
         terminals = circuit.terminals
         self._network = NetworkEquations(circuit, self._gfm.y_f, terminals[units.gfm_at], terminals[units.gfl_at])
