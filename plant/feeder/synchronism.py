@@ -131,13 +131,22 @@ class Synchronism:
         others
             Switches that close with it. A dead side that one of them energizes counts as the energizing island.
         """
+        phases = self._network.switches[switch].phases
+        found = self._on_phases(switch, phases, closed, others)
+        if found is None and len(phases) > 1:  # a single-phase inverter may feed one phase of a side alone
+            single = (self._on_phases(switch, phase, closed, others) for phase in phases)
+            found = max(filter(None, single), key=lambda difference: difference.angle, default=None)
+        return found
+
+    def _on_phases(self, switch: str, phases: str, closed: frozenset[str], others: Iterable[str]) -> Difference | None:
+        """Return the difference across these phases of a switch, whose ends must all be live."""
         network, reduction = self._network, self._dynamics.network.reduction
         device, merge = network.switches[switch], network.merge(closed)
         island = reduction.label[merge.representative]
         live = reduction.live[island]
         rest = closed.union(others) - {switch}
-        ends = [self._live_end(bus, device.phases, live, rest) for bus in (device.from_bus, device.to_bus)]
-        nodes = [[network.index(bus, phase) for phase in device.phases] for bus in ends if bus]
+        ends = [self._live_end(bus, phases, live, rest) for bus in (device.from_bus, device.to_bus)]
+        nodes = [[network.index(bus, phase) for phase in phases] for bus in ends if bus]
         if len(nodes) < 2 or island[nodes[0][0]] == island[nodes[1][0]]:
             return None
         first, second = (int(island[of[0]]) for of in nodes)

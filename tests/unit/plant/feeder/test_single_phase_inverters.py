@@ -1,0 +1,200 @@
+"""Single-phase inverters on a feeder: laterals, legs of one bus, islands, trips and reclosing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from plant.dynamics.reduction import reduce_network
+from plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
+from plant.feeder import Plant
+from plant.network import Network
+from plant.plant_config import Method, PlantSettings, PowerLimit, Protection, SwitchEvent
+from plant.tables import read_feeder
+from tests.unit.plant.networks import feeder, three_phase_bus
+
+V_NOM = 2400.0
+T_C = 0.02
+Z_SELF, Z_MUTUAL = 0.3 + 0.6j, 0.1 + 0.3j
+
+
+def unit(name: str, kind: str, bus: str, phases: str, P_rated: float) -> InverterRow:
+    """An inverter of the default droops."""
+    return InverterRow(
+        name=name,
+        kind=kind,  # type: ignore[arg-type]
+        bus=bus,
+        phases=phases,  # type: ignore[arg-type]
+        microgrid="MG1",
+        P_rated=P_rated,
+        V_nom=V_NOM,
+        m_p=0.01,
+        m_q=0.05,
+    )
+
+
+def small(*inverters: InverterRow, lateral_load: float = 40e3) -> Feeder:
+    """A substation 0, a switch, a line to bus 2, a line to bus 3, and from there behind a switch a lateral of phase B.
+
+    ::
+
+        0 --/-- 1 ----- 2 ----- 3 --/-- 4 ----- 5 ----- 6
+                        ABC                 B
+    """
+    Z = tuple(tuple(Z_SELF if i == k else Z_MUTUAL for k in range(3)) for i in range(3))
+    none = ((0.0,) * 3,) * 3
+    lines = [
+        Line(name=f"{a}{b}", from_bus=a, to_bus=b, phases="ABC", config="abc", length=0.5) for a, b in ("12", "23")
+    ]
+    lines += [Line(name=f"{a}{b}", from_bus=a, to_bus=b, phases="B", config="b", length=0.2) for a, b in ("45", "56")]
+    return feeder(
+        buses=(*(three_phase_bus(name) for name in "0123"), *(Bus(name=n, phases="B", V_nom=V_NOM) for n in "456")),
+        lines=tuple(lines),
+        line_configs=(
+            LineConfig(name="abc", phases="ABC", Z=Z, B=none),
+            LineConfig(name="b", phases="B", Z=((Z_SELF,),), B=((0.0,),)),
+        ),
+        switches=(
+            Switch(name="0-1", alias="grid", from_bus="0", to_bus="1", phases="ABC", closed=True),
+            Switch(name="3-4", alias="lateral", from_bus="3", to_bus="4", phases="B", closed=True),
+        ),
+        loads=(
+            Load(bus="3", connection="Y", model="P", S=(60e3 + 2e4j, 40e3 + 1e4j, 50e3 + 1e4j)),
+            Load(bus="6", connection="Y", model="P", S=(0j, lateral_load + 0.2j * lateral_load, 0j)),
+        ),
+        source=Source(bus="0", V_pu=1.0, angle=0.0),
+        inverters=inverters,
+    )
+
+
+ON_LATERAL = (
+    unit("inv1", "GFM", "2", "ABC", 300e3),
+    unit("leg", "GFM", "5", "B", 60e3),
+    unit("roof", "GFL", "6", "B", 30e3),
+)
+
+
+def plant(of: Feeder, *events: SwitchEvent, **settings: object) -> Plant:
+    """The plant of a feeder, started at half of the ratings, with these switchings."""
+    chosen = {"P_set0": 0.5, "events": events} | settings
+    return Plant(Network(of), PlantSettings(**chosen), T_C, T_C)  # type: ignore[arg-type]
+
+
+def run(p: Plant, until: float) -> list[str]:
+    """Advance to a time; the texts of the events."""
+    while p.tick * T_C < until - 1e-9:
+        p.advance()
+    return [event.text for event in p.take_events()]
+
+
+@pytest.mark.parametrize("method", ["first-order", "second-order"])
+def test_both_forms_of_the_network_give_the_same_run(monkeypatch: pytest.MonkeyPatch, method: Method) -> None:
+    """Dense and sparse, a large feeder with single-phase inverters goes through islanding, load loss and reclosing."""
+    added = [unit(f"leg{phase}", "GFM", "47", phase, 60e3) for phase in "ABC"]
+    added += [unit("roof", "GFL", "96", "B", 50e3), unit("lateral", "GFM", "114", "A", 40e3)]
+    table = read_feeder("microgrid123")
+    table = replace(table, inverters=(*table.inverters, *(replace(row, V_nom=4160.0 / 3.0**0.5) for row in added)))
+    events = (("13-152", "open", 0.1), ("60-160", "open", 0.3), ("60-160", "close", 0.5))
+    settings = PlantSettings(events=tuple(SwitchEvent(t=t, switch=s, action=a) for s, a, t in events), method=method)  # type: ignore[arg-type]
+    runs = []
+    for most_dense in (0, 10_000):
+        monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+        p = Plant(Network(table), settings, T_C, T_C)
+        run(p, 0.8)
+        runs.append(np.array(p.take_rows()))
+
+    np.testing.assert_allclose(runs[0], runs[1], rtol=1e-9, atol=1e-3)
+
+
+def test_a_lateral_is_an_island_of_its_own_grid_forming_inverter() -> None:
+    """Behind its open switch phase B has the frequency of the droop of its own GFM, the rest that of the other."""
+    p = plant(
+        small(*ON_LATERAL),
+        SwitchEvent(t=0.1, switch="grid", action="open"),
+        SwitchEvent(t=0.2, switch="lateral", action="open"),
+    )
+    told = run(p, 8.0)
+    now = p.measure()
+
+    assert told[-2:] == ["island of inv1", "island of leg, roof"]
+    assert [now[name].island for name in ("inv1", "leg", "roof")] == ["inv1", "leg", "leg"]
+    for name, rating in (("inv1", 300e3), ("leg", 60e3), ("roof", 30e3)):
+        assert now[name].f - 60.0 == pytest.approx(0.6 * (0.5 - now[name].P / rating), abs=1e-4), name
+    assert pytest.approx(40e3, rel=0.01) == now["leg"].P + now["roof"].P
+
+
+def test_a_lateral_meets_the_rest_when_it_is_in_step() -> None:
+    """The switch of phase B waits until the lateral, which is fast, has come round; then all have one frequency."""
+    p = plant(
+        small(*ON_LATERAL, lateral_load=20e3),
+        SwitchEvent(t=0.1, switch="grid", action="open"),
+        SwitchEvent(t=0.1, switch="lateral", action="open"),
+        SwitchEvent(t=1.0, switch="lateral", action="close", synchronised=True),
+    )
+    told = run(p, 12.0)
+    f = [reading.f for reading in p.measure().values()]
+
+    assert any(text.startswith("switch lateral (3-4) waits for synchronism") for text in told)
+    assert any(text.startswith("switch lateral (3-4) closed in step") for text in told)
+    assert not any("tripped" in text for text in told)
+    assert np.ptp(f) < 1e-3
+
+
+def test_an_overloaded_lateral_trips_and_starts_again_by_itself() -> None:
+    """Underfrequency trips both inverters of the phase; after the delay they start it together."""
+    p = plant(
+        small(*ON_LATERAL, lateral_load=75e3),
+        SwitchEvent(t=0.1, switch="grid", action="open"),
+        SwitchEvent(t=0.1, switch="lateral", action="open"),
+        limits=(PowerLimit(t=0.3, inverter="roof", P_max=1e3),),
+        protection=Protection(enter_service=1.0),
+    )
+    told = run(p, 4.0)
+    now = p.measure()
+
+    assert any(text.startswith("leg tripped: underfrequency") for text in told)
+    assert "black start by leg, roof" in told
+    assert pytest.approx(75e3, rel=0.01) == now["leg"].P + now["roof"].P
+    assert pytest.approx(1e3, rel=0.2) == now["roof"].P
+    assert now["inv1"].f == pytest.approx(60.0, abs=1e-3)
+
+
+def test_three_legs_of_a_bus_feed_the_island_that_the_grid_leaves() -> None:
+    """Each gives what its own phase takes, at the frequency of its own droop."""
+    legs = tuple(unit(f"leg{phase}", "GFM", "2", phase, 100e3) for phase in "ABC")
+    p = plant(small(*legs), SwitchEvent(t=0.1, switch="grid", action="open"))
+    told = run(p, 5.0)
+    now = p.measure()
+
+    assert "island of legA, legB, legC" in told
+    for name, load in (("legA", 60e3), ("legB", 80e3), ("legC", 50e3)):
+        assert pytest.approx(load, rel=0.01) == now[name].P, name
+        assert now[name].f - 60.0 == pytest.approx(0.6 * (0.5 - now[name].P / 100e3), abs=1e-4), name
+
+
+def test_a_side_that_is_live_on_one_phase_needs_the_check_too() -> None:
+    """Where the phases are not coupled, a three-phase switch with phase B alone beyond is not closed blindly."""
+    table = small(ON_LATERAL[0], unit("leg", "GFM", "3", "B", 60e3), lateral_load=5e3)
+    configs = tuple(
+        replace(each, Z=tuple(tuple(z * (i == k) for k, z in enumerate(row)) for i, row in enumerate(each.Z)))
+        for each in table.line_configs
+    )
+    middle = Switch(name="2-9", alias="middle", from_bus="2", to_bus="9", phases="ABC", closed=True)
+    lines = tuple(replace(line, from_bus="9") if line.name == "23" else line for line in table.lines)
+    table = replace(
+        table,
+        line_configs=configs,
+        lines=lines,
+        buses=(*table.buses, three_phase_bus("9")),
+        switches=(*table.switches, middle),
+    )
+    p = plant(
+        table,
+        SwitchEvent(t=0.1, switch="grid", action="open"),
+        SwitchEvent(t=0.2, switch="middle", action="open"),
+        SwitchEvent(t=3.0, switch="middle", action="close"),
+    )
+    told = run(p, 3.1)
+
+    assert any(text.startswith("switch middle (2-9) joins two live islands: its sides are ") for text in told)
