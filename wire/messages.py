@@ -97,9 +97,9 @@ class Measurement(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     to: QuickName
     """Inverter of this measurement."""
     P: Power
-    """Real power out of the inverter (W, three phases)."""
+    """Real power out of the inverter (W, all its phases)."""
     Q: Power
-    """Reactive power out of the inverter (var, three phases)."""
+    """Reactive power out of the inverter (var, all its phases)."""
     V: Voltage
     """Terminal voltage (V, mean of the line-to-neutral RMS values)."""
     f: Frequency

@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
+FLOATING = 1e-12
+"""Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it
+phases without an inverter, which only the lines' impedances couple to the others, would have no determined voltage."""
+
 
 class SwitchState:
     """The island structure of a circuit, and its admittances with the inverters' filters.
@@ -79,6 +83,10 @@ class SwitchState:
         injects = np.tile(self.online, 3) & ~circuit.copies.T.ravel()
         y_diagonal = np.zeros(n, complex)
         np.add.at(y_diagonal, G, np.where(injects, np.tile(y_f, 3), 0.0))
+        whole = np.bincount(self.label[circuit.sources], minlength=self.count) >= 3
+        whole[self.inverter_island[forming & self.online & ~circuit.copies[:, 1]]] = True
+        if (on_few_phases := fed & ~whole).any():
+            y_diagonal += np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
         self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
         self.C = C[:, self.branches]
         self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)

@@ -56,6 +56,8 @@ class SparseReduction(SwitchState):
         from_sources = self._C_S.T @ source_voltage
         drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
         constant = -(self._Y_S @ source_voltage) - self._C @ drawn
+        if not constant.size:
+            return self._without_unknowns(net, from_sources, source_voltage)
         pattern, matrix = self._pattern, self._pattern.matrix(net.A, net.B)
         factorise_blocks(matrix)
         return net._replace(
@@ -74,6 +76,19 @@ class SparseReduction(SwitchState):
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((2, 2 * self._C.shape[1])),
             ),
+        )
+
+    def _without_unknowns(self, net: Reduced, from_sources: Complex, source_voltage: Complex) -> Reduced:
+        """Return the arrays where nothing is live but what a source holds: the kernel takes the dense ones then."""
+        m, n = 2 * from_sources.size, 2 * self.terminals.size
+        held = (self.circuit.turn * self._held_voltages(source_voltage)).T.ravel()
+        return net._replace(
+            PT=np.zeros((n, m)),
+            QT=np.zeros((m, m)),
+            x_c=np.concatenate([from_sources.real, from_sources.imag]),
+            GGT=np.zeros((n, n)),
+            GBT=np.zeros((m, n)),
+            s_G=np.concatenate([held.real, held.imag]),
         )
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:

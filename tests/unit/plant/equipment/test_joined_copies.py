@@ -48,6 +48,17 @@ def test_imported_feeders_can_be_copied(tmp_path: Path) -> None:
     assert len(two.solve()) == 2 * len(one.solve()) + 3
 
 
+def test_copies_keep_the_phases_of_their_inverters() -> None:
+    """A single-phase inverter stands on the same phase in every copy."""
+    one = Feeder.read("microgrid123").add_inverter("roof", "96", "GFL", 5e4, phases="B")
+    two = joined_copies(one, 2, "450")
+
+    assert [(row.name, row.bus, row.phases) for row in two.inverters if row.name.startswith("roof")] == [
+        ("roof", "96", "B"),
+        ("roof_2", "96_2", "B"),
+    ]
+
+
 @pytest.mark.parametrize(
     ("copies", "joint", "text"),
     [

@@ -173,6 +173,23 @@ def test_three_legs_of_a_bus_feed_the_island_that_the_grid_leaves() -> None:
         assert now[name].f - 60.0 == pytest.approx(0.6 * (0.5 - now[name].P / 100e3), abs=1e-4), name
 
 
+@pytest.mark.parametrize("most_dense", [0, 10_000])
+def test_alone_on_three_phases_it_feeds_its_own(monkeypatch: pytest.MonkeyPatch, most_dense: int) -> None:
+    """A leg of phase B left with a three-phase section feeds phase B; constant power on the others has no solution."""
+    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    islanding = SwitchEvent(t=0.1, switch="grid", action="open")
+    table = small(unit("leg", "GFM", "5", "B", 300e3))
+    impedances = replace(table, loads=tuple(replace(load, model="Z") for load in table.loads))
+    feeding, collapsed = plant(impedances, islanding), plant(table, islanding)
+    run(feeding, 2.0)
+
+    assert any("leg tripped, as the island has no solution" in text for text in run(collapsed, 0.2))
+    assert pytest.approx(80e3, rel=0.02) == feeding.measure()["leg"].P
+    assert feeding.measure()["leg"].f - 60.0 == pytest.approx(
+        0.6 * (0.5 - feeding.measure()["leg"].P / 300e3), abs=1e-4
+    )
+
+
 def test_a_side_that_is_live_on_one_phase_needs_the_check_too() -> None:
     """Where the phases are not coupled, a three-phase switch with phase B alone beyond is not closed blindly."""
     table = small(ON_LATERAL[0], unit("leg", "GFM", "3", "B", 60e3), lateral_load=5e3)

@@ -82,15 +82,18 @@ def test_transformers_and_regulators_of_any_ratio_are_exported(tmp_path: Path) -
 def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None:
     """GridLAB-D begins with the terminal voltages that our plant has with the same parameters and set-points."""
     feeder = read_feeder("microgrid123", "event2")
+    roof, lateral = (replace(feeder.inverters[i], P_rated=5e4) for i in (1, 0))
+    added = (replace(roof, name="roof", bus="47", phases="C"), replace(lateral, name="lateral", bus="96", phases="B"))
+    feeder = replace(feeder, inverters=(*feeder.inverters, *added))
     settings = PlantSettings(P_set0=0.5, gfm=GfmParameters(X_f=0.2))
 
     text = export_glm(feeder, settings, 1, "voltages.csv")
     theirs = voltages(text, tmp_path)
 
-    assert text.count("Xfilter 0.2;") == 3
+    assert text.count("Xfilter 0.2;") == 4
     ours = Plant(Network(with_impedances(feeder)), settings, settings.h, settings.h).measure()
     for row in feeder.inverters:
-        V = sum(abs(phasor) for phasor in theirs[f"n{row.bus}"]) / 3.0
+        V = np.mean([abs(theirs[f"n{row.bus}"]["ABC".index(phase)]) for phase in row.phases])
         assert abs(V - ours[row.name].V) / row.V_nom < TOLERANCE, row.name
 
 
@@ -103,6 +106,9 @@ def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
 
     with pytest.raises(FeederError) as error:
         export_glm(feeder, PlantSettings(), 1, "voltages.csv")
+    crowded = replace(feeder, inverters=(*inverters, replace(others[2], name="leg", bus="80", phases="B")))
+    with pytest.raises(FeederError, match='bus "80" has inv4, leg; GridLAB-D takes one inverter a bus'):
+        export_glm(crowded, PlantSettings(), 1, "voltages.csv")
     with pytest.raises(FeederError, match='inv1 has model = "regfm_a1", which no GFM of GridLAB-D has'):
         export_glm(read_feeder("microgrid123"), PlantSettings(gfm=REGFM_A1), 1, "voltages.csv")
 
