@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from array import array
 from collections import Counter
 from collections.abc import Iterator
 from io import StringIO
@@ -27,6 +28,9 @@ COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 
 PARTIAL = "links.partial"
 """Name of the verdicts' file while the case runs; links.csv takes its place."""
+
+_SIZE = 4
+"""Bytes of the size before each part in that file."""
 
 
 class LinkRecord:
@@ -70,7 +74,7 @@ class LinkRecord:
             with self._file.open("ab") as file:
                 for trace in traces:
                     encoded = _encode(trace)
-                    file.write(len(encoded).to_bytes(4, "little") + encoded)
+                    file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
 
     @property
     def sent(self) -> int:
@@ -94,10 +98,28 @@ class LinkRecord:
     def traces(self) -> Iterator[LinkTrace]:
         """Yield the verdicts in parts, as they were reported."""
         yield from self._traces
+        yield from (trace for _, trace in self._in_file())
+
+    def _in_file(self) -> Iterator[tuple[int, LinkTrace]]:
+        """Yield the parts in the file, each with its place."""
         if self._file is not None and self._file.exists():
             with self._file.open("rb") as file:
-                while size := file.read(4):
-                    yield _decode(file.read(int.from_bytes(size, "little")))
+                while size := file.read(_SIZE):
+                    yield file.tell(), _decode(file.read(int.from_bytes(size, "little")))
+
+    def sorted_parts(self) -> Iterator[LinkTrace]:
+        """Yield the verdicts in parts, link by link; of those in the file only one part at a time is in memory."""
+        places: dict[tuple[str, str], array[int]] = {}
+        for place, trace in self._in_file():
+            places.setdefault((trace.src, trace.dst), array("Q")).append(place)
+        yield from sorted(self._traces, key=lambda trace: (trace.src, trace.dst))
+        if self._file is None or not places:
+            return
+        with self._file.open("rb") as file:
+            for link in sorted(places):
+                for place in places[link]:
+                    file.seek(place - _SIZE)
+                    yield _decode(file.read(int.from_bytes(file.read(_SIZE), "little")))
 
     def by_link(self) -> dict[tuple[str, str], LinkTrace]:
         """Return all verdicts of each link (src, dst) in one."""
@@ -127,17 +149,24 @@ class LinkRecord:
         if not self.sent:
             return []
         check = None if setup is None else self._check(setup)
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for trace in self.by_link().values():
-            writer.writerows(_rows(trace))
-        write_whole(folder / "links.csv", text.getvalue())
+        write_whole(folder / "links.csv", self._csv())
         write_whole(folder / "links.json", self._json(check))
         if self._file is not None:
             self._file.unlink(missing_ok=True)
             self._file = None
         return list(self._lines(check))
+
+    def _csv(self) -> Iterator[str]:
+        """Yield the text of links.csv: a run of an hour has hundreds of megabytes."""
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for trace in self.sorted_parts():
+            writer.writerows(_rows(trace))
+            yield text.getvalue()
+            text.seek(0)
+            text.truncate()
+        yield text.getvalue()
 
     def _check(self, setup: EmulationConfig) -> Report:
         """Test every link over which anything was sent; see `netem.check.verify`."""

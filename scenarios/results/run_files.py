@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
@@ -102,11 +103,12 @@ def refusal(folder: Path, error: OSError) -> str:
     return str(error)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file at once or not at all."""
+def write_whole(path: Path, text: str | Iterable[str]) -> None:
+    """Write a file, from its text or pieces of it, at once or not at all."""
     partial = path.with_name(path.name + ".partial")
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        with partial.open("w", encoding="utf-8", newline="\n") as file:
+            file.writelines([text] if isinstance(text, str) else text)
         partial.replace(path)
     except OSError:
         with contextlib.suppress(OSError):

@@ -109,9 +109,15 @@ def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     (mine,), (theirs,) = on_disk.by_link().values(), in_memory.by_link().values()
+    tracemalloc.start()
     on_disk.write(tmp_path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    with (tmp_path / "links.csv").open(newline="") as file:
+        written = [int(row["seq"]) for row in csv.DictReader(file)]
 
-    assert grown < 100_000
+    assert max(grown, peak) < 300_000
+    assert written == list(range(20_000))
     assert mine.outcome[:5_000] == theirs.outcome
     assert mine.seq == tuple(range(20_000))
     assert {path.name for path in tmp_path.iterdir()} == {"links.csv", "links.json"}
