@@ -25,7 +25,7 @@ from wire.schema.relations import problems_of
 from wire.schema.suggestion import suggestion
 
 SECONDS_PER_SECOND = 0.05
-"""Rough cost of a second of the nine-inverter feeder (s on one core, bench/sweep_speed.py), for messages alone."""
+"""Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers), for messages alone."""
 
 
 def sweeps() -> tuple[str, ...]:

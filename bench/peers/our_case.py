@@ -1,0 +1,200 @@
+"""Our side: the islanding experiment, case IV: its plant, one case by each driver, the command, a sweep."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+from unittest.mock import patch
+
+import gridpeers as gp
+import wire.codec
+from agents.agent import Agent
+from agents.agent_config import AgentConfig
+from agents.lockstep_agent import LockstepAgent
+from plant.build import build_plant
+from plant.feeder import Plant
+from plant.gridlabd.gridlabd_plant import REST, GridlabdPlant
+from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.process_driver import run_processes
+from scenarios.results.record import Recorder
+from scenarios.schema.configs import configs
+from wire.actions import Publish
+
+CASE = "IV"
+
+STEPS, REST_OF_CASE, TICKS = "plant: dynamics and network", "lock-step, bus, meeting", "all ticks"
+"""Keys of `shares`."""
+
+
+class OurCase:
+    """The islanding experiment, case IV: nine agents, full graph, T_c 20 ms, h 2 ms, 7 s.
+
+    Parameters
+    ----------
+    end : float, optional
+        Duration (s) instead of the experiment's: shorter in tests.
+    """
+
+    def __init__(self, end: float | None = None) -> None:
+        scenario = gp.load("islanding").replace({"paper": None})
+        if end is not None:
+            first = scenario.tables["event"][0]
+            scenario = scenario.replace({"event": [first | {"t_s": end / 2.0}], "time.end_s": end})
+        self.scenario = scenario
+        self.plant, self.agents = configs(scenario.spec, scenario.feeder, CASE)
+        assert self.plant.end is not None
+        self.end = self.plant.end
+        self.ticks = round(self.end / self.plant.T_c)
+
+    def plant_alone(self) -> dict[str, float]:
+        """Measure the plant with constant set-points: processor time (s) of its build and of its steps."""
+        began = process_time()
+        plant = build_plant(self.plant)
+        built = process_time()
+        for _ in range(self.ticks):
+            plant.advance()
+        return {"ours.plant.build": built - began, "ours.plant.steps": process_time() - built}
+
+    def gridlabd_alone(self) -> dict[str, float]:
+        """Measure GridLAB-D through the same events: processor time (s) of its start and of its steps.
+
+        It starts with a rest of half a second simulated that only our comparison needs; that is taken off.
+        """
+        ours = build_plant(self.plant)
+        with GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end) as plant:
+            started = _processor_time(plant.process.pid)
+            for _ in range(self.ticks):
+                plant.advance()
+            steps = _processor_time(plant.process.pid) - started
+        return {"gridlabd.plant.build": started - steps * REST / self.end, "gridlabd.plant.steps": steps}
+
+    def in_process(self) -> dict[str, float]:
+        """Measure one case in this process, processor time (s): tables are read, plant built and history written."""
+        with tempfile.TemporaryDirectory() as folder:
+            began = process_time()
+            with Recorder(Path(folder) / CASE) as recorder:
+                outcome = run_inprocess(self.plant, self.agents, recorder)
+                recorder.finish(self.end, self.plant.record_step)
+            took = process_time() - began
+        _check(outcome.broke)
+        return {"ours.case.inprocess": took}
+
+    def with_processes(self, shared: int = 0) -> dict[str, float]:
+        """Measure one case with processes (s): the whole, until its first row, and each tick."""
+        kind = f"{shared or len(self.agents)}"
+        with tempfile.TemporaryDirectory() as name:
+            folder, began = Path(name), perf_counter()
+            with Recorder(folder / CASE) as recorder:
+                outcome = run_processes(self.plant, self.agents, folder / "log", recorder, shared=shared)
+                _check(outcome.broke)
+                recorder.finish(self.end, self.plant.record_step)
+            whole = perf_counter() - began
+        return {
+            f"ours.tick.{kind}": outcome.run_s / outcome.ticks,
+            f"ours.first_row.{kind}": outcome.start_s,
+            f"ours.case.{kind}": whole,
+        }
+
+    def sweep(self, runs: int) -> dict[str, float]:
+        """Measure a sweep over all cores, the start of its workers included: runs per second."""
+        values = [0.5 + 1.5 * i / runs for i in range(runs)]
+        began = perf_counter()
+        rows = gp.sweep(self.scenario, {"gains.alpha": values}, cases=[CASE])
+        took = perf_counter() - began
+        _check("; ".join(rows["why"][rows["status"] != "ran"]))
+        return {"ours.sweep": len(rows) / took}
+
+    @cached_property
+    def sizes(self) -> tuple[int, int]:
+        """Bytes of a measurement and of a state, as they are published in this case; medians."""
+        sizes: dict[str, list[int]] = {"measurement": [], "state": []}
+
+        def noted(take: Callable[[Any], Any]) -> Callable[[Any], Any]:
+            def call(node: Any) -> Any:
+                actions = take(node)
+                for action in actions:
+                    if isinstance(action, Publish):
+                        for kind, found in sizes.items():
+                            if f"/{kind}/" in action[0]:
+                                found.append(len(action[1]))
+                return actions
+
+            return call
+
+        with ExitStack() as stack:
+            for owner in (LockstepPlant, LockstepAgent):
+                stack.enter_context(patch.object(owner, "take_actions", noted(owner.take_actions)))
+            _check(run_inprocess(self.plant, self.agents, lambda telemetry: None).broke)
+        measurement, state = (sorted(found)[len(found) // 2] for found in sizes.values())
+        return measurement, state
+
+    def shares(self) -> dict[str, float]:
+        """Measure the parts (s) of a case in this process at their borders; the timing itself is in the rest."""
+        return shares(self.plant, self.agents)
+
+
+def shares(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> dict[str, float]:
+    """Return the processor time (s) by part of a run in this process, and that of all ticks under `TICKS`."""
+    spent: defaultdict[str, float] = defaultdict(float)
+
+    def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **named: Any) -> Any:
+            began = process_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                spent[part] += process_time() - began
+
+        return call
+
+    borders: list[tuple[str, Any, str]] = [
+        (STEPS, Plant, "advance"),
+        *(("plant: readings, set-points, rows", Plant, name) for name in ("measure", "hold", "take_rows")),
+        ("agents: the law", Agent, "tick"),
+    ]
+    for function in (wire.codec.encode, wire.codec.decode):
+        name = function.__name__
+        owners = [module for module in list(sys.modules.values()) if getattr(module, name, None) is function]
+        borders += [("codec", module, name) for module in owners]
+    with ExitStack() as stack:
+        for part, owner, name in borders:
+            stack.enter_context(patch.object(owner, name, timed(part, getattr(owner, name))))
+        began = process_time()
+        built = timed("plant: tables and initial state", build_plant)(plant)
+        started: list[float] = []
+        outcome = run_inprocess(plant, agents, lambda telemetry: started.append(process_time()), plant=built)
+        ended = process_time()
+        spent["all"], spent[TICKS] = ended - began, ended - started[0]
+        _check(outcome.broke)
+    whole, ticks = spent.pop("all"), spent.pop(TICKS)
+    return dict(spent) | {REST_OF_CASE: whole - sum(spent.values()), TICKS: ticks}
+
+
+def help_time() -> dict[str, float]:
+    """Measure `gridpeers --help` (s)."""
+    command = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "--help"]
+    began = perf_counter()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return {"ours.help": perf_counter() - began}
+
+
+def _processor_time(pid: int) -> float:
+    """Return the processor time (s) of a running process so far; Linux."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _check(broke: str) -> None:
+    if broke:
+        raise RuntimeError(broke)
