@@ -14,9 +14,11 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from time import monotonic
+from typing import IO
 
 import msgspec
 
+from scenarios.drivers.forking import ForkedProcess, ForkServer, ForkServerError
 from wire.driver.process import LEASH
 
 LAST_LINES = 12
@@ -45,6 +47,8 @@ class Child:
         Called from another thread with every line of its standard output.
     prefix : Sequence[str], optional
         What stands before the interpreter in the command, e.g. ip netns exec NAME.
+    server : ForkServer or None, optional
+        Forks it, instead of a new interpreter; then the command is `-m` and a module.
     """
 
     def __init__(
@@ -56,12 +60,14 @@ class Child:
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,
         prefix: Sequence[str] = (),
+        server: ForkServer | None = None,
     ) -> None:
         self.name, self.log = name, log
-        # -P: a folder named like one of our packages, where the user stands, must not be imported instead
+        words = [*command, LEASH, name]  # the name is for people who look at ps
         with log.open("wb") as stderr:
-            self._process = subprocess.Popen(
-                [*prefix, sys.executable, "-P", *command, LEASH, name],  # the name is for people who look at ps
+            self._process = self._forked(server, words, stderr, speaks=on_word is not None) or subprocess.Popen(
+                # -P: a folder named like one of our packages, where the user stands, must not be imported instead
+                [*prefix, sys.executable, "-P", *words],
                 stdin=subprocess.PIPE,
                 stdout=stderr if on_word is None else subprocess.PIPE,
                 stderr=stderr,
@@ -73,6 +79,12 @@ class Child:
             self._process.stdin.flush()
         self._watcher = threading.Thread(target=self._watch, args=(on_exit, on_word), daemon=True)
         self._watcher.start()
+
+    @staticmethod
+    def _forked(server: ForkServer | None, words: list[str], log: IO[bytes], *, speaks: bool) -> ForkedProcess | None:
+        with contextlib.suppress(ForkServerError):
+            return None if server is None else server.fork(words[1:], log, speaks=speaks)
+        return None
 
     def _watch(self, on_exit: Callable[[Child], None], on_word: Callable[[str], None] | None) -> None:
         if on_word is not None and self._process.stdout is not None:

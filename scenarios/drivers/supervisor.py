@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -13,7 +14,11 @@ from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.fault_injector import FaultInjector
+from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
 from wire.messages import PLANT
+
+PRELOAD = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.laws.consensus")
+"""What most processes of agents import."""
 
 
 class Supervisor:
@@ -76,24 +81,41 @@ class Supervisor:
     def start(self, *names: str) -> None:
         """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life.
 
-        Agents that share a process start with the first of them.
+        Agents that share a process start with the first of them. Several processes of agents are forked from one that
+        has imported what they need.
         """
-        for name in names:
-            mates = self._shared.get(name, (name,))
-            if name != mates[0]:
-                continue
-            life = len(self.children.lives(name)) + 1
-            log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
-            if name == PLANT:
-                usual = ("-m", "scenarios.emulation.emulated_plant" if self._plant.links else "plant")
-                command = list(self._plant_command or usual)
-                self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
-                continue
-            configs = tuple(replace(self._agents[mate], epoch=life) for mate in mates)
-            command = ["-m", "scenarios.emulation.emulated_agent" if configs[0].links else "agents"]
-            prefix = self._prefixes.get(name, ())
-            process = configs if len(configs) > 1 else configs[0]
-            self.children.add(Child(name, command, process, log, self._on_exit, prefix=prefix))
+        firsts = [name for name in names if name == self._mates(name)[0]]
+        agents = [name for name in firsts if name != PLANT and name not in self._prefixes]
+        with ExitStack() as stack:
+            server = None
+            if len(agents) > 1 and AVAILABLE:
+                with suppress(ForkServerError):
+                    server = stack.enter_context(ForkServer((*PRELOAD, self._module(agents[0]))))
+            for name in firsts:
+                self._start(name, server)
+
+    def _start(self, name: str, server: ForkServer | None) -> None:
+        life = len(self.children.lives(name)) + 1
+        log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
+        if name == PLANT:
+            usual = ("-m", "scenarios.emulation.emulated_plant" if self._plant.links else "plant")
+            command = list(self._plant_command or usual)
+            self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
+            return
+        configs = tuple(replace(self._agents[mate], epoch=life) for mate in self._mates(name))
+        process = configs if len(configs) > 1 else configs[0]
+        prefix = self._prefixes.get(name, ())
+        command = ["-m", self._module(name)]
+        server = None if prefix else server
+        self.children.add(Child(name, command, process, log, self._on_exit, prefix=prefix, server=server))
+
+    def _mates(self, name: str) -> tuple[str, ...]:
+        """Return the agents that share the process of one, itself included."""
+        return self._shared.get(name, (name,))
+
+    def _module(self, name: str) -> str:
+        """Return the module of an agent's process."""
+        return "scenarios.emulation.emulated_agent" if self._agents[name].links else "agents"
 
     def start_when_gone(self, names: Iterable[str]) -> None:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""

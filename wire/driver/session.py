@@ -70,6 +70,12 @@ _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
 
+def load_zenoh() -> None:
+    """Import Zenoh with the threads that a node needs; it starts none before its first session."""
+    os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
+    import zenoh  # noqa: F401
+
+
 class SessionError(ValueError):
     """Zenoh could not open a session; the message says why and what to do."""
 
@@ -117,8 +123,8 @@ class Session:
         inbox: Inbox | None = None,
         meets_all: bool = False,
     ) -> None:
-        os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
         try:
+            load_zenoh()
             import zenoh
         except ImportError as error:
             raise SessionError(

@@ -1,0 +1,68 @@
+"""Processes that are forked from a server which has imported their modules."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from scenarios.drivers.children import Child
+from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
+from tests.toy.toy_configs import agent_config
+
+pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
+
+
+def stat_of(pid: int) -> list[str]:
+    """Fields of a process, from its state on."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
+def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path) -> None:
+    """It has this process as its parent, a session, a name in `ps`, a log, an exit status, and outlives the server."""
+    with (tmp_path / "log").open("wb") as log:
+        with ForkServer(("agents.__main__",)) as server:
+            good, killed = (server.fork(["agents", "--leash", name], log, speaks=False) for name in ("inv1", "inv2"))
+        parent, group, session = stat_of(good.pid)[1:4]
+        command = Path(f"/proc/{good.pid}/cmdline").read_text()
+        assert good.stdin is not None
+        good.stdin.write(b'{"run": 1}\n')
+        good.stdin.close()
+        killed.send_signal(signal.SIGKILL)
+
+        assert (good.wait(), killed.wait()) == (2, -signal.SIGKILL)
+        assert int(parent) == os.getpid()
+        assert int(group) == int(session) == good.pid != killed.pid
+    assert command == f"{sys.executable} -P -m agents --leash inv1\0"
+    assert "Expected `str`, got `int` - at `$.run`" in (tmp_path / "log").read_text()
+    killed.stdin.close()
+
+
+def test_a_process_that_cannot_be_forked_is_started_anew(tmp_path: Path) -> None:
+    """A server that is gone costs time and nothing else."""
+    config = agent_config("inv1")
+    with ForkServer(("no_such_module",)) as server:
+        child = Child("inv1", ["-m", "agents"], config, tmp_path / "log", lambda child: None, server=server)
+        child.signal(signal.SIGKILL)
+        child.release()
+
+    assert child.join(monotonic() + 60.0)
+    assert child.status == -signal.SIGKILL
+
+
+def test_a_server_with_threads_forks_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lock that another thread holds would stay locked in the new process for ever."""
+    text = "import threading, time\nthreading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+    (tmp_path / "busy_module.py").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+
+    with (
+        (tmp_path / "log").open("wb") as log,
+        ForkServer(("busy_module",)) as server,
+        pytest.raises(ForkServerError, match="has 2 threads"),
+    ):
+        server.fork(["agents"], log, speaks=False)

@@ -1,0 +1,121 @@
+"""A fork server: it imports what many processes need, once, and forks each of them.
+
+    python -m wire.driver.fork_server SOCKET MODULE ...
+
+`SOCKET` is the number of an inherited Unix socket, where the requests of `scenarios.drivers.forking` arrive. Each
+`MODULE` is imported at the start; of `MODULE:FUNCTION` the function is called too. Then each request, a JSON object
+with the words of a command line (`agents`, `--leash`, `inv1`) and three open files, becomes a process that runs the
+module as `python -m` would: with these as its standard input, output and error, in a session of its own.
+
+**Whose child it is.** The server forks twice and the process between ends at once, so that the new process becomes a
+child of the one that asks, the next subreaper above (`prctl(2)`). That one waits for it and learns its exit status as
+of any child. Nothing depends on the server once it has answered: it may die.
+
+**Why forking is safe here.** The server has one thread, and no session: each process opens its own. Before each fork
+the server checks that it is alone.
+"""
+
+from __future__ import annotations
+
+import array
+import ctypes
+import gc
+import json
+import os
+import runpy
+import socket
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+LONGEST = 65_536
+"""Longest request (bytes)."""
+
+
+class _Job(NamedTuple):
+    words: list[str]
+    """Module, and its arguments."""
+    files: tuple[int, ...]
+    """Standard input, output, error."""
+
+
+def main() -> None:
+    """Import, then serve requests until the socket closes; in a new process, run its module."""
+    control = socket.socket(fileno=int(sys.argv[1]))
+    for text in sys.argv[2:]:
+        module, _, function = text.partition(":")
+        found = import_module(module)
+        if function:
+            getattr(found, function)()
+    gc.collect()
+    gc.freeze()  # no collection touches these objects, so that the processes share their memory
+    job = _serve(control)
+    if job is None:
+        return
+    control.close()
+    _become(job)
+    runpy.run_module(job.words[0], run_name="__main__", alter_sys=True)
+
+
+def _serve(control: socket.socket) -> _Job | None:
+    """Return the job of this process, in a new process; None in the server, once nobody asks any more."""
+    while True:
+        data, files, _, _ = socket.recv_fds(control, LONGEST, 3)
+        if not data:
+            return None
+        job = _Job(json.loads(data), tuple(files))
+        threads = sum(1 for _ in Path("/proc/self/task").iterdir())
+        if threads > 1:
+            answer: dict[str, object] = {
+                "error": f"the fork server has {threads} threads: what was imported has started some"
+            }
+        else:
+            forked = _fork_twice()
+            if forked is None:
+                return job
+            answer = {"pid": forked}
+        for file in files:
+            os.close(file)
+        control.sendall(json.dumps(answer).encode())
+
+
+def _fork_twice() -> int | None:
+    """Fork a process that has the next subreaper above as its parent; return its id, None in the process itself."""
+    reading, writing = os.pipe()
+    between = os.fork()
+    if between == 0:
+        pid = os.fork()
+        if pid:
+            os.write(writing, array.array("q", [pid]).tobytes())
+            os._exit(0)
+        os.close(reading)
+        os.close(writing)
+        return None
+    os.close(writing)
+    pid = array.array("q", os.read(reading, 8))[0]
+    os.close(reading)
+    os.waitpid(between, 0)  # from now on the new process has its new parent
+    return pid
+
+
+def _become(job: _Job) -> None:
+    """Take over the standard files, and the look of a process that was started for this job."""
+    os.setsid()
+    for number, file in enumerate(job.files):
+        os.dup2(file, number)
+        os.close(file)
+    sys.argv = [sys.argv[0], *job.words[1:]]  # runpy sets the first
+    _show(f"{sys.executable} -P -m {' '.join(job.words)}")
+
+
+def _show(line: str) -> None:
+    """Have `ps` show a command line: write it where the kernel reads it. The last byte says that it is one text."""
+    fields = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    start, end = int(fields[45]), int(fields[46])
+    text = line.encode()[: end - start - 2]
+    ctypes.memmove(start, text.ljust(end - start - 1, b"\0") + b".", end - start)
+
+
+if __name__ == "__main__":
+    main()
