@@ -14,6 +14,7 @@ from plant.feeder.closings import Closings
 from plant.feeder.current_limits import CurrentLimits
 from plant.feeder.in_service import InService
 from plant.feeder.islands import Islands
+from plant.feeder.load_limits import LoadLimits
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Difference, Synchronism
@@ -123,6 +124,7 @@ class Plant:
         n = len(self.inverters)
         self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
         require_within_limits(self._dynamics.inverters, self._dynamics.network.reduction.online)
+        self._load_limits = LoadLimits(network, self._dynamics.network.V_branch)
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
@@ -223,6 +225,7 @@ class Plant:
             self._now = out[-1, :, :4].copy()
             self._in_service.watch(stop, out)
             step = stop
+        self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
         self.tick += 1
 
     # ---------------------------------------------------------------- for the recorder

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
@@ -19,8 +21,19 @@ TOLERANCE = 1e-11
 """Largest change of any voltage (pu) in the last iteration of our power flow."""
 
 
-def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> tuple[float, Node]:
-    """Return the largest difference (pu) between our voltages and another program's (V), and the node that has it.
+class Difference(NamedTuple):
+    """Our power flow beside another program's."""
+
+    largest: float
+    """Largest difference of a voltage (pu)."""
+    node: Node
+    """The node that has it."""
+    two_solutions: bool
+    """Whether the other program's voltages solve our equations as well: loads whose law jumps have two solutions."""
+
+
+def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> Difference:
+    """Return the largest difference between our voltages and another program's, `theirs` (V).
 
     Raises
     ------
@@ -28,13 +41,26 @@ def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> tuple[float, N
         If our power flow does not converge.
     """
     network = Network(feeder)
-    V = solve_power_flow(network, network.closed0, tolerance=TOLERANCE).V
     at = [k for k, node in enumerate(network.nodes) if node in theirs]
     given = np.array([theirs[network.nodes[k]] for k in at])
     # where the given voltage is far above the nominal one, the nominal one is not what the script means
-    largest = np.abs(V[at] - given) / np.maximum(network.V_nom[at], np.abs(given))
-    worst = int(np.argmax(largest))
-    return float(largest[worst]), network.nodes[at[worst]]
+    scale = np.maximum(network.V_nom[at], np.abs(given))
+
+    def solved_from(start: NDArray[np.complex128] | None) -> NDArray[np.float64]:
+        V = solve_power_flow(network, network.closed0, tolerance=TOLERANCE, start=start).V
+        return np.asarray(np.abs(V[at] - given) / scale)
+
+    off = solved_from(None)
+    worst = int(np.argmax(off))
+    two = False
+    if off[worst] > MATCH:
+        start = network.nominal.copy()
+        start[at] = given
+        try:
+            two = bool(solved_from(start).max() <= MATCH)
+        except ArithmeticError:
+            two = False
+    return Difference(float(off[worst]), network.nodes[at[worst]], two)
 
 
 def loads_without_ground(feeder: Feeder) -> list[str]:

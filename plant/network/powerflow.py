@@ -53,6 +53,7 @@ def solve_power_flow(
     shunt: NDArray[np.complex128] | None = None,
     injection: Injection | None = None,
     tolerance: float = 1e-10,
+    start: NDArray[np.complex128] | None = None,
 ) -> PowerFlow:
     r"""Solve the nodes that the substation reaches, by a fixed point.
 
@@ -72,6 +73,8 @@ def solve_power_flow(
         Currents fed into the nodes (A) from their voltages (V), in addition.
     tolerance : float, optional
         Largest change of any voltage in the last iteration (pu).
+    start : complex128[n], optional
+        Voltages to start from (V); by default those without load.
 
     Returns
     -------
@@ -101,7 +104,7 @@ def solve_power_flow(
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
 
     V_rep = np.zeros(len(network.nodes), dtype=np.complex128)
-    V_rep[unknown] = network.nominal[unknown]
+    V_rep[unknown] = (network.nominal if start is None else start)[unknown]
     V_rep[network.source_nodes] = network.source_voltage
     smallest, since = np.inf, 0
     for iteration in range(1, MOST_ITERATIONS + 1):

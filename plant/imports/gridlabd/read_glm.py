@@ -227,7 +227,7 @@ class _GlmReader:
             )
             return
         try:
-            worst, (bus, phase) = difference(feeder, theirs)
+            worst, (bus, phase), _ = difference(feeder, theirs)
         except ArithmeticError as error:
             self._problems.append(f"{self._path.name}: {error}")
             return

@@ -32,7 +32,7 @@ class Share(NamedTuple):
     V_off: float = 0.0
 
 
-def read_loads(engine: DssEngine, left_out: set[str], problems: list[str]) -> list[LoadPart]:
+def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems: list[str]) -> list[LoadPart]:
     """Return the parts of all loads that are enabled and not left out; a problem for each that cannot be represented.
 
     Of models 6 and 7 one thing is not taken over: that below `vlowpu` (half of the nominal voltage) they jump to
@@ -53,6 +53,11 @@ def read_loads(engine: DssEngine, left_out: set[str], problems: list[str]) -> li
             continue
         if load.kW == 0.0 and load.kvar == 0.0:
             continue
+        if int(load.Model) == FIXED_Q and load.kvar and not impedances:
+            notes.append(
+                f"{name}: model=6 takes less Q just below Vminpu, and more just above Vmaxpu: where its voltage "
+                "crosses one of them, no power flow has a solution, and an island is de-energised; model=1 has none"
+            )
         scale = multiplier if int(load.Status) == VARIABLE else 1.0
         parts += _parts(name, load, element, scale, impedances, problems)
     return parts

@@ -99,7 +99,7 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             notes.append(f"{name}: what it controls stays as it is")
         elif kind not in CONTROLS | WATCHING | {"load"}:
             problems.append(f'{name}: elements of class {kind} are not supported; leave it out (leave_out=["{name}"])')
-    load_parts = [*read_loads(engine, left_out, problems), *generated]
+    load_parts = [*read_loads(engine, left_out, notes, problems), *generated]
     lines = [name for name, kind in there if kind == "line"]
     for name in sorted(set(switches) - elements.used_switches):
         problems.append(f'switches: there is no line "{name}"; {suggestion(name.lower(), lines, "lines")}')
@@ -130,9 +130,11 @@ def _compared(path: Path, feeder: Feeder, circuit: Any) -> Feeder:
     nodes = [(bus, letter_of(int(number))) for bus, _, number in places]
     theirs = dict(zip(nodes, complex_of(circuit.YNodeVarray).tolist(), strict=True))
     try:
-        worst, (bus, letter) = difference(feeder, theirs)
+        worst, (bus, letter), two_solutions = difference(feeder, theirs)
         node = f"{bus}.{number_of(letter)}"
         told = f"{path.name}: our power flow differs from the engine's by {worst:.2g} pu, most at {node}"
+        if two_solutions:
+            told += "; both are solutions, as loads allow whose law jumps at Vminpu or Vmaxpu (models 3 and 4)"
     except ArithmeticError as error:
         worst, told = 1.0, f"{path.name}: the engine solves it, our {error}"
     if worst <= MATCH:

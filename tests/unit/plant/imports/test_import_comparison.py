@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from plant.imports.import_comparison import difference, loads_without_ground
@@ -23,7 +24,7 @@ def test_a_difference_is_found_where_it_is(tmp_path: Path) -> None:
     theirs = dict(zip(network.nodes, solve_power_flow(network, network.closed0).V.tolist(), strict=True))
 
     assert difference(feeder, theirs)[0] < 1e-9
-    worst, node = difference(feeder, theirs | {("c", "B"): theirs["c", "B"] * 1.001})
+    worst, node, _ = difference(feeder, theirs | {("c", "B"): theirs["c", "B"] * 1.001})
     assert node == ("c", "B")
     assert worst == pytest.approx(1e-3, rel=0.05)
 
@@ -35,3 +36,23 @@ def test_constant_power_without_ground_is_named(tmp_path: Path, connection: str,
     feeder = read_opendss(script)
 
     assert loads_without_ground(feeder) == named
+
+
+def test_two_solutions_are_told_from_a_difference(tmp_path: Path) -> None:
+    """Where the law of a load jumps, another program's solution can be another one than ours, and both are right."""
+    load = "New Load.l bus1=c phases=3 kv=0.48 kw=300 kvar=240 model=4"
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, load))
+    network = Network(feeder)
+    upper = solve_power_flow(network, network.closed0).V
+    at = [network.index("c", phase) for phase in "ABC"]
+    V_min = (abs(upper[at]) / network.V_nom[at]).min() - 1e-4  # just below, so that the load is still within
+    parts = tuple(msgspec.structs.replace(part, V_min=V_min) for part in feeder.load_parts)
+    network = Network(msgspec.structs.replace(feeder, load_parts=parts))
+    lower = solve_power_flow(network, network.closed0, start=0.9 * network.nominal).V
+
+    found = difference(network.feeder, dict(zip(network.nodes, lower.tolist(), strict=True)))
+    wrong = difference(network.feeder, dict(zip(network.nodes, (1.001 * lower).tolist(), strict=True)))
+
+    assert found.largest > 1e-4
+    assert found.two_solutions
+    assert not wrong.two_solutions
