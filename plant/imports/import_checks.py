@@ -6,10 +6,11 @@ import fnmatch
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from plant.equipment import NODES, PHASES, Feeder
-from plant.equipment.connectivity import Connectivity, by_bus
+from plant.equipment.connectivity import Connectivity, Node, by_bus
 from plant.network import Network
 from plant.tables.read import FeederError
 
@@ -43,6 +44,105 @@ def left_out_by(names: Sequence[str], patterns: Sequence[str], problems: list[st
     return left_out
 
 
+MOST_UNFED = 0.5
+"""Part of a feeder's load that may be without a path to the source; more of it is a mistake in the file."""
+
+
+def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], str] = number_of) -> Feeder:
+    """Return a feeder without the sections and loads that nothing can feed, each of which becomes a note.
+
+    They are sections without a path to the source with all switches closed, and loads at a node to which nothing else
+    leads. Nothing flows there, so that the rest is what it was. If they have most of the load, the feeder stays as it
+    is, and `refuse_unsolvable` names them.
+    """
+    held, sections = _held(feeder), _unfed_sections(feeder)
+    gone = frozenset[Node]().union(*sections)
+    idle = _idle_parts(feeder, held)
+    parts = [part for k, part in enumerate(feeder.load_parts) if k in idle or (part.bus, part.ends[0]) in gone]
+    unserved = sum(part.S.real for part in parts)
+    if not (gone or parts) or unserved > MOST_UNFED * sum(part.S.real for part in feeder.load_parts):
+        return feeder
+    for section in sections:
+        load = sum(part.S.real for part in parts if (part.bus, part.ends[0]) in section)
+        with_load = f", with {load / 1e3:.3g} kW of load" if load else ""
+        notes.append(f"{_named(feeder, section, name_node)}: no path to the source; left out{with_load}")
+    names = list(dict.fromkeys(part.name for k, part in enumerate(feeder.load_parts) if k in idle))
+    if names:
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        notes.append(f"{', '.join(names[:SHOWN])}{more}: at a node to which nothing else leads; left out")
+    kept = tuple(part for part in feeder.load_parts if part not in parts)
+    used = held | {(part.bus, letter) for part in kept for letter in part.ends}
+    used |= {(bus, letter) for row in feeder.switches for bus in (row.from_bus, row.to_bus) for letter in row.phases}
+    buses = [
+        msgspec.structs.replace(bus, phases="".join(p for p in bus.phases if (bus.name, p) in used - gone))
+        for bus in feeder.buses
+    ]
+    switches = [
+        msgspec.structs.replace(row, phases="".join(p for p in row.phases if (row.from_bus, p) not in gone))
+        for row in feeder.switches
+    ]
+    return msgspec.structs.replace(
+        feeder,
+        buses=tuple(bus for bus in buses if bus.phases),
+        switches=tuple(row for row in switches if row.phases),
+        elements=tuple(row for row in feeder.elements if not set(row.nodes) & gone),
+        load_parts=kept,
+    )
+
+
+def _held(feeder: Feeder) -> set[Node]:
+    """Return the nodes to which an element or the source leads, and not loads alone."""
+    assert feeder.source is not None
+    held = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
+    return held | {(feeder.source.bus, letter) for letter in PHASES}
+
+
+def _unfed_sections(feeder: Feeder) -> list[frozenset[Node]]:
+    """Return the sections that have no path to the source, not even through loads, with all switches closed."""
+    assert feeder.source is not None
+    through_loads = [
+        ((part.bus, one), (part.bus, other)) for part in feeder.load_parts for one, other in [part.ends] if other
+    ]
+    source, held = feeder.source.bus, _held(feeder)
+    parts = Connectivity(feeder).parts(whole=[source], tied=through_loads)
+    return by_bus(part for part in parts if (source, "A") not in part and part & held)
+
+
+def _idle_parts(feeder: Feeder, held: Collection[Node]) -> set[int]:
+    """Return the places of the load parts through which no current can flow.
+
+    Nodes that only loads lead to, and their loads, form groups; a group that touches one other node, or ground alone,
+    has no second way for a current.
+    """
+    group: dict[Node, Node] = {}
+
+    def root(node: Node) -> Node:
+        while group.setdefault(node, node) != node:
+            node = group[node]
+        return node
+
+    ends = [[(part.bus, letter) for letter in part.ends] for part in feeder.load_parts]
+    loose = [[node for node in pair if node[1] and node not in held] for pair in ends]
+    for nodes in loose:
+        for node in nodes[1:]:
+            group[root(node)] = root(nodes[0])
+    touched: dict[Node, set[Node]] = {}
+    for pair, nodes in zip(ends, loose, strict=True):
+        for node in nodes[:1]:
+            ground = {("", "") if not other[1] else other for other in pair if other not in nodes}
+            touched.setdefault(root(node), set()).update(ground)
+    return {k for k, nodes in enumerate(loose) if nodes and len(touched[root(nodes[0])]) <= 1}
+
+
+def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str], str]) -> str:
+    """Return the first buses of a section, and the nodes that it has of the first."""
+    nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
+    buses = list(dict.fromkeys(bus for bus, _ in nodes))
+    more = f" and {len(buses) - SHOWN} more" if len(buses) > SHOWN else ""
+    first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
+    return f"bus{'es' if len(buses) > 1 else ''} {', '.join(buses[:SHOWN])}{more} (first {first})"
+
+
 def refuse_unsolvable(
     path: Path, feeder: Feeder, problems: list[str], remedy: str, name_node: Callable[[str], str] = number_of
 ) -> None:
@@ -69,9 +169,7 @@ def refuse_unsolvable(
 
 def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable[[str], str]) -> None:
     """Add a problem for each node that loads alone lead to, and each section without the source, switches closed."""
-    assert feeder.source is not None
-    held = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
-    held |= {(feeder.source.bus, letter) for letter in PHASES}
+    held = _held(feeder)
     alone: dict[tuple[str, str], set[str]] = {}
     for part in feeder.load_parts:
         for letter in part.ends:
@@ -83,20 +181,10 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
             f"{name}: node {which} of bus {bus} is connected to nothing but loads: a "
             "phase that does not come there, or an open neutral; connect or ground it"
         )
-    graph = Connectivity(feeder)
-    through_loads = [
-        ((part.bus, one), (part.bus, other)) for part in feeder.load_parts for one, other in [part.ends] if other
-    ]
-    source = feeder.source.bus
-    parts = graph.parts(whole=[source], tied=through_loads)
-    for section in by_bus(part for part in parts if (source, "A") not in part and part & held):
-        nodes = [node for node in graph.nodes if node in section & held]
-        buses = list(dict.fromkeys(bus for bus, _ in nodes))
-        more = f" and {len(buses) - SHOWN} more" if len(buses) > SHOWN else ""
-        first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
+    for section in _unfed_sections(feeder):
         problems.append(
-            f"bus{'es' if len(buses) > 1 else ''} {', '.join(buses[:SHOWN])}{more} (first {first}): no path to the "
-            "source, even with all switches closed; connect or leave out what is there"
+            f"{_named(feeder, section & held, name_node)}: no path to the source, even with all switches closed; "
+            "connect or leave out what is there"
         )
 
 

@@ -32,6 +32,9 @@ RATED_CURRENT = 5000.0
 TIMES_THE_LOAD = 50.0
 """Largest rating of one inverter beside the total real power of the feeder's loads."""
 
+SOURCE_VOLTAGE = Plausible("the voltage of the substation", 0.8, 1.2, above_zero=True)
+"""Range of the substation's voltage (pu)."""
+
 Phases = Annotated[str, PhaseLetters()]
 OhmPerKm = Annotated[float, Unit("ohm/km")]
 LoadW = Annotated[float, Unit("kW"), "Real power at nominal voltage."]
@@ -106,8 +109,8 @@ class SwitchColumns(msgspec.Struct, frozen=True, kw_only=True):
     """One end."""
     to_bus: str
     """The other end."""
-    phases: Phases
-    """Phases that it switches."""
+    phases: Annotated[str, PhaseLetters(others=True)]
+    """Phases that it switches, and further nodes where its buses have some."""
     state: Annotated[Literal["closed", "open"], Label("state of a switch")]
     """Position at the start."""
     alias: str = ""
@@ -222,7 +225,7 @@ class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
 
     bus: str
     """Its bus, of three phases."""
-    V_pu: Annotated[float, Unit("pu"), Plausible("the voltage of the substation", 0.8, 1.2, above_zero=True)]
+    V_pu: Annotated[float, Unit("pu"), SOURCE_VOLTAGE]
     """Voltage."""
     angle_deg: Annotated[float, Unit("deg"), Plausible("the angle of the substation", -360.0, 360.0)]
     """Angle of phase A."""

@@ -60,7 +60,7 @@ def import_(
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             fail([f"{folder}: is there already; name a new folder with --out"], BAD_INPUT)
-        feeder.save(folder)
+        save_readable(feeder, folder)
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)
     _describe(feeder)
@@ -177,6 +177,20 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     try:
         return read(name, switches=switches, leave_out=leave_out)
     except FeederError as error:
+        refuse(error)
+
+
+def save_readable(feeder: Feeder, folder: Path) -> None:
+    """Write a feeder's tables and read them again; end with every problem, and no tables, if a run could not."""
+    import shutil
+
+    from plant.tables import FeederError
+
+    feeder.save(folder)
+    try:
+        feeder.read(folder)
+    except FeederError as error:
+        shutil.rmtree(folder)
         refuse(error)
 
 

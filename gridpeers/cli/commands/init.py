@@ -136,7 +136,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
 
     import msgspec
 
-    from gridpeers.cli.commands.feeder_commands import folder_of
+    from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
     from scenarios.feeder_proposal import NoProposalError
     from scenarios.operating_point import start_problem
     from scenarios.schema import load_scenario
@@ -146,7 +146,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
     name = folder_of(feeder.name)
-    msgspec.structs.replace(feeder, inverters=proposal.inverters).save(folder / name)
+    save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name)
     graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
     problem = ""
     for part in PARTS:

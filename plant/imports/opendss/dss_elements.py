@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from plant.equipment import NODES, Bus, Source, Switch
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.imports.opendss.dss_engine import DssEngine
+from plant.tables.feeder_columns import SOURCE_VOLTAGE
 
 Complex = NDArray[np.complex128]
 
@@ -47,6 +48,8 @@ class DssElements:
         self._places = [str(name).lower().rpartition(".") for name in engine.circuit.YNodeOrder]
         self._added: dict[str, tuple[str, str]] = {}
         """Buses that are not in the script: their phases, and the bus whose voltage and place they have."""
+        self._own_V_nom: dict[str, float] = {}
+        """Nominal voltages (V, line-to-neutral) of those that have another one."""
 
     def add(self, name: str, kind: str) -> None:
         """Take an element over by its primitive admittance matrix."""
@@ -72,13 +75,21 @@ class DssElements:
         if vsource.Phases != 3 or sorted(nodes[:3]) != [(bus, p) for p in "ABC"] or any(node[1] for node in nodes[3:]):
             self._problems.append(f"{name}: a source has three phases between nodes 1, 2, 3 of its bus and ground")
             return
+        frequency = float(self._engine.circuit.Solution.Frequency)
+        if vsource.Frequency != frequency:
+            self._problems.append(
+                f"{name}: is of {vsource.Frequency:g} Hz, and the circuit is solved at {frequency:g} Hz, so that the "
+                f"engine has 0 V; write Set DefaultBaseFrequency={frequency:g} before New Circuit"
+            )
         Y = matrix(element.Yprim)[:3, :3]
         stiff = self._add_bus(f"{bus}~{name.partition('.')[2]}", bus, "ABC")
         inner = [(stiff, letter) for letter in "ABC"]
         # conductor k leads to node nodes[k], and has the angle of the k-th phase
         self._append(name, [*inner, *nodes[:3]], np.block([[Y, -Y], [-Y, Y]]))
-        E = vsource.pu * vsource.BasekV / sqrt(3.0)
-        self.source.append(Source(bus=stiff, V_pu=E * 1e3 / self._V_nom(bus), angle=radians(vsource.AngleDeg)))
+        E, V_nom = 1e3 * vsource.pu * vsource.BasekV / sqrt(3.0), self._V_nom(bus)
+        if SOURCE_VOLTAGE.objection(E / V_nom):  # the voltage base of the bus is not meant for it
+            V_nom = self._own_V_nom[stiff] = E
+        self.source.append(Source(bus=stiff, V_pu=E / V_nom, angle=radians(vsource.AngleDeg)))
 
     def buses(self, parts: list[LoadPart]) -> tuple[Bus, ...]:
         """Return the buses that anything is connected to, in the script's order, with their nodes, voltages, places."""
@@ -106,7 +117,7 @@ class DssElements:
                     Bus(
                         name=each,
                         phases="".join(letter for letter in NODES if letter in letters),
-                        V_nom=self._V_nom(name),
+                        V_nom=self._own_V_nom.get(each) or self._V_nom(name),
                         x=x,
                         y=y,
                     )
@@ -159,6 +170,8 @@ class DssElements:
             self._problems.append(f"{name}: the engine gives no admittance matrix for it; leave it out or change it")
             return
         distinct = list(dict.fromkeys(node for node in nodes if node[1]))
+        if not distinct:
+            return  # all of it is grounded
         place = np.array([[node == each for each in distinct] for node in nodes], float).reshape(len(nodes), -1)
         own = place.T @ Y @ place
         rows = tuple(tuple(complex(value) for value in row) for row in own)

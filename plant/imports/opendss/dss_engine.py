@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from plant.imports.opendss.dss_script import DssScript
+from plant.imports.opendss.dss_script import HUNTING, DssScript
 from plant.tables.read import FeederError
 
 SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
@@ -79,8 +79,14 @@ class DssEngine:
             return self._clear(script.problems)
         for verb, where in script.not_run.items():
             self.notes.append(f"{where}: {verb} was not run")
+        self.notes += script.notes
         for command in SETTLE:
-            if message := self.execute(command):
+            message = self.execute(command)
+            if HUNTING in message:
+                self.notes.append(
+                    f"{path.name}: its controls hunt; they stay at their positions of the 1000th iteration"
+                )
+            elif message:
                 return [f"{path.name}: the engine cannot solve the circuit: {message}"]
         if not self.circuit.Solution.Converged:
             return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]

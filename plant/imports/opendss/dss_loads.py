@@ -42,10 +42,8 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
     loads, circuit = engine.circuit.Loads, engine.circuit
     multiplier = float(circuit.Solution.LoadMult)
     impedances = int(circuit.Solution.LoadModel) == ADMITTANCE
-    if circuit.Solution.Year:
-        problems.append(
-            f"set year={circuit.Solution.Year}: loads that grow by the year are not supported; leave it out"
-        )
+    year = int(circuit.Solution.Year)
+    growth = (1.0 + float(circuit.Solution.pctGrowth) / 100.0) ** (year - 1) if year else 1.0
     for load in loads:
         element = circuit.ActiveCktElement
         name = f"load.{str(load.Name).lower()}"
@@ -58,7 +56,11 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
                 f"{name}: model=6 takes less Q just below Vminpu, and more just above Vmaxpu: where its voltage "
                 "crosses one of them, no power flow has a solution, and an island is de-energised; model=1 has none"
             )
-        scale = multiplier if int(load.Status) == VARIABLE else 1.0
+        if year and str(load.Growth):
+            problems.append(
+                f"{name}: growth={load.Growth}: growth by a GrowthShape is not supported; leave out set year"
+            )
+        scale = growth * (multiplier if int(load.Status) == VARIABLE else 1.0)
         parts += _parts(name, load, element, scale, impedances, problems)
     return parts
 
@@ -90,7 +92,7 @@ def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, p
                     V_nom=V_nom,
                     exponents=share.exponents,
                     V_low=share.V_low if limited else 0.0,
-                    V_min=float(load.Vminpu) if limited else 0.0,
+                    V_min=float(load.Vminpu) if limited and float(load.Vminpu) > share.V_low else 0.0,
                     V_max=float(load.Vmaxpu) if limited else 0.0,
                     edge=share.edge,
                     V_off=share.V_off,

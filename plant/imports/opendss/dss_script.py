@@ -43,6 +43,15 @@ INCLUDING = frozenset({"redirect", "compile"})
 COORDINATES = frozenset({"buscoords", "latlongcoords"})
 """Commands that name a file without saying so."""
 
+METERS = frozenset({"energymeter", "monitor", "sensor"})
+"""Classes that measure."""
+
+ASIDE = METERS | {"loadshape", "tshape", "priceshape", "spectrum", "tcc_curve"}
+"""Classes that a snapshot does without: one that fails is a note."""
+
+HUNTING = "Max Control Iterations Exceeded"
+"""In the engine's warning on controls that move on and on: the import solves once more, and tells."""
+
 CLOSING = {'"': '"', "'": "'", "(": ")", "[": "]", "{": "}"}
 """Closing mark of a quoted name, by its opening mark."""
 
@@ -82,6 +91,8 @@ class DssScript:
     ----------
     problems : list of str
         Every command that failed: file, line, the engine's message.
+    notes : list of str
+        Commands that failed, and on which the network does not depend.
     not_run : dict of str to str
         First place of each kind of command that was not run.
     """
@@ -89,6 +100,8 @@ class DssScript:
     def __init__(self, execute: Execute, may_solve: Callable[[], bool]) -> None:
         self._execute, self._may_solve = execute, may_solve
         self.problems: list[str] = []
+        self.notes: list[str] = []
+        self._element = ""
         self.not_run: dict[str, str] = {}
         self._folder = Path()
 
@@ -125,8 +138,19 @@ class DssScript:
                 command = f'{verb} "{self._whole_path(_bare(rest))}"'
             else:
                 command = FILE.sub(lambda match: f'{match[1]}"{self._whole_path(_bare(match[2]))}"', command)
-            if message := self._execute(command):
-                self.problems.append(f"{where}: {printable(message)}")
+            self._element = element_of(command, self._element)
+            message = printable(self._execute(command))
+            if message and not (verb == "solve" and HUNTING in message):
+                self._failed(verb, f"{where}: {message}")
+
+    def _failed(self, verb: str, text: str) -> None:
+        kind = self._element.partition(".")[0]
+        if verb not in COORDINATES and kind not in ASIDE:
+            self.problems.append(text)
+            return
+        self.notes.append(text)
+        if kind in METERS:  # the engine solves nothing while one measures nowhere
+            self._execute(f"disable {self._element}")
 
     def _include(self, rest: str, where: str, depth: int) -> None:
         name = _bare(rest)
@@ -160,6 +184,25 @@ def commands_of(text: str) -> Iterator[tuple[int, str]]:
         command = _without_comment(line).strip()
         if command:
             yield number, command
+
+
+def element_of(command: str, before: str) -> str:
+    """Return the element (lower case) that a command is about; that of the command before if it goes on.
+
+    Examples
+    --------
+    >>> element_of("New object=LoadShape.a npts=2", ""), element_of("~ mult=(1 2)", "loadshape.a")
+    ('loadshape.a', 'loadshape.a')
+    >>> element_of("Load.a.kw=3", "line.x"), element_of('new "Line.x-1" bus1=b', ""), element_of("solve", "line.x")
+    ('load.a', 'line.x-1', '')
+    """
+    if re.match(r"(~|m\b|more\b)", command, re.IGNORECASE):
+        return before
+    made = re.match(
+        r"""(?:new|edit|batchedit)\s+(?:object\s*=\s*)?["'(\[{]?(\w+\.[^\s"')\]},=]+)""", command, re.IGNORECASE
+    )
+    found = made or re.match(r"(\w+\.[^\s.=]+)\.[^=\s]+\s*=", command)
+    return found[1].lower() if found else ""
 
 
 def decoded(data: bytes) -> str:

@@ -17,7 +17,7 @@ import msgspec
 
 from plant.equipment import NODES, Feeder
 from plant.equipment.imported_equipment import LoadPart
-from plant.imports.import_checks import SHOWN, left_out_by, number_of, refuse_if, refuse_unsolvable
+from plant.imports.import_checks import SHOWN, left_out_by, number_of, refuse_if, refuse_unsolvable, without_unfed
 from plant.imports.import_comparison import MATCH, difference, loads_without_ground
 from plant.imports.opendss.dss_elements import DssElements, complex_of, letter_of
 from plant.imports.opendss.dss_engine import DssEngine
@@ -116,8 +116,10 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
         f_nom=frequency,
         elements=tuple(elements.rows),
         load_parts=tuple(load_parts),
-        notes=tuple(notes),
     )
+    if not problems:
+        feeder = without_unfed(feeder, notes)
+    feeder = msgspec.structs.replace(feeder, notes=tuple(notes))
     refuse_unsolvable(path, feeder, problems, UNGROUNDED)
     if left_out:
         return feeder

@@ -62,7 +62,14 @@ ONE_LINE = {
         "Master.dss: the engine's power flow does not converge",
     ),
     "more nodes than letters": ("New Line.l phases=1 bus1=c.1 bus2=d.60", "bus d: nodes above 58 are not supported"),
-    "loads that grow by the year": ("New Load.l bus1=c kv=0.48 kw=9\nSet year=3", "set year=3"),
+    "loads that grow by a curve": (
+        "New GrowthShape.g npts=2 year=(1 9) mult=(1.02 1.01)\nNew Load.l bus1=c kv=0.48 kw=9 growth=g\nSet year=3",
+        "load.l: growth=g: growth by a GrowthShape is not supported",
+    ),
+    "a source of another frequency": (
+        "New Load.l bus1=c kv=0.48 kw=9\nSet DefaultBaseFrequency=50",
+        "vsource.source: is of 60 Hz, and the circuit is solved at 50 Hz, so that the engine has 0 V",
+    ),
     "a script that includes itself": ("Redirect Master.dss", "Master.dss:11: includes itself"),
     "an element defined twice": (
         "New Load.l bus1=c kv=0.48 kw=9\nNew Load.l bus1=c kv=0.48 kw=8",
