@@ -11,6 +11,7 @@ from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from plant.tables import read_feeder
+from scenarios.results.file_sizes import file_sizes, require_room
 from scenarios.results.run_files import FolderError
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
@@ -54,6 +55,9 @@ def run(
         raise ScenarioError([f"progress: must be a function of a case and two times, got {progress!r:.60}"])
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
+    require_room(
+        Path(tempfile.gettempdir()) if folder is None else as_folder(folder), file_sizes(spec, scenario.feeder)
+    )
     if folder is None:
         try:
             home = RunFolder(Path(tempfile.mkdtemp(prefix="gridpeers-")), temporary=True)

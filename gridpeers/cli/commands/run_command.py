@@ -117,19 +117,24 @@ def carry_out(
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.progress import COMPILING, RESTING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
+    from scenarios.results.file_sizes import file_sizes, require_room
     from scenarios.results.report import show
-    from scenarios.results.run_files import FolderError, new_folder, shown
+    from scenarios.results.run_files import RUNS, FolderError, new_folder, shown
     from scenarios.run import BrokenRunError, Request
     from scenarios.run import run as run_scenario
 
     try:
         if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
+        sizes = file_sizes(spec, feeder)
+        require_room(out or RUNS, sizes, "--out")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     except (ListenError, FolderError) as error:
         fail([str(error)], BAD_INPUT)
 
     console = Console()
+    if sizes.sentence:
+        typer.echo(f"{spec.name}: {sizes.sentence}")
     broker = spec.plant.helics.broker
     explanation = f"still starting: waiting for the HELICS federation at {broker} ..." if federate else COMPILING
     if spec.plant.simulator == "gridlabd":

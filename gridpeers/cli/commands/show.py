@@ -41,6 +41,7 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from scenarios.operating_point import start_problem
+    from scenarios.results.file_sizes import file_sizes
     from scenarios.schema.supply import supply_notes
 
     if problem := start_problem(spec, feeder):
@@ -50,6 +51,7 @@ def check(
     typer.echo(
         f"{file}: can be run: {len(spec.cases)} case(s) {', '.join(spec.cases)}; {len(spec.events)} event(s); "
         f"{spec.time.end_s:g} s; {len(feeder.inverters)} inverters on {len(feeder.buses)} buses"
+        + (f"; {sentence}" if (sentence := file_sizes(spec, feeder).sentence) else "")
     )
 
 
