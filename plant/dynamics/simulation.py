@@ -60,6 +60,7 @@ class Dynamics:
         self.h, self._method = h, method
         self.inverters = Inverters(inverters, connected, method)
         self.network = LiveNetwork(circuit, self.inverters)
+        self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[switching.Trip] = []
         units = self.inverters
         self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
@@ -143,8 +144,8 @@ class Dynamics:
             begin, renewed = 2 * step, -1
         network.refresh(status, 2 * steps - begin)
         network.note()
-        if self.inverters.single.any():
-            out[:, self.inverters.single, 1:3] /= 3.0  # the kernel's powers are those of three equal phases
+        if self._single.size:
+            out[:, self._single, 1:3] /= 3.0  # the kernel's powers are those of three equal phases
         return out
 
     def arrays(self) -> Units:

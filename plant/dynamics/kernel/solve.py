@@ -11,7 +11,7 @@ from plant.dynamics.kernel.arithmetic import A120, multiply_add
 from plant.dynamics.kernel.block_factors import solve_blocks
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.limited_load import limited_currents
-from plant.dynamics.kernel.sparse import branch_voltages, draw_remainders
+from plant.dynamics.kernel.sparse import COPY, branch_voltages, draw_remainders
 
 MAX_ITERATIONS = 60
 
@@ -91,8 +91,8 @@ def solve_sparse(
             at = maps.terminals[i, phase]
             V[i, phase] = complex(right[2 * at], right[2 * at + 1]) * back if at >= 0 else maps.fixed[i, phase]
             size += abs(V[i, phase])
-    for i in maps.single:
-        V[i, 1], V[i, 2] = V[i, 0] * A120.conjugate(), V[i, 0] * A120
+        if maps.terminals[i, 1] == COPY:
+            V[i, 1], V[i, 2] = V[i, 0] * A120.conjugate(), V[i, 0] * A120
     return iterations if np.isfinite(size) else -1
 
 

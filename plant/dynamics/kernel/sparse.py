@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, no_factors
 from plant.dynamics.kernel.compiled import compiled
 
+COPY = -2
+"""In place of the position of a terminal that copies the first one of its single-phase inverter."""
+
 
 class SparseMaps(NamedTuple):
     """The network of a large feeder for the inner loop.
@@ -32,13 +35,11 @@ class SparseMaps(NamedTuple):
     from_sources: NDArray[np.complex128]
     """Part of each branch's voltage that the ideal sources give (V)."""
     terminals: Integers
-    """Positions of the inverters' terminals, n_inv x 3, or -1."""
+    """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
     fixed: NDArray[np.complex128]
     """Voltages (V) of the terminals that have no position: a source's, or 0."""
     feeds: NDArray[np.bool_]
     """Which inverters inject."""
-    single: Integers
-    """Single-phase inverters: their second and third terminals have no position, and copy the first."""
     scratch: Real
     """Room for the solution and its right-hand side."""
     increments: Real
@@ -62,7 +63,6 @@ def no_maps() -> SparseMaps:
         terminals,
         fixed,
         held,
-        nowhere,
         values,
         increments,
     )

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.island_newton import TOLERANCE, solve_island
 from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
-from plant.dynamics.kernel.sparse import SparseMaps
+from plant.dynamics.kernel.sparse import COPY, SparseMaps
 from plant.dynamics.load_law import LoadLaw
 from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
 from plant.dynamics.reduction.elimination import eliminated
@@ -44,9 +44,7 @@ class SparseReduction(SwitchState):
         self._lu: SuperLU | None = None
         place = np.full(circuit.Y.shape[0], -1, np.int64)
         place[self.unknown[kept]] = np.arange(kept.size)
-        self._at = np.where(circuit.copies, -1, place[circuit.terminals])
-        self._whole_at = np.where(circuit.copies, -1, at)
-        self._single = np.flatnonzero(circuit.copies[:, 1])
+        self._at, self._whole_at = (np.where(circuit.copies, COPY, of[circuit.terminals]) for of in (place, self.place))
         self._feeds = np.zeros(len(circuit.terminals), bool)
         self._feeds[self.feeding % max(self._feeds.size, 1)] = True
 
@@ -72,7 +70,6 @@ class SparseReduction(SwitchState):
                 terminals=self._at,
                 fixed=self._held_voltages(source_voltage),
                 feeds=self._feeds,
-                single=self._single,
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((2, 2 * self._C.shape[1])),
             ),
