@@ -25,11 +25,12 @@ f, P, Q, V and the held set-points of all inverters on the complete 123-node fee
 GridLAB-D's delta mode (`inverter_dyn`, its voltage tolerance 1e-11 pu), after every step of 2 ms. GridLAB-D reads a
 model that `plant/gridlabd/glm.py` writes from the CSV tables without any code of `plant.tables` and `plant.network`.
 Each plant starts from its own equilibrium, which it has held for 0.5 s, and in closed loop has agents of its own. The
-tests go through all cases but `single-phase-limits`, `reclosing-70`, `wind-up` and `ideal`, in a fifth of the time.
+tests go through all cases but `single-phase-limits`, `reclosing-70` and `wind-up`, in a fifth of the time.
+`feeder glm` and `--plant gridlabd` have the same model.
 
-- Switches and regulators are ideal here, but not in GridLAB-D: there a closed switch is 1e-4 - j1e-4 ohm, and a
-  regulator is 1e-4 ohm on its regulated side. All cases but `ideal` have these impedances in our network too
-  (`plant/gridlabd/impedance.py`). Line charging is on in both.
+- Closed switches and regulators are ideal in both. GridLAB-D needs an impedance for each (1e-4 - j1e-4 and 1e-4 ohm by
+  default), and gets one; a line of its negative follows in series, so together they have none, exactly. With the
+  default impedances `islanding-I` differs by 2e-4 Hz and pu. Line charging is on in both.
 - A reclosing is rehearsed by our plant: 13-152 closes on the first control period in which its sides are further apart
   than the angle, and its opening is put off by the steps that bring the angle back; the column tells the angle that
   each plant has across the switch in the step before it closes. At 120 degrees both agree in the step of the closing;

@@ -10,8 +10,8 @@ from plant.equipment import Feeder, Regulator
 from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder import Plant
 from plant.gridlabd.glm import START, read_table, write_glm
-from plant.gridlabd.glm_network import TableRow, network_blocks
-from plant.gridlabd.impedance import with_impedances
+from plant.gridlabd.glm_block import TableRow
+from plant.gridlabd.glm_network import network_blocks
 from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
 from plant.network import Network
 from plant.plant_config import PlantSettings
@@ -84,8 +84,7 @@ def write_tables(feeder: Feeder, folder: Path) -> None:
 
 def _in_delta_mode(feeder: Feeder, settings: PlantSettings, seconds: int, folder: Path) -> str:
     parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
-    # the start of the network that GridLAB-D has: its closed switches and its regulators are not ideal
-    plant = Plant(Network(with_impedances(feeder)), settings, settings.h, settings.h)
+    plant = Plant(Network(feeder), settings, settings.h, settings.h)
     start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
     return write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
 

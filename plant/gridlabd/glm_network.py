@@ -6,6 +6,9 @@ import cmath
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import pi, sqrt
 
+from plant.gridlabd.glm_block import TableRow, block
+from plant.gridlabd.glm_ideal_devices import compensations, regulator_blocks, switch_blocks
+
 F_NOM = 60.0
 """Nominal frequency (Hz)."""
 
@@ -15,38 +18,40 @@ FOOT, MILE = 0.3048e-3, 1.609344
 NOMINAL_ANGLE = {"A": 0.0, "B": -2 * pi / 3, "C": 2 * pi / 3, "AB": pi / 6, "BC": -pi / 2, "CA": 5 * pi / 6}
 """Of a load branch (rad): phase to ground, or phase to phase."""
 
-TableRow = Mapping[str, str]
-
 
 def network_blocks(
-    table: Mapping[str, Sequence[TableRow]], load_set: str, V_nom: Mapping[str, float], leaders: Collection[str]
+    table: Mapping[str, Sequence[TableRow]],
+    load_set: str,
+    V_nom: Mapping[str, float],
+    leaders: Collection[str],
+    *,
+    ideal: bool = True,
 ) -> list[str]:
-    """Return the objects of a network from its tables, the buses' nominal voltages (V) and the buses with a GFM."""
+    """Return the objects of a network.
+
+    Parameters
+    ----------
+    table
+        Its tables.
+    load_set
+        Which of the load tables.
+    V_nom
+        Nominal voltages (V) of the buses.
+    leaders
+        Buses with a GFM.
+    ideal
+        Whether closed switches and regulators have no impedance, as here, or the default ones of GridLAB-D.
+    """
     return [
         *_buses(table["buses"], V_nom, table["source"][0], leaders),
         *_lines(table["lines"], table["line_configs"]),
-        *_switches(table.get("switches", ())),
-        *_regulators(table.get("regulators", ())),
+        *(compensations() if ideal else ()),
+        *switch_blocks(table.get("switches", ()), V_nom, ideal=ideal),
+        *regulator_blocks(table.get("regulators", ()), V_nom, ideal=ideal),
         *_transformers(table.get("transformers", ()), V_nom),
         *_loads(table[f"loads_{load_set}"], V_nom),
         *_capacitors(table.get("capacitors", ()), V_nom),
     ]
-
-
-def block(kind: str, **properties: str | int | float | complex) -> str:
-    """Write an object; names end in an underscore where Python has a keyword."""
-    lines = [
-        f"\t{name.removesuffix('_')} {value if isinstance(value, str) else _number(value)};"
-        for name, value in properties.items()
-    ]
-    return "\n".join((f"object {kind} {{", *lines, "}"))
-
-
-def _number(value: complex | float) -> str:
-    """Write a number so that reading gives the same bits."""
-    if isinstance(value, complex):
-        return f"{value.real!r}{value.imag:+.17g}j"
-    return repr(value)
 
 
 def _buses(
@@ -87,55 +92,6 @@ def _lines(rows: Iterable[TableRow], configs: Iterable[TableRow]) -> list[str]:
                 phases=row["phases"] + "N",
                 length=float(row["length_m"]) / 1e3 / FOOT,
                 configuration=f"c{row['config']}",
-            )
-        )
-    return blocks
-
-
-def _switches(rows: Iterable[TableRow]) -> list[str]:
-    return [
-        block(
-            "switch",
-            name=f"s{row['from_bus']}-{row['to_bus']}",
-            from_=f"n{row['from_bus']}",
-            to=f"n{row['to_bus']}",
-            phases=row["phases"] + "N",
-            status=row["state"].upper(),
-            operating_mode="BANKED",
-        )
-        for row in rows
-    ]
-
-
-def _regulators(rows: Iterable[TableRow]) -> list[str]:
-    """Regulators at fixed taps, GridLAB-D's type A: V_to = (1 + tap tap_step) V_from."""
-    taps: dict[tuple[str, str, str, float], dict[str, int]] = {}
-    for row in rows:
-        key = row["regulator"], row["from_bus"], row["to_bus"], float(row["tap_step_pu"])
-        taps.setdefault(key, {}).update(dict.fromkeys(row["phases"], int(row["tap"])))
-    blocks = []
-    for (name, start, end, step), tap in taps.items():
-        blocks.append(
-            block(
-                "regulator_configuration",
-                name=f"c{name}",
-                connect_type="WYE_WYE",
-                Control="MANUAL",
-                Type="A",
-                raise_taps=16,
-                lower_taps=16,
-                regulation=16 * step,
-                **{f"tap_pos_{phase}": at for phase, at in tap.items()},
-            )
-        )
-        blocks.append(
-            block(
-                "regulator",
-                name=name,
-                from_=f"n{start}",
-                to=f"n{end}",
-                phases="".join(sorted(tap)) + "N",
-                configuration=f"c{name}",
             )
         )
     return blocks

@@ -19,7 +19,6 @@ from plant.feeder.set_points import SetPointLimits
 from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.gridlabd.glm import write_glm
 from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
-from plant.network import Network
 from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of
@@ -51,8 +50,6 @@ class GridlabdPlant:
         Distance of the recorded rows (s); None for every step.
     deadline
         Longest wait for GridLAB-D's next control period (s).
-    network
-        The feeder's network as events and islands name it; that of our plant when left out.
 
     Raises
     ------
@@ -70,14 +67,13 @@ class GridlabdPlant:
         *,
         record_step: float | None = None,
         deadline: float = 60.0,
-        network: Network | None = None,
     ) -> None:
         self.inverters = ours.inverters
         self.tick = 0
         """k: the plant is at k T_c."""
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
-        network = network or ours.network
+        network = ours.network
         self._units = {unit.name: unit for unit in network.inverters}
         self._parameters = {
             unit.name: network.feeder.parameters_of(unit, settings.gfm, settings.gfl) for unit in network.inverters

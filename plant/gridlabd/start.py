@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+from contextlib import closing
 
 from msgspec.structs import replace
 
@@ -11,13 +10,13 @@ from plant.equipment import Feeder
 from plant.feeder import Plant
 from plant.gridlabd.export_glm import write_tables
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
-from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
 from plant.plant_config import FeederChanges, PlantConfig
+from plant.transient_folder import TransientFolder
 
 
 def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:
-    """Start GridLAB-D on a feeder; its closed switches and regulators have impedances, so its start has them too.
+    """Start GridLAB-D on a feeder, with the powers of our operating point.
 
     Raises
     ------
@@ -26,11 +25,11 @@ def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:
     """
     assert config.end is not None, "a scenario in simulated time has an end"
     settings = config.settings
-    ours = Plant(Network(with_impedances(feeder)), settings, config.T_c, config.record_step)
-    with tempfile.TemporaryDirectory() as name:
+    ours = Plant(Network(feeder), settings, config.T_c, config.record_step)
+    with closing(TransientFolder("gridpeers-tables-")) as folder:
         if settings.changes != FeederChanges():  # else GridLAB-D's model is written from the tables as they stand
-            write_tables(feeder, Path(name))
-            settings = replace(settings, feeder=name)
+            write_tables(feeder, folder.path)
+            settings = replace(settings, feeder=str(folder.path))
         return GridlabdPlant(
             ours,
             settings,
@@ -38,5 +37,4 @@ def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:
             config.end,
             record_step=config.record_step,
             deadline=0.8 * config.deadline,  # the plant tells the agents before they give it up
-            network=Network(feeder),
         )

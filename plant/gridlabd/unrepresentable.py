@@ -57,12 +57,12 @@ def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:
     yield from (("bus", bus.name, f"n{bus.name}") for bus in feeder.buses)
     yield from (("line", line.name, f"l{line.name}") for line in feeder.lines)
     yield from (("kind of line", config.name, f"c{config.name}") for config in feeder.line_configs)
-    yield from (("switch", switch.name, f"s{switch.name}") for switch in feeder.switches)
+    yield from (("switch", switch.name, f"{initial}{switch.name}") for switch in feeder.switches for initial in "smz")
     yield from (("transformer", row.name, f"t{row.name}") for row in feeder.transformers)
     yield from (("transformer", row.name, f"ct{row.name}") for row in feeder.transformers)
     for name in dict.fromkeys(row.name for row in feeder.regulators):
-        yield from (("regulator", name, in_model) for in_model in (name, f"c{name}"))
+        yield from (("regulator", name, in_model) for in_model in (name, f"c{name}", f"m{name}", f"z{name}"))
     yield from (("inverter", row.name, row.name) for row in feeder.inverters)
     single = [row for row in feeder.inverters if len(row.phases) == 1]
     yield from (("node of inverter", row.name, node_of(row.bus, row.phases)) for row in single)
-    yield from (("object", name, name) for name in ("islands", "ticker"))
+    yield from (("object", name, name) for name in ("islands", "ticker", "minus_switch", "minus_regulator"))

@@ -23,7 +23,6 @@ from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
 from plant.gridlabd.export_glm import write_tables
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
-from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
 from plant.plant_config import PlantConfig, SwitchEvent
 from plant.plant_interface import PlantLike
@@ -71,7 +70,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
         events=run.events or config.settings.events,
     )
     run, config = shortened(run, replace(config, settings=settings, record_step=settings.h), factor)
-    network = Network(with_impedances(feeder) if run.impedances else feeder)
+    network = Network(feeder)
     if run.reclosing:
         config = _reclosing_at_its_angle(network, config, run.reclosing)
     assert config.end is not None

@@ -72,8 +72,6 @@ class ComparedRun(NamedTuple):
     """Instead of events."""
     single_phase: tuple[SinglePhase, ...] = ()
     """Further inverters."""
-    impedances: bool = True
-    """Whether our switches and regulators have GridLAB-D's impedances."""
     tolerance: float = 1e-8
     """Largest difference (Hz, pu) that passes."""
     in_tests: bool = True
@@ -175,14 +173,6 @@ RUNS = {
         "none",
         closed_loop=True,
         gfl=ONE_RATING,
-        in_tests=False,
-    ),
-    "ideal": ComparedRun(
-        "as islanding-I, our switches and regulators ideal, as shipped",
-        "islanding",
-        "I",
-        impedances=False,
-        tolerance=2e-4,
         in_tests=False,
     ),
 }

@@ -20,8 +20,9 @@ from bench.validation.autotests.secondary.secondary_case import (
     H,
 )
 from bench.validation.autotests.secondary.secondary_law import AUTOTEST, SecondarySettings
+from plant.gridlabd.glm_block import block
 from plant.gridlabd.glm_inverters import inverter_blocks
-from plant.gridlabd.glm_network import block, network_blocks
+from plant.gridlabd.glm_network import network_blocks
 
 NODE = {
     **{name: f"n{bus}" for name, (_, bus, _) in INVERTERS.items()},
@@ -69,7 +70,7 @@ def _model(seconds: int) -> str:
     parameters = {row["name"]: GFM if row["kind"] == "GFM" else GFL for row in tables["inverters"]}
     blocks = (
         delta_header(H, seconds, f"n{CONTROL_BUS}", *SOLVER),
-        *network_blocks(tables, "main", V_nom, {"151", "300"}),
+        *network_blocks(tables, "main", V_nom, {"151", "300"}, ideal=False),
         *machine_blocks(),
         *inverter_blocks(tables["inverters"], START_POWER, parameters),
         _controller(AUTOTEST),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bench.validation.autotests.delta_header import START
 from bench.validation.autotests.recorded_run import RecordedRun
 from bench.validation.autotests.secondary.bus_frequency import BusFrequency
+from bench.validation.autotests.secondary.default_impedances import with_impedances
 from bench.validation.autotests.secondary.island_tables import INVERTERS, V_NOM, island_tables, write_tables
 from bench.validation.autotests.secondary.machines import MACHINES, PHASES
 from bench.validation.autotests.secondary.replayed_machines import ReplayedMachines
@@ -33,7 +34,6 @@ from plant.dynamics import Inverter
 from plant.equipment import InverterRow
 from plant.equipment.imported_equipment import LinearElement
 from plant.feeder.circuits import circuit_of
-from plant.gridlabd.impedance import with_impedances
 from plant.network import Network
 from plant.tables import read_feeder
 

@@ -14,7 +14,6 @@ from plant.equipment import Feeder, Load
 from plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from plant.feeder import Plant
 from plant.gridlabd.export_glm import export_glm
-from plant.gridlabd.impedance import with_impedances
 from plant.network import Network, solve_power_flow
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError, read_feeder
@@ -42,7 +41,7 @@ def voltages(text: str, folder: Path) -> dict[str, list[complex]]:
 
 def largest_difference(feeder: Feeder, theirs: dict[str, list[complex]]) -> float:
     """Largest difference (pu) over all nodes of a power flow; behind a delta winding, over phase to phase."""
-    network = Network(with_impedances(feeder))
+    network = Network(feeder)
     V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
     floating = {row.to_bus for row in feeder.transformers if row.connection == "D-D"}
     gaps = []
@@ -91,7 +90,7 @@ def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None
     theirs = voltages(text, tmp_path)
 
     assert text.count("Xfilter 0.2;") == 4
-    ours = Plant(Network(with_impedances(feeder)), settings, settings.h, settings.h).measure()
+    ours = Plant(Network(feeder), settings, settings.h, settings.h).measure()
     for row in feeder.inverters:
         V = np.mean([abs(theirs[f"n{row.bus}"]["ABC".index(phase)]) for phase in row.phases])
         assert abs(V - ours[row.name].V) / row.V_nom < TOLERANCE, row.name

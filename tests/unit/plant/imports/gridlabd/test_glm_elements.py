@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from plant.gridlabd.export_glm import export_glm
-from plant.gridlabd.impedance import with_impedances
 from plant.imports.gridlabd.glm_loads import V_MIN
 from plant.imports.gridlabd.read_glm import read_glm
 from plant.network import Network, solve_power_flow
@@ -36,7 +35,7 @@ def test_voltages_are_gridlabds(tmp_path: Path, model: str, count: int) -> None:
 @pytest.mark.parametrize(("name", "leave_out"), [("standard123", ()), ("microgrid123", ("inverter_dyn.*",))])
 def test_our_own_feeder_comes_back(tmp_path: Path, name: str, leave_out: tuple[str, ...]) -> None:
     """The 123-node feeder of our tables, exported for GridLAB-D and imported, has the voltages of the tables."""
-    own = Network(with_impedances(read_feeder(name)))
+    own = Network(read_feeder(name))
     V = dict(zip(own.nodes, solve_power_flow(own, own.closed0, tolerance=1e-11).V, strict=True))
     path = write(tmp_path, export_glm(read_feeder(name), PlantSettings(), 1, "voltages.csv"))
     back = Network(read_glm(path, leave_out=leave_out))
@@ -45,7 +44,9 @@ def test_our_own_feeder_comes_back(tmp_path: Path, name: str, leave_out: tuple[s
     differences = [
         abs(V[bus[1:], phase] - voltage) / V_nom
         for (bus, phase), voltage, V_nom in zip(back.nodes, solved.V, back.V_nom, strict=True)
-        if "~" not in bus and bus != "n610"  # behind a delta winding: to ground it has no voltage of its own
+        if bus[0] == "n"
+        and "~" not in bus
+        and bus != "n610"  # behind a delta winding: to ground it has no voltage of its own
     ]
     assert len(differences) >= 270
     assert max(differences) < TOLERANCE

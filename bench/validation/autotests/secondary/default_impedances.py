@@ -1,7 +1,7 @@
-"""The impedances that GridLAB-D gives to closed switches and regulators, put into our feeder.
+"""The impedances that GridLAB-D gives to closed switches and regulators by default, put into our feeder.
 
-Ours are ideal; in GridLAB-D's Newton solver they are not. To compare everything else to many digits, each gets its
-impedance in our network, as a short line in series.
+The autotest has them, and needs them: a machine and an inverter are at the two ends of a closed switch. So each gets
+its impedance in our network, as a short line in series.
 """
 
 from __future__ import annotations
