@@ -10,6 +10,7 @@ from plant.equipment.inverter_parameters import GflParameters as GflParameters
 from plant.equipment.inverter_parameters import GfmParameters as GfmParameters
 from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
+from plant.simulator import Simulator
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 
@@ -110,9 +111,6 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 Method = Literal["first-order", "second-order"]
 """Method of time stepping: `plant.dynamics.kernel.step`, GridLAB-D's, or `plant.dynamics.kernel.second_order_step`."""
-
-Simulator = Literal["gridpeers", "gridlabd", "helics"]
-"""What simulates the plant: our own, GridLAB-D (docs/plant.md), or a federate of a HELICS co-simulation."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

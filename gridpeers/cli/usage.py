@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Collection, Mapping
 from types import MappingProxyType
@@ -22,6 +23,16 @@ ScenarioName = Annotated[
 PASSED, CLAIM_FAILED, BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 
 
+OPTIONS = {
+    "plant.simulator": "--plant",
+    "plant.load_set": "--load-set",
+    "plant.helics.broker": "--broker",
+    "plant.helics.federates": "--federates",
+    "plant.helics.name": "--name",
+}
+"""Options that change a key of the scenario, by this key."""
+
+
 def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[ScenarioModel, Feeder]:
     """Read and check a scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
@@ -40,10 +51,12 @@ def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[
 
 
 def refuse(error: ScenarioError | FeederError) -> NoReturn:
-    """End with every problem in a file."""
-    count = len(error.problems)
-    head = [] if count == 1 else [f"{count} problems:"]
-    fail([*head, *error.problems], BAD_INPUT)
+    """End with every problem in a file, or of an option that changes a key of it."""
+    problems = list(error.problems)
+    for key, option in OPTIONS.items():
+        problems = [re.sub(rf"^replace: {re.escape(key)}:", f"{option}:", problem) for problem in problems]
+    head = [] if len(problems) == 1 else [f"{len(problems)} problems:"]
+    fail([*head, *problems], BAD_INPUT)
 
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
@@ -83,6 +96,18 @@ def require(modules: dict[str, str], install: str = INSTALL) -> None:
     if missing:
         lines = [f"{packages.get(name, name)} is not installed; {modules[name]} cannot do without" for name in missing]
         fail([*lines, install], BAD_INPUT)
+
+
+def require_loadable(module: str, user: str) -> None:
+    """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
+    import subprocess
+
+    require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
+    done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
+    if done.returncode:
+        reason = done.stderr.strip().rpartition("\n")[2] or f"exit status {done.returncode}"
+        again = f"pip install --force-reinstall {module}"
+        fail([f"{module} is installed, but cannot be imported ({reason}); {user} needs it: {again}"], BAD_INPUT)
 
 
 def fail(lines: list[str], code: int) -> NoReturn:

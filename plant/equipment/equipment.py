@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters, OwnParameters, given
+from plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")
@@ -190,7 +190,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     spare: bool = False
     """Whether it stays off until an agent joins for it."""
     parameters: str = ""
-    """Name of its set of parameters (`Feeder.parameter_sets`); empty for none."""
+    """Name of its set of parameters (`Feeder.parameter_sets`, or a published one); empty for none."""
     own: OwnParameters = OwnParameters()
     """Parameters that replace those of its set and of its kind: a scenario gives them."""
 
@@ -249,7 +249,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
         >>> feeder.parameters_of(feeder.inverters[0], GfmParameters(P_max=1.2), GflParameters()).P_max
         1.2
         """
-        of_set = self.parameter_sets.get(row.parameters, OwnParameters())
+        of_set = with_published(self.parameter_sets).get(row.parameters, OwnParameters())
         kind: InverterParameters = gfm if row.kind == "GFM" else gfl
         own = given(of_set) | given(row.own)
         # what its kind has not, the checks of feeder and scenario refuse; others of their checks come first

@@ -6,6 +6,7 @@ from math import pi
 from typing import Annotated, Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Below
@@ -29,10 +30,10 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Grid-forming inverter, `inverter-models.md` section 3. Per unit of own rating."""
 
     model: Literal["gridlabd", "regfm_a1"] = "gridlabd"
-    """What its controller measures: total power and the mean of the phases' voltages, as GridLAB-D, or power and
+    """Quantities that its controller measures: total power and mean voltage of the phases, as GridLAB-D, or power and
     voltage of the positive sequence, as REGFM_A1 (section 3.8)."""
     voltage_control: bool = True
-    """Whether a controller brings the terminal to the voltage of the Q-V droop; otherwise the droop gives the internal
+    """true: the Q-V droop gives the terminal voltage, and a controller holds it; false: the droop gives the internal
     voltage (VFlag of REGFM_A1, section 3.8)."""
     R_f: Resistance = 0.015
     """Filter resistance (pu)."""
@@ -94,7 +95,10 @@ REGFM_A1 = GfmParameters(
     Q_min=-0.44,
     E_max=1.15,
 )
-"""REGFM_A1 with the default values of public implementations, at 60 Hz (section 3.8)."""
+"""REGFM_A1 with the default values of public implementations, at 60 Hz (section 3.8); VFlag is 1."""
+
+REGFM_A1_VFLAG0 = replace(REGFM_A1, voltage_control=False, k_pq=0.1, k_iq=10.0)
+"""The same with VFlag 0, which has other gains of the Q limiters."""
 
 
 class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -103,7 +107,7 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     model: Literal["voltage_source", "current_source"] = "voltage_source"
     """Representation towards the network (sections 4.6, 4.7)."""
     mode: Literal["positive_sequence", "balanced_power"] = "positive_sequence"
-    """What its phases share: one PLL and equal currents, or, with a PLL each, equal powers (section 4)."""
+    """Control of its phases: one PLL for all and equal currents, or a PLL for each and equal powers (section 4)."""
     R_f: Resistance = 0.01
     """Filter resistance (pu)."""
     X_f: Reactance = 0.15

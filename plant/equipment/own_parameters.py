@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import REGFM_A1, REGFM_A1_VFLAG0, GflParameters, GfmParameters
 from wire.schema.table_schema import fields_of
 
 Kind = Literal["GFM", "GFL"]
@@ -57,6 +58,21 @@ else:
         module=__name__,
     )
     OwnParameters.__doc__ = "Some parameters of an inverter of either kind; None gives nothing."
+
+
+def _published(own: GfmParameters) -> OwnParameters:
+    """Return a set of all parameters but the bounds of set-points, which no specification has."""
+    bounds = {"P_set_lim", "V_set_min", "V_set_max"}
+    return OwnParameters(**{name: getattr(own, name) for name in own.__struct_fields__ if name not in bounds})
+
+
+PUBLISHED_SETS = {"regfm_a1": _published(REGFM_A1), "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0)}
+"""Sets of published values, which every feeder has."""
+
+
+def with_published(sets: Mapping[str, OwnParameters]) -> dict[str, OwnParameters]:
+    """Return the sets of a feeder, which come first, and the published ones."""
+    return {**sets, **{name: own for name, own in PUBLISHED_SETS.items() if name not in sets}}
 
 
 def given(own: OwnParameters) -> dict[str, Any]:

@@ -14,7 +14,8 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
 
 A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), the set-points as GridLAB-D holds them: `Pset` (pu)
 of a GFM or `Pref` (W) of a GFL, and `Vset` (pu); then the lowest and the highest phase voltage (V). What goes wrong is
-answered as {"error": text}. The process ends with standard input, and with its parent, whose id is its argument.
+answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text}. The process ends
+with standard input, and with its parent, whose id is its argument.
 """
 
 from __future__ import annotations
@@ -227,6 +228,8 @@ def main() -> None:
     try:
         for answer in answers(json.loads(line) for line in sys.stdin):
             print(json.dumps(answer), file=out, flush=True)
+    except ImportError as error:
+        print(json.dumps({"not_importable": str(error)}), file=out, flush=True)
     except Exception as error:
         text = str(error) if isinstance(error, RuntimeError) else f"{type(error).__name__}: {error}"
         print(json.dumps({"error": text}), file=out, flush=True)

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
-import selectors
-import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
@@ -15,10 +10,9 @@ from typing import Any
 
 from plant.helics.helics_settings import HelicsSettings, endpoint
 from plant.helics.topics import Topic, Value
+from plant.request_process import ProcessEndedError, RequestProcess
 
 PROCESS = Path(__file__).with_name("federate_process.py")
-
-MISSING = "HELICS is not installed; install it: pip install 'gridpeers[helics]'"
 
 IMPORT = 60.0
 """Longest time (s) until the process has imported HELICS, on a machine that is busy."""
@@ -57,21 +51,11 @@ class HelicsFederate:
         self._when = BEFORE
         self._others = "nobody"
         """Names of the other federates."""
-        self._rest = b""
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
-        self._process = subprocess.Popen(
-            [sys.executable, str(PROCESS)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            start_new_session=True,  # Ctrl-C is for the run, which then ends this process in order
-        )
-        assert self._process.stdout is not None
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._process.stdout, selectors.EVENT_READ)
-        if "error" in self._take(IMPORT, f"its process did not start within {IMPORT:g} s"):
-            self.abort(MISSING)
-            raise HelicsError(MISSING)
+        self._process = RequestProcess([sys.executable, str(PROCESS)])
+        ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
+        if "error" in ready:
+            self._process.close(FAREWELL)
+            raise HelicsError(ready["error"])
         host, port = endpoint(settings.broker)
         late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
         self._ask(
@@ -138,22 +122,12 @@ class HelicsFederate:
 
     def abort(self, reason: str) -> None:
         """End the process, unless it has ended; if it is in a federation still, the others get the reason."""
-        if self._log.closed:
-            return
-        if self._process.poll() is None:
-            self._send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
-        try:
-            self._process.wait(FAREWELL)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._selector.close()
-        for stream in (self._process.stdin, self._process.stdout, self._log):
-            if stream is not None and not stream.closed:
-                stream.close()
+        if not self._process.closed:
+            self._process.send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
+            self._process.close(FAREWELL)
 
     def _ask(self, request: Mapping[str, Any], late: str, wait: float | None = None) -> dict[str, Any]:
-        self._send(request)
+        self._process.send(request)
         try:
             answer = self._take(self._deadline if wait is None else wait, late)
             if "error" in answer:
@@ -163,20 +137,12 @@ class HelicsFederate:
             raise
         return answer
 
-    def _send(self, request: Mapping[str, Any]) -> None:
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(request).encode() + b"\n")
-            self._process.stdin.flush()
-        except OSError:
-            pass  # it has ended: the answer will say so
-
     def _take(self, wait: float, late: str) -> dict[str, Any]:
         """Return the next answer, or complain that it is late, with the times at which the others are."""
         answer = self._answer(monotonic() + wait)
         if answer is not None:
             return answer
-        self._send({"do": "stand"})
+        self._process.send({"do": "stand"})
         until = monotonic() + ASK
         stand: list[str] = []
         while (answer := self._answer(until)) is not None:
@@ -189,20 +155,12 @@ class HelicsFederate:
         raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
 
     def _answer(self, until: float) -> dict[str, Any] | None:
-        """Return the next line of the process; None at a time of `monotonic` (s)."""
-        assert self._process.stdout is not None
-        while b"\n" not in self._rest:
-            if not self._selector.select(max(0.0, until - monotonic())):
-                return None
-            piece = os.read(self._process.stdout.fileno(), 1 << 20)
-            if not piece:
-                self._log.seek(0)
-                last = self._log.read()[-300:].decode(errors="replace").strip().rpartition("\n")[2]
-                raise HelicsError(f"HELICS, {self._when}: the process of the federate died; {last or 'no word'}")
-            self._rest += piece
-        line, _, self._rest = self._rest.partition(b"\n")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
+        """Return the next answer of the process; None at a time of `monotonic` (s)."""
+        try:
+            return self._process.answer(until)
+        except ProcessEndedError as how:
+            last = self._process.printed()[-300:].strip().rpartition("\n")[2]
+            raise HelicsError(f"HELICS, {self._when}: the process of the federate {how}; {last or 'no word'}") from None
 
     def _explained(self, error: str, doing: str) -> str:
         """Return an error of HELICS with what it means."""

@@ -34,6 +34,9 @@ BROKER_LEAVES = 3000
 FAREWELL = 0.3
 """Time (s) for the word of an abort to reach the others."""
 
+INSTALL = "install it: pip install 'gridpeers[helics]'"
+"""Advice when the package is missing or damaged."""
+
 NOBODY = "any"
 """Type of a topic that nobody publishes."""
 
@@ -52,7 +55,7 @@ class Federate:
         try:
             import helics
         except ImportError as error:
-            raise RefusedError(f"no wheel: {error}") from None
+            raise RefusedError(f"HELICS cannot be imported ({error}); {INSTALL}") from None
         self.helics: Any = helics
         self.fed: Any = None
         self.broker: Any = None

@@ -26,6 +26,13 @@ def number_of(letter: str) -> str:
     return str(NODES.index(letter) + 1)
 
 
+def not_a_file(path: Path) -> list[str]:
+    """Return what is wrong with the path of a file to import, if it is none."""
+    if path.is_file():
+        return []
+    return [f"{path}: is a folder; name the file in it" if path.is_dir() else f"{path}: there is no such file"]
+
+
 def refuse_if(path: Path, problems: Collection[str]) -> None:
     """Raise a FeederError if there are problems."""
     if problems:

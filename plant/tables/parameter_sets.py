@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign
+from plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign, with_published
 from plant.tables.csv_table import CsvTable
 from plant.tables.feeder_columns import ParameterColumns
 from wire.schema.relations import contradictions
@@ -76,7 +76,7 @@ def as_set(
     params
         The name of a set, some parameters by their keys in a file, all of them, or none.
     sets
-        The sets that there are.
+        The sets of its feeder; the published ones are known everywhere.
 
     Raises
     ------
@@ -92,9 +92,10 @@ def as_set(
         return "", dict(sets)
     found: list[str] = []
     if isinstance(params, str):
-        if params not in sets:
-            raise ValueError(f'inverter "{name}": no parameter set "{params}"; {suggestion(params, sets, "sets")}')
-        own, label = sets[params], params
+        all_sets = with_published(sets)
+        if params not in all_sets:
+            raise ValueError(f'inverter "{name}": no parameter set "{params}"; {suggestion(params, all_sets, "sets")}')
+        own, label = all_sets[params], params
     else:
         if isinstance(params, Mapping):
             values = dict(params)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
-from plant.equipment.own_parameters import OwnParameters, foreign
+from plant.equipment.own_parameters import OwnParameters, foreign, with_published
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import (
@@ -184,9 +184,10 @@ def problems_of(inverter: InverterRow, bus: Bus, load: float, others: Iterable[I
 def _require_set(row: CsvRow[InverterColumns], sets: Mapping[str, OwnParameters]) -> None:
     """Note a problem if an inverter's set of parameters is not there, or has what its kind has not."""
     name, kind = row.columns.parameters, row.columns.kind
-    if name not in sets:
-        row.problem(f'parameters "{name}": no such set; {suggestion(name, sets, "sets of inverter_parameters.csv")}')
-    elif wrong := foreign(sets[name], kind):
+    known = with_published(sets)
+    if name not in known:
+        row.problem(f'parameters "{name}": no such set; {suggestion(name, known, "sets")}')
+    elif wrong := foreign(known[name], kind):
         row.problem(f'parameters "{name}": a {kind} has no {", ".join(wrong)}; give it a set of its own')
 
 

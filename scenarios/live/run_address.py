@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import socket
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scenarios.drivers.free_endpoint import parse_endpoint
@@ -82,6 +84,23 @@ def check_name(option: str, name: str) -> str:
     except ValueError as error:
         raise UsageError(str(error)) from None
     return name
+
+
+def check_inverters(names: Sequence[str]) -> None:
+    """Refuse a name that cannot be an inverter's, and one that is given twice.
+
+    Examples
+    --------
+    >>> check_inverters(["inv1", "inv2", "inv1"])
+    Traceback (most recent call last):
+        ...
+    scenarios.live.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an inverter
+    """
+    for name in names:
+        check_name("INVERTER", name)
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise UsageError(f"INVERTER: {', '.join(twice)} is given twice; one agent controls an inverter")
 
 
 def check_wait(wait: float) -> float:

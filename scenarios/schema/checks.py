@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from plant.equipment import Feeder, InverterRow
-from plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given
+from plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given, with_published
 from plant.trip_settings import DEFAULTS, defaults
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
@@ -143,7 +143,7 @@ def check_changes(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -
         path = f"plant.inverter.{name}"
         if problems.unknown(path, "inverter", name, rows):
             continue
-        kind, sets = rows[name].kind, feeder.parameter_sets
+        kind, sets = rows[name].kind, with_published(feeder.parameter_sets)
         if table == InverterTable() and not problems.below(path):
             problems.add(
                 path, f"changes nothing; give it one of {', '.join(keys_of(InverterTable))}, or a key of {kind}"

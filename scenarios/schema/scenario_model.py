@@ -15,7 +15,8 @@ from netem.schema.netem import Netem
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
-from plant.plant_config import Method, Protection, Simulator, SyncCheck
+from plant.plant_config import Method, Protection, SyncCheck
+from plant.simulator import Simulator
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Divides, MultipleOf
 from wire.schema.table_schema import INHERITED, INLINE, Example, Label
@@ -80,8 +81,8 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     P_rated_kW: Annotated[float | None, Unit("kW"), Plausible("a rating", 0.1, 1e6)] = None
     """Rated power (kW), the base of its per-unit values."""
     parameters: Annotated[str | None, Example('"fast"')] = None
-    """Name of a set of parameters of the feeder (inverter_parameters.csv), in place of what inverters.csv names; "" is
-    none."""
+    """Name of a set of parameters of the feeder (inverter_parameters.csv), or of a published one ("regfm_a1",
+    "regfm_a1_vflag0"), in place of the one that inverters.csv names; "" is none."""
     own: Annotated[OwnParameters, INLINE] = OwnParameters()
     """Parameters of its kind, in its table."""
 

@@ -9,6 +9,7 @@ import typer
 
 from gridpeers.cli.commands.run_command import carry_out
 from gridpeers.cli.usage import BAD_INPUT, ScenarioName, check_choice, chosen, fail, load
+from plant.simulator import OwnSimulator
 
 if TYPE_CHECKING:
     from scenarios.schema import ScenarioModel
@@ -34,7 +35,7 @@ def helics(
         str, typer.Option(metavar="NAMES", help="Inverters that others control: all, none, or e.g. inv1,inv4.")
     ] = "all",
     plant: Annotated[
-        Literal["gridpeers", "gridlabd"] | None,
+        OwnSimulator | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
     broker: Annotated[

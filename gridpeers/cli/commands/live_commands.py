@@ -158,11 +158,10 @@ def agent(
     with usage_errors():
         from scenarios.drivers.free_endpoint import free_endpoint
         from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import address_of, check_endpoint, check_name, check_wait
+        from scenarios.live.run_address import address_of, check_endpoint, check_inverters, check_wait
 
         where = address_of(run, connect)
-        for inverter in inverters:
-            check_name("INVERTER", inverter)
+        check_inverters(inverters)
         check_wait(wait)
         watch_readers(quits=False)
         listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())

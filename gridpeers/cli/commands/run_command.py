@@ -18,7 +18,9 @@ from gridpeers.cli.usage import (
     load,
     refuse,
     require,
+    require_loadable,
 )
+from plant.simulator import Simulator
 
 if TYPE_CHECKING:
     from gridpeers.runs.choices import Pace
@@ -44,7 +46,7 @@ def run(
         bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
     ] = False,
     plant: Annotated[
-        Literal["gridpeers", "gridlabd", "helics"] | None,
+        Simulator | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
     processes: Annotated[
@@ -107,10 +109,10 @@ def carry_out(
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
     require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     if spec.plant.simulator == "gridlabd":
-        require({"gridlabd": 'the plant of simulator "gridlabd"'}, "install it: pip install 'gridpeers[gridlabd]'")
+        require_loadable("gridlabd", 'the plant of simulator "gridlabd"')
     federate = outside is not None or spec.plant.simulator == "helics"
     if federate:
-        require({"helics": "a HELICS federate"}, "install it: pip install 'gridpeers[helics]'")
+        require_loadable("helics", "a HELICS federate")
 
     from rich.console import Console
 

@@ -21,7 +21,7 @@ from plant.imports.gridlabd.glm_loads import BusLoads
 from plant.imports.gridlabd.glm_text import GlmText
 from plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
 from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.import_checks import BEYOND, left_out_by, refuse_if, refuse_unsolvable
+from plant.imports.import_checks import BEYOND, left_out_by, not_a_file, refuse_if, refuse_unsolvable
 from plant.imports.import_comparison import MATCH, difference
 
 FAR = 1.3
@@ -46,8 +46,7 @@ def read_glm(
         With everything that GridLAB-D refuses and everything that cannot be represented.
     """
     path = Path(path).absolute()
-    if not path.is_file():
-        refuse_if(path, [f"{path}: there is no such file"])
+    refuse_if(path, not_a_file(path))
     text = GlmText(path)
     refuse_if(path, text.problems)
     model = solved_model(path)

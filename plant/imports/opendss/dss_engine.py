@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from plant.imports.import_checks import not_a_file
 from plant.imports.opendss.dss_script import HUNTING, DssScript
 from plant.tables.read import FeederError
 
@@ -66,8 +67,8 @@ class DssEngine:
         scratch
             Folder that takes what the engine writes by itself (traces of controls); else the working folder.
         """
-        if not path.is_file():
-            return [f"{path}: there is no such file"]
+        if problems := not_a_file(path):
+            return problems
         if scratch is not None:
             self.execute(f'set datapath="{scratch}"')
         script = DssScript(self.execute, self._may_solve)

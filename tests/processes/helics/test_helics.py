@@ -146,13 +146,19 @@ def test_a_broker_that_is_missing_is_one_line() -> None:
         scenario.run("IV")
 
 
-def test_a_wheel_that_is_missing_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It says what to install."""
+def test_a_wheel_that_cannot_be_imported_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says why, and what to install; the command finds out before it starts anything."""
     (tmp_path / "helics.py").write_text("raise ImportError('none')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
-    with pytest.raises(HelicsError, match=r"not installed; install it: pip install 'gridpeers\[helics\]'"):
+    with pytest.raises(
+        HelicsError, match=r"cannot be imported \(none\); install it: pip install 'gridpeers\[helics\]'"
+    ):
         HelicsFederate(HelicsSettings(), 5.0)
+
+    code, text = invoke("run", "islanding", "--case", "IV", "--plant", "helics")
+    assert (code, text.count("\n")) == (2, 1)
+    assert "helics is installed, but cannot be imported (ImportError: none)" in text
 
 
 class Controller(threading.Thread):

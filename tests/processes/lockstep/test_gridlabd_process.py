@@ -101,21 +101,27 @@ def test_agents_end_when_gridlabd_is_killed(tmp_path: Path) -> None:
 
 
 def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
-    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does."""
+    """A plant that is killed by -9 cannot end GridLAB-D; the kernel does, and its temporary folder goes, too."""
     run = ProcessRun(*run_of(), tmp_path)
     watched: list[int] = []
+    folders: list[Path] = []
 
     def kill() -> None:
         plant = run.child("plant").pid
-        watched.append(os.pidfd_open(gridlabd_of(plant)))
+        folders.append(Path(f"/proc/{gridlabd_of(plant)}/cwd").readlink())
+        for task in Path(f"/proc/{plant}/task").iterdir():
+            watched.extend(os.pidfd_open(int(child)) for child in (task / "children").read_text().split())
         os.kill(plant, signal.SIGKILL)
 
     run.at(0.1, kill)
     outcome = run(plant_command=())
 
     assert "plant was killed by SIGKILL" in outcome.broke
-    assert select.select(watched, [], [], 10.0)[0] == watched
-    os.close(watched[0])
+    assert len(watched) == 2  # GridLAB-D, and the shell that removes the folder
+    for each in watched:
+        assert select.select([each], [], [], 10.0)[0] == [each]
+        os.close(each)
+    assert not folders[0].exists()
 
 
 def test_ctrl_c_ends_gridlabd(tmp_path: Path) -> None:
@@ -178,8 +184,24 @@ def test_without_the_wheel_one_line_says_what_to_install(monkeypatch: pytest.Mon
 
     assert code == 2
     assert text.splitlines()[-1] == "gridpeers: install it: pip install 'gridpeers[gridlabd]'"
-    with pytest.raises(GridlabdError, match=r"/nowhere/python has no package gridlabd; .*pip install 'gridpeers"):
+    with pytest.raises(
+        GridlabdError, match=r"/nowhere/python cannot import .* \(No such file .*pip install 'gridpeers"
+    ):
         DeltaModeProcess("/nowhere/python", deadline=1.0)
+
+
+def test_a_damaged_wheel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that is there and cannot be imported ends the command with 2, and a plant with the same reason."""
+    (tmp_path / "gridlabd.py").write_text("raise ImportError('libdamaged.so')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    code, text = invoke("run", "islanding", "--plant", "gridlabd")
+
+    assert (code, text.count("\n")) == (2, 1)
+    assert "gridlabd is installed, but cannot be imported (ImportError: libdamaged.so)" in text
+    process = DeltaModeProcess(sys.executable, deadline=1.0)
+    with pytest.raises(GridlabdError, match=r"cannot import the package gridlabd \(libdamaged.so\); install it"):
+        process.load("", [])
+    process.close()
 
 
 def test_gridlabd_keeps_no_real_time(tmp_path: Path) -> None:

@@ -103,6 +103,14 @@ def test_doc_prints_a_page(topic: str) -> None:
         ),
         (["run", "islanding", "--seed", "many"], '--seed: must be a whole number, got "many"'),
         (["run", "islanding", "--out", "full"], "--out full: the folder is not empty"),
+        (
+            ["agent", "inv1", "inv2", "inv1"],
+            "gridpeers: INVERTER: inv1 is given twice; one agent controls an inverter\n",
+        ),
+        (
+            ["bridge", "helics", "islanding", "--broker", "foo bar"],
+            'gridpeers: --broker: must be like tcp://127.0.0.1:23404, got "foo bar"\n',
+        ),
         (["run", "bad.toml"], "bad.toml:15: time.T_c_s: 20 s is not plausible"),
         (["check", "bad.toml"], "2 problems:"),
         (["run", "used.toml"], "cannot be listened on: address already in use"),

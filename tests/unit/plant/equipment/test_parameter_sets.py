@@ -5,11 +5,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 import gridpeers as gp
 from plant.build import build_plant
 from plant.equipment import Bus, Source
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
 from plant.equipment.own_parameters import OwnParameters
 from plant.tables import FeederError, read_feeder
 from plant.tables.read import DATA
@@ -80,6 +81,22 @@ def test_a_scenario_may_give_an_inverter_another_set_or_none(tmp_path: Path) -> 
     assert [it.T_pf for it in T_pf if isinstance(it, GflParameters)] == [0.05, 0.2, 0.2, 0.05, 0.05, 0.05]
 
 
+def test_the_published_values_of_a_model_are_a_set_of_every_feeder(tmp_path: Path) -> None:
+    """`parameters = "regfm_a1"` gives them all, whatever [plant.gfm] has; bounds of set-points are not among them."""
+    tables = (
+        "\n[plant.gfm]\nP_max_pu = 1.5\nV_set_max_pu = 1.1\n"
+        '[plant.inverter.inv1]\nparameters = "regfm_a1"\n'
+        '[plant.inverter.inv4]\nparameters = "regfm_a1_vflag0"\nP_max_pu = 1.0\n'
+    )
+    scenario, feeder = load_scenario(scenario_of(tmp_path, folder_of(tmp_path), tables))
+
+    units = [feeder.parameters_of(row, scenario.plant.gfm, scenario.plant.gfl) for row in feeder.inverters]
+
+    assert units[0] == replace(REGFM_A1, V_set_max=1.1)
+    assert units[3] == replace(REGFM_A1, V_set_max=1.1, voltage_control=False, k_pq=0.1, k_iq=10.0, P_max=1.0)
+    assert units[6] == GfmParameters(P_max=1.5, V_set_max=1.1)
+
+
 def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
     """Unknown keys, wrong values, repeats, contradictions, sets that there are not and keys of the other kind."""
     rows = "a,T_pff_s,1\na,T_pf_s,20\na,T_vf_s,x\nb,P_max_pu,0.1\nb,P_min_pu,0.5\nb,P_max_pu,1\nc,S_max_pu,1\n"
@@ -96,7 +113,7 @@ def test_all_mistakes_of_a_set_come_at_once(tmp_path: Path) -> None:
         'row 7: set "b" has P_max_pu already; give each parameter once',
         'set "b": P_min_pu: 0.5 must be below P_max_pu = 0.1; swap them or set both',
         'inverters.csv row 2: parameters "c": a GFM has no S_max_pu; give it a set of its own',
-        'inverters.csv row 3: parameters "d": no such set; the sets of inverter_parameters.csv are a, b, c',
+        'inverters.csv row 3: parameters "d": no such set; the sets are a, b, c, regfm_a1, regfm_a1_vflag0',
     ):
         assert part in said
 

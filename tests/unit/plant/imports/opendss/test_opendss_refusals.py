@@ -182,7 +182,7 @@ def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_a_folder_is_no_script(tmp_path: Path) -> None:
     """A folder, an empty file and a model for another program end in few lines."""
     (tmp_path / "folder.dss").mkdir()
-    assert "there is no such file" in problems(tmp_path / "folder.dss")[0]
+    assert "is a folder; name the file in it" in problems(tmp_path / "folder.dss")[0]
 
     path = tmp_path / "x.dss"
     path.write_text("")

@@ -1,0 +1,114 @@
+"""A program in a process of its own that answers requests: one JSON object a line, on its standard streams."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from time import monotonic
+from typing import Any
+
+from plant.transient_folder import TransientFolder
+
+
+class ProcessEndedError(RuntimeError):
+    """The process has ended; the text says how."""
+
+
+class RequestProcess:
+    """A program that is asked on standard input and answers on standard output; its standard error is kept.
+
+    Parameters
+    ----------
+    command
+        The program and its arguments.
+    folder
+        Where it stands, and which stays as long as it does; None: where this process stands.
+
+    Raises
+    ------
+    OSError
+        If there is no such program.
+    """
+
+    def __init__(self, command: Sequence[str], folder: TransientFolder | None = None) -> None:
+        self._unread = b""
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                cwd=folder.path if folder else None,
+                pass_fds=(folder.user,) if folder else (),
+                start_new_session=True,  # Ctrl-C is for the run, which then ends this process in order
+            )
+        except OSError:
+            self._log.close()
+            raise
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests, self._answers = self._process.stdin, self._process.stdout
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._answers, selectors.EVENT_READ)
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._log.closed
+
+    def send(self, request: Mapping[str, Any]) -> None:
+        """Send a request; if the process has ended, `answer` says so."""
+        with contextlib.suppress(OSError):
+            self._requests.write(json.dumps(request).encode() + b"\n")
+            self._requests.flush()
+
+    def answer(self, until: float) -> dict[str, Any] | None:
+        """Return the next answer; None if it has not come by a time of `monotonic` (s).
+
+        Raises
+        ------
+        ProcessEndedError
+            If the process has ended.
+        """
+        while b"\n" not in self._unread:
+            if not self._selector.select(max(0.0, until - monotonic())):
+                return None
+            piece = os.read(self._answers.fileno(), 1 << 20)
+            if not piece:
+                status = self._process.wait()
+                how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"exited with status {status}"
+                raise ProcessEndedError(how)
+            self._unread += piece
+        line, _, self._unread = self._unread.partition(b"\n")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def printed(self) -> str:
+        """Return what the program has printed on standard error."""
+        return os.pread(self._log.fileno(), os.fstat(self._log.fileno()).st_size, 0).decode(errors="replace")
+
+    def close(self, patience: float = 0.0) -> None:
+        """End the process, at any time and as often as you like; before that, wait so long (s) for its own end."""
+        if self.closed:
+            return
+        try:
+            self._process.wait(patience)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._selector.close()
+        for stream in (self._requests, self._answers, self._log):
+            with contextlib.suppress(BrokenPipeError):  # a request that it never read
+                stream.close()
