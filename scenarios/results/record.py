@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
@@ -88,13 +88,24 @@ def csv_line(row: Row) -> bytes:
     b'0.1,-0.0,2.5e-07,1e+22,nan\n'
     """
     text = _encoder.encode(row)[1:-1]
-    if b"e" in text or b"0.0000" in text or b"n" in text:
-        parts = zip(row, text.split(b","), strict=True)
-        text = b",".join(
-            repr(number).encode() if b"e" in part or b"0.0000" in part or part == b"null" else part
-            for number, part in parts
-        )
+    if b"n" in text:  # the null of NaN and of an infinite number
+        return (",".join(map(repr, row)) + "\n").encode("ascii")
+    for mark in (b"e", b"0.0000"):
+        if mark in text:
+            text = b"".join(_with_texts_of_repr(text, mark))
     return text + b"\n"
+
+
+def _with_texts_of_repr(text: bytes, mark: bytes) -> Iterator[bytes]:
+    """Yield a line in pieces; the numbers whose texts contain the mark are as `repr` writes them."""
+    done, at = 0, text.find(mark)
+    while at >= 0:
+        begin, end = text.rfind(b",", done, at) + 1 or done, text.find(b",", at)
+        end = len(text) if end < 0 else end
+        yield text[done:begin]
+        yield repr(float(text[begin:end])).encode("ascii")
+        done, at = end, text.find(mark, end)
+    yield text[done:]
 
 
 class Recorder:
