@@ -285,24 +285,25 @@ class Agent:
         assert self._P_set is not None
         assert self._V_set is not None
         P_saturated, V_saturated = self._saturated_sides(m, e) if self._stops else (0, 0)
+        P_rated, V_nom, m_q = config.P_rated, config.V_nom, config.m_q
         return Own(
-            name=config.name,
-            leader=self._leader,
-            t=m.t,
-            P=m.P / config.P_rated,
-            Q=m.Q / config.P_rated,
-            V=m.V / config.V_nom,
-            e=e,
-            z=config.m_q * m.Q / config.P_rated,
-            P_set=self._P_set / config.P_rated,
-            V_set=self._V_set / config.V_nom,
-            m_p=config.m_p,
-            m_q=config.m_q,
-            P_rated=config.P_rated,
-            V_nom=config.V_nom,
-            f_nom=config.f_nom,
-            P_saturated=P_saturated,
-            V_saturated=V_saturated,
+            config.name,
+            self._leader,
+            m.t,
+            m.P / P_rated,
+            m.Q / P_rated,
+            m.V / V_nom,
+            e,
+            m_q * m.Q / P_rated,  # z
+            self._P_set / P_rated,
+            self._V_set / V_nom,
+            config.m_p,
+            m_q,
+            P_rated,
+            V_nom,
+            config.f_nom,
+            P_saturated,
+            V_saturated,
         )
 
     def _counted(

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from agents.carriers.make import make_law
+from agents.known_agents import KnownAgents
 from agents.laws.law import Law
 from agents.lockstep_agent import LockstepAgent
 from agents.realtime.realtime_agent import RealtimeAgent
@@ -104,6 +105,8 @@ def _one_session_after_the_other(
             made.append(laws.enter_context(closing(make_law(config.control))))
         except ValueError as error:
             raise ConfigurationError(f"{config.name}: {error}") from None
+    shared: list[KnownAgents] = []
+    """One for each rule among the agents."""
     nodes: tuple[AnyAgent, ...] = ()
     core: AnyAgent | NodeGroup | None = None
     while core is None or core.session_broken:
@@ -111,7 +114,8 @@ def _one_session_after_the_other(
         try:
             if core is None:
                 nodes = tuple(
-                    _node(config, session.id, make_links, law) for config, law in zip(configs, made, strict=True)
+                    _node(config, session.id, make_links, law, shared)
+                    for config, law in zip(configs, made, strict=True)
                 )
                 core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
             _take_part(core, nodes, session, logging.getLogger(first.name))
@@ -120,10 +124,16 @@ def _one_session_after_the_other(
     return nodes
 
 
-def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law) -> AnyAgent:
+def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AnyAgent:
     try:
         links = make_links(config.name, config.links)
-        return (RealtimeAgent if config.clock == "wall" else LockstepAgent)(config, instance, links, law)
+        if config.clock == "wall":
+            return RealtimeAgent(config, instance, links, law)
+        known = next((each for each in shared if each.control == config.control), None)
+        if known is None:
+            known = KnownAgents(config.control)
+            shared.append(known)
+        return LockstepAgent(config, instance, links, law, known)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
 

@@ -302,8 +302,9 @@ class LockstepAgent(AgentNode):
             raise RejectedError(kind, f"tick {message.seq}, but {self._tick} is next")
         self._grant = message
         self._barrier.came(PLANT)
-        for name in set(self._neighbours).difference(self._processes):
-            self._barrier.came(name)
+        if self._neighbours_of is not self._processes:
+            for name in set(self._neighbours).difference(self._processes):
+                self._barrier.came(name)
         self._hear(message, payload, message.t)
         self._barrier.renew(now)
         self._compute(now)

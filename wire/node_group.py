@@ -88,6 +88,8 @@ class NodeGroup:
         self._active = list(self.nodes)
         self._declared: set[str] = set()
         """Keys that the session has subscribed to."""
+        self._listeners: dict[str, list[GroupedNode]] = {}
+        """Nodes that listen to each key."""
         self._queries: dict[str, _Query] = {}
         """Last query of each key."""
         self._open: dict[str, _Query] = {}
@@ -109,7 +111,10 @@ class NodeGroup:
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the tokens are declared."""
-        keys = tuple(dict.fromkeys(key for node in self._active for key in node.subscriptions))
+        for node in self._active:
+            for key in node.subscriptions:
+                self._listen(node, key)
+        keys = tuple(self._listeners)
         self._declared.update(keys)
         return keys
 
@@ -186,9 +191,8 @@ class NodeGroup:
         if query is not None:
             query.answer.append(payload)
             key = key.partition("#")[0]
-        for node in self._active if query is None else query.askers:
-            if query is not None or key in node.routes:
-                node.received(key, payload, now)
+        for node in tuple(self._listeners.get(key, ())) if query is None else query.askers:
+            node.received(key, payload, now)
 
     def work(self, now: float) -> bool:
         """Let every node do a piece of work; return whether one did."""
@@ -207,10 +211,11 @@ class NodeGroup:
     def _perform(self, node: GroupedNode, action: Action | Log, actions: list[Action | Log]) -> None:
         if isinstance(action, Publish):
             actions.append(action)
-            for other in self._active:
-                if other is not node and action.key in other.routes:
+            for other in tuple(self._listeners.get(action.key, ())):
+                if other is not node:
                     other.received(action.key, action.payload, self._now)
         elif isinstance(action, Listen):
+            self._listen(node, action.key)
             if action.key not in self._declared:
                 self._declared.add(action.key)
                 actions.append(action)
@@ -218,6 +223,11 @@ class NodeGroup:
             self._fetch(node, action.key, actions)
         else:
             actions.append(action)
+
+    def _listen(self, node: GroupedNode, key: str) -> None:
+        listeners = self._listeners.setdefault(key, [])
+        if node not in listeners:
+            listeners.append(node)
 
     def _fetch(self, node: GroupedNode, key: str, actions: list[Action | Log]) -> None:
         """Answer from inside, or by a query that proves as much, or query."""
@@ -246,6 +256,9 @@ class NodeGroup:
             if node.finished and not node.session_broken:
                 actions.extend(node.take_actions())
                 self._active.remove(node)
+                for listeners in self._listeners.values():
+                    if node in listeners:
+                        listeners.remove(node)
                 actions.append(WithdrawToken(node.token))
                 for other in self._active:
                     other.vanished(node.token, self._now)

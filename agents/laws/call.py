@@ -67,12 +67,12 @@ def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
     """Return a law's result within its limits; raise LawError if it is no decision."""
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
-    P_set, V_set = (_number(name, getattr(result, name), own.t) for name in ("P_set", "V_set"))
+    P_set, V_set = _number("P_set", result.P_set, own.t), _number("V_set", result.V_set, own.t)
     return SetPoints(
-        P_set=min(max(P_set, law.P_set_min), law.P_set_max),
-        V_set=min(max(V_set, law.V_set_min), law.V_set_max),
-        shared=NOTHING if result.shared is NOTHING else _checked(result.shared, own.t),
-        send=bool(result.send),
+        min(max(P_set, law.P_set_min), law.P_set_max),
+        min(max(V_set, law.V_set_min), law.V_set_max),
+        NOTHING if result.shared is NOTHING else _checked(result.shared, own.t),
+        bool(result.send),
     )
 
 
