@@ -112,7 +112,8 @@ class BusTable:
 def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> None:
     """Note every node that is cut off even with all switches closed: a feeder is one network, in each phase."""
     inverters = (*feeder.inverters, *feeder.spares)
-    of_three = (row.bus for row in inverters if len(row.phases) > 1)
+    of_three = [row.bus for row in inverters if len(row.phases) > 1]
+    of_three += [bus.name for bus in feeder.buses if set(PHASES) <= set(bus.phases)] if inverters else []
     whole = [*([feeder.source.bus] if feeder.source else []), *of_three][:1]
     parts = Connectivity(feeder).parts(whole=whole)
     main = next((part for part in parts if whole and (whole[0], "A") in part), max(parts, key=len))

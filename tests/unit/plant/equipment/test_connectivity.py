@@ -21,3 +21,18 @@ def test_a_switch_cuts_off_the_side_without_the_substation(turned: bool) -> None
 
     assert {"152", "160", "300"} <= buses
     assert not {"150", "13", "1"} & buses
+
+
+def test_a_single_phase_inverter_feeds_its_own_phase_alone() -> None:
+    """Without the substation a GFM on phase C feeds the nodes of phase C; one of three phases feeds all."""
+    feeder = replace(read_feeder("microgrid123"), source=None)
+    graph = Connectivity(feeder)
+    single = replace(feeder.inverters[0], phases="C")
+
+    closed = graph.closed_at_start() - {"61-61s"}  # behind it a delta transformer joins the phases
+    fed, dead = graph.fed(closed, [single])
+    whole, _ = graph.fed(closed, feeder.inverters[:1])
+
+    assert {phase for part in fed for _, phase in part} == {"C"}
+    assert ("160", "A") in frozenset().union(*dead)
+    assert {phase for part in whole for _, phase in part} == {"A", "B", "C"}

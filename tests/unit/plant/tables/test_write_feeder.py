@@ -37,6 +37,8 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
 
     assert Feeder.read(feeder.save(tmp_path / "mine")).inverters == feeder.inverters
     assert [row.phases for row in feeder.inverters[-5:]] == ["ABC", "A", "B", "C", "B"]
+    alone = msgspec.structs.replace(feeder, source=None, inverters=feeder.inverters[-4:-1], spares=())
+    assert len(Feeder.read(alone.save(tmp_path / "alone")).inverters) == 3
 
 
 @pytest.mark.parametrize(
