@@ -58,7 +58,10 @@ def spread(parts: Parts, graph: str, start: int) -> float:
     return 100.0 * (max(costs.values()) / costs[start] - 1.0)
 
 
-GRIDLABD, PLANT = (tuple(f"{who}.plant.{what}" for what in ("build", "steps")) for who in ("gridlabd", "ours"))
+GRIDLABD = ("gridlabd.plant.steps",)
+"""Without its start, which has a rest before t = 0 that only a comparison needs."""
+
+PLANT = ("ours.plant.build", "ours.plant.steps")
 
 CRITERIA = (
     Criterion("plant: GridLAB-D / ours", lambda parts: ratio(parts, "plant", GRIDLABD, PLANT), 100.0, at_least=True),
