@@ -27,6 +27,9 @@ VERDICT, VERDICT_UNDER_WAY = 36, 26
 LONG = 20_000_000
 """Bytes from which on a run's size is told before its start."""
 
+HOUR = 3600.0
+"""Run time (s) for which the size of a live run without an end is told."""
+
 MB = 1e6
 
 
@@ -57,13 +60,13 @@ class FileSizes(NamedTuple):
         return f"writes about {(self.history + self.links) / MB:.0f} MB: history.csv {self.history / MB:.0f} MB{links}"
 
 
-def file_sizes(scenario: ScenarioModel, feeder: Feeder) -> FileSizes:
-    """Return the size of the files of all cases of a scenario.
+def file_sizes(scenario: ScenarioModel, feeder: Feeder, seconds: float | None = None) -> FileSizes:
+    """Return the size of the files of all cases of a scenario, which last for their own or other `seconds`.
 
     Links count where a fault may act on them, each with a message a tick.
     """
-    time = scenario.time
-    rows, ticks = round(time.end_s / time.record_s) + 1, round(time.end_s / time.T_c_s)
+    time, end = scenario.time, scenario.time.end_s if seconds is None else seconds
+    rows, ticks = round(end / time.record_s) + 1, round(end / time.T_c_s)
     history = links = most = 0
     for case in scenario.cases:
         history += rows * (1 + len(QUANTITIES) * len(inverters_of(scenario, feeder))) * NUMBER

@@ -73,6 +73,7 @@ def _start(
         from scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
         from scenarios.live.live_processes import all_here, plant_here, say
         from scenarios.live.numbers.live_report import conclude
+        from scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from scenarios.results.metrics_file import RunMetrics
 
         check_new("--record", record)
@@ -80,8 +81,13 @@ def _start(
         options = LiveOptions(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
         config, everyone = configure(spec, feeder, options, endpoint, beyond)
         watch_readers(quits=False)
+        sizes = file_sizes(spec, feeder, HOUR if duration is None else duration)
+        if out is not None and duration is not None:
+            require_room(out, sizes, "--out")
         with folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
+            if kept.whole is not None and sizes.sentence:
+                say(f"run {run}: {'an hour' if duration is None else f'{duration:g} s'} {sizes.sentence}")
             replay = None if out is None else out / "replay.toml"
             link_log = LinkLog(spec, feeder, record, replay)
             if agents:

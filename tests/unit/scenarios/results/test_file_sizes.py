@@ -59,6 +59,13 @@ def test_links_without_a_fault_write_nothing() -> None:
     assert file_sizes(four, one.feeder).links == 350 * 36
 
 
+def test_a_live_run_without_an_end_is_told_by_the_hour() -> None:
+    """An hour of nine inverters is 356 MB, whatever the scenario's own end is."""
+    forecast = file_sizes(with_cases(ISLANDING.spec, ["IV"]), ISLANDING.feeder, 3600.0)
+
+    assert forecast.sentence == "writes about 356 MB: history.csv 356 MB"
+
+
 def test_check_tells_the_size_of_a_long_run(tmp_path: Path) -> None:
     """Four cases of ten minutes are some 240 MB; the experiment itself is too short to speak of."""
     code, output = invoke("check", str(long_run(tmp_path)))
