@@ -26,7 +26,7 @@ def islanded(tmp_path: Path) -> gp.Scenario:
     write_feeder(small(*INVERTERS), tmp_path / "feeder")
     return gp.Scenario(
         name="single-phase",
-        time={"end_s": 4.0},
+        time={"end_s": 2.5},
         plant={"feeder": str(tmp_path / "feeder"), "load_set": "test", "P_set0_pu": 0.3},
         event=[{"label": "islanding", "t_s": 0.1, "open": ["grid"]}],
         case={"IV": {"secondary": "all", "graph": "full"}},
