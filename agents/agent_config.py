@@ -185,6 +185,8 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Rendezvous endpoints, e.g. ("tcp/127.0.0.1:7447",)."""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:0",)
     """Where other agents can connect; port 0 is any free one."""
+    star: bool = False
+    """Whether the plant relays all messages, in simulated time: the agents have one link each."""
     epoch: int = 1
     """Epoch of this process; see `wire.admission`."""
     clock: Literal["simulated", "wall"] = "simulated"

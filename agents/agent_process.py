@@ -83,7 +83,7 @@ def _check(configs: Sequence[AgentConfig]) -> None:
         raise ConfigurationError(str(error)) from None
     first = configs[0]
     for config in configs[1:]:
-        for key in ("run", "clock", "listen", "connect"):
+        for key in ("run", "clock", "listen", "connect", "star"):
             if getattr(config, key) != getattr(first, key):
                 raise ConfigurationError(
                     f"{config.name}: {key} {getattr(config, key)!r} differs from that of {first.name}; "
@@ -110,7 +110,7 @@ def _one_session_after_the_other(
     nodes: tuple[AnyAgent, ...] = ()
     core: AnyAgent | NodeGroup | None = None
     while core is None or core.session_broken:
-        session = Session(first.name, listen=first.listen, connect=first.connect, clock=first.clock)
+        session = Session(first.name, listen=first.listen, connect=first.connect, clock=first.clock, star=first.star)
         try:
             if core is None:
                 nodes = tuple(

@@ -174,6 +174,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     Empty: none."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
+    star: bool = False
+    """Whether the plant relays all messages, in simulated time: the agents have one link each."""
     recorders: tuple[str, ...] = ()
     """Recorders of the telemetry that the plant waits for before tick 0."""
     epoch: int = 1

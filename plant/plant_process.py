@@ -74,7 +74,8 @@ def run_plant(
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
     plant: LivePlant | None = None
-    session = Session("plant", listen=config.listen, connect=config.connect, clock=config.clock, rendezvous=True)
+    listen, connect = config.listen, config.connect
+    session = Session("plant", listen=listen, connect=connect, clock=config.clock, rendezvous=True, star=config.star)
     try:
         on_word(LISTENING)
         try:

@@ -25,6 +25,10 @@ from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
 
+MESHED = 20
+"""Most processes of agents that link to each other in simulated time. More link to the plant alone, which relays: a
+link for each pair costs more than the way through the plant (bench/discovery.py)."""
+
 LEAVING = 2.5
 """Time (s) that processes have to close at the end by themselves."""
 
@@ -93,8 +97,10 @@ def run_processes(
     wall = plant_config.clock == "wall"
     endpoint = free_endpoint(*plant_config.listen[:1])
     deadline = "deadline" if wall else "plant_wait"  # an agent that waits for the plant waits for its compiler too
-    configs = [replace(config, **{deadline: BUILD_DEADLINE}, connect=(endpoint,)) for config in agents.values()]
-    plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,))
+    star = not wall and (plant_config.star or (shared or len(agents)) > MESHED)
+    own = {deadline: BUILD_DEADLINE, "connect": (endpoint,), "star": star}
+    configs = [replace(config, **own) for config in agents.values()]
+    plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,), star=star)
     first = [name for name in agents if name in plant_config.agents]
     order = list(start_order) if start_order is not None else [PLANT, *first]
     if sorted(order) != sorted([PLANT, *first]):

@@ -104,6 +104,8 @@ class Session:
     meets_all : bool, optional
         Whether to connect to every peer, instead of the one with the greater id of each pair: for a peer that does not
         listen.
+    star : bool, optional
+        Whether the rendezvous relays all messages, as a router: then every other session is its client, with one link.
 
     Raises
     ------
@@ -122,6 +124,7 @@ class Session:
         rendezvous: bool = False,
         inbox: Inbox | None = None,
         meets_all: bool = False,
+        star: bool = False,
     ) -> None:
         try:
             load_zenoh()
@@ -140,12 +143,17 @@ class Session:
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         config = _config(listen, connect, gossip, meets_all, profile)
+        if star and rendezvous:
+            config["mode"] = "router"
+        elif star:
+            config = _config((), connect, False, meets_all, profile)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
-        if self._changeable and self._meets_router():
-            self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
-            self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
-            self._changeable = False
+        if star and not rendezvous:
+            self._await_router()
+            self._become_client(who, config)
+        elif self._changeable and self._meets_router():
+            self._become_client(who, config)
         self._links: Any = None
         if clock == "wall":  # no callback: one during the end of Python would abort the process
             channel: Any = zenoh.handlers.RingChannel(1)
@@ -159,6 +167,21 @@ class Session:
             return self._zenoh.open(self._config)
         except self._zenoh.ZError as error:
             raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
+
+    def _await_router(self) -> None:
+        """Wait until the router is there; a signal ends the wait, as it would not end the opening of a client."""
+        try:
+            while not self._meets_router():
+                pass
+        except BaseException:
+            self.close()
+            raise
+
+    def _become_client(self, who: str, config: dict[str, Any]) -> None:
+        """Open the session again as the client of the router that it has met."""
+        self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
+        self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
+        self._changeable = False
 
     def _meets_router(self) -> bool:
         """Wait for the first link; return whether it leads to a router."""

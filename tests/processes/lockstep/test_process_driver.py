@@ -57,6 +57,22 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
     assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
 
 
+def test_a_plant_that_relays_gives_the_same_rows_and_notices_a_death(tmp_path: Path) -> None:
+    """As for many agents: each has one link, to the plant. A kill -9 is noticed as in a mesh."""
+    plant, agents = toy_configs(4, end=2.0)
+    mesh = ProcessRun(plant, agents, tmp_path / "mesh")
+    star = ProcessRun(msgspec.structs.replace(plant, star=True), agents, tmp_path / "star")
+    hurt = ProcessRun(msgspec.structs.replace(plant, star=True), agents, tmp_path / "hurt")
+    hurt.at(0.4, lambda: hurt.child("inv3").signal(signal.SIGKILL))
+
+    assert [mesh().broke, star().broke] == ["", ""]
+    assert star.rows == mesh.rows
+    outcome = hurt()
+    assert outcome.broke == ""
+    assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
+    assert hurt.rows[-1][0] == 2.0
+
+
 def test_agents_of_a_killed_process_die_together(tmp_path: Path) -> None:
     """Kill -9 of a process that two agents share: the plant goes on with the others, and names both."""
     run = ProcessRun(*toy_configs(4, end=3.0), tmp_path)
