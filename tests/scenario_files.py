@@ -17,7 +17,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def problems(folder: Path, text: str) -> tuple[str, ...]:
-    """What is wrong with a scenario file of this text."""
+    """Problems of a scenario file of this text."""
     with pytest.raises(ScenarioError) as caught:
         load_scenario(written(folder, text))
     return caught.value.problems

@@ -75,7 +75,7 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
 
 
 def test_the_copy_of_a_scenario_keeps_its_protection(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """What a run leaves in its folder can be run again: settings are written as they are read."""
+    """The scenario in a run's folder can be run again: settings are written as they are read."""
     scenario, _ = load_scenario("blackout")
     own = replace(scenario, protection=replace(scenario.protection, trips={"UV2": (0.4, 0.2), "OF1": (61.0, 100.0)}))
     path = tmp_path_factory.mktemp("copy") / "again.toml"

@@ -23,7 +23,7 @@ from tests.toy.toy_runs import ProcessRun, Rows, first_difference
 
 @dataclass
 class Ran:
-    """What a driver gave."""
+    """Result of a driver."""
 
     outcome: Outcome
     rows: Rows = field(default_factory=list)

@@ -73,7 +73,7 @@ CALM = STORM[: STORM.index("[[link]]")]
 
 
 class Ran(NamedTuple):
-    """What came of one run."""
+    """Result of one run."""
 
     outcome: Outcome
     rows: list[tuple[float, ...]]

@@ -21,7 +21,7 @@ Row = tuple[float, ...]
 
 @lru_cache
 def rows(case: str) -> tuple[Row, ...]:
-    """What was recorded until 9 s, of a case of unheard-switches."""
+    """Records until 9 s of a case of unheard-switches."""
     scenario, feeder = load_scenario("unheard-switches")
     found: list[Row] = []
     outcome = run_inprocess(*configs(scenario, feeder, case), lambda telemetry: found.extend(telemetry.rows))

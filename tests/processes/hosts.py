@@ -55,7 +55,7 @@ class Hosts:
         return f"10.77.0.{host}"
 
     def at(self, host: int) -> list[str]:
-        """What stands before a command to run it on a host."""
+        """Prefix of a command that runs it on a host."""
         return ["ip", "netns", "exec", self._name(host)]
 
     def cut(self, host: int) -> None:

@@ -55,7 +55,7 @@ class Verdict:
     excused: dict[str, str] = field(default_factory=dict)
     """Islands that need not come back, and why."""
     events: tuple[str, ...] = ()
-    """What the plant told."""
+    """The plant's telemetry."""
     late: float = 0.0
     """Share of the plant's steps that were late."""
 

@@ -34,7 +34,7 @@ class Mixed(ProcessRun):
         self.foreigners: list[subprocess.Popen[bytes]] = []
 
     def start(self, name: str) -> None:
-        """Start a foreign agent as a person would: told by the plant in real time, by a file in simulated time."""
+        """Start a foreign agent as a person would: the plant configures it in real time, a file in simulated time."""
         wall = self.plant.clock == "wall"
         with (self.log_dir / f"{name}-foreign-{len(self.foreigners)}.log").open("wb") as log:
             options = [self.endpoint, self.plant.run, name] if wall else []

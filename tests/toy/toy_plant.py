@@ -23,7 +23,7 @@ ISLANDING = 0.1
 
 
 class Reading(NamedTuple):
-    """What the sensors of one inverter read."""
+    """Sensor readings of one inverter."""
 
     P: float
     Q: float

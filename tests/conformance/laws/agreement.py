@@ -1,4 +1,4 @@
-"""Agents that only agree: a law without a plant, on any graph, neighbours told as the law has it."""
+"""Agents that only agree: a law without a plant, on any graph, which decides when it sends to neighbours."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ M_P = 0.01
 def agreement(
     make: Callable[[], Law], P_set: Sequence[float], links: NDArray[np.bool_], T: float, steps: int
 ) -> tuple[Floats, int]:
-    """Every agent's m_p P_set (pu) at each step, a row each, and how often one told its neighbours."""
+    """Every agent's m_p P_set (pu) at each step, a row each, and how often one sent to its neighbours."""
     n, told = len(P_set), 0
     laws, y = [make() for _ in P_set], [list(P_set)]
     known = list(P_set)
@@ -42,7 +42,7 @@ def own(i: int, P_set: float, t: float) -> Own:
 
 
 def neighbour(j: int, P_set: float) -> Neighbour:
-    """What is known of a neighbour."""
+    """Nameplate and state of a neighbour."""
     return Neighbour(f"inv{j}", False, 0.0, 1.0, P_set, 1.0, 0.0, M_P, 0.05, 1e5)
 
 

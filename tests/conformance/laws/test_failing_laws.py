@@ -36,7 +36,7 @@ BAD = "tests.conformance.laws.bad_laws"
     ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
 ])  # fmt: skip
 def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
-    """Whatever a step does: one line of every agent in events.csv, primary droop from then on, a history to the end."""
+    """A failing step gives one line of every agent in events.csv, primary droop from then on, a history to the end."""
     limit = {"time_limit_s": 0.3} if how.startswith("hangs") else {}  # the default is out of a starved machine's reach
     result = written({"use": f"{BAD}:Failing", "how": how, **limit})
     told = result.events[result.events["kind"] == "law"]
@@ -185,7 +185,7 @@ def test_a_module_that_ends_python_while_it_is_imported_is_refused(tmp_path: Pat
 
 
 def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
-    """Who changes a law between two runs of a notebook sees the new one, in process as with processes."""
+    """A law that is changed between two runs of a notebook takes effect, in process as with processes."""
     text = "import gridpeers as gp\nclass Hold(gp.Law):\n    def step(self, own, neighbours, T):\n        return "
     module = tmp_path / "edited_law.py"
     law = {"use": "edited_law:Hold", "folder": str(tmp_path)}

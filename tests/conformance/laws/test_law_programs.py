@@ -44,7 +44,7 @@ def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
 
 
 def answers(command: tuple[str, ...], *lines: str) -> list[dict[str, object]]:
-    """What a program answers to some lines."""
+    """Answers of a program to some lines."""
     done = subprocess.run(command, input="".join(f"{line}\n" for line in lines), capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     return [json.loads(line) for line in done.stdout.splitlines()]

@@ -12,7 +12,7 @@ LAWS = ("consensus", "dapi", "event-triggered", "finite-time", "centralised")
 
 @pytest.mark.parametrize("law", LAWS)
 def test_every_secondary_law_restores_frequency_and_shares_power(law: str) -> None:
-    """What all of them are for: nominal frequency and equal shares after both events."""
+    """Every published law reaches nominal frequency and equal shares after both events."""
     metrics = islanding(law).metrics
 
     assert (metrics["f_error_Hz"] < 0.01).all()

@@ -57,7 +57,7 @@ def run_case(name: str, case: str) -> Pin:
 
 
 def environment() -> dict[str, str]:
-    """What decides the last digits: the numerical packages, and the processor type that OpenBLAS found."""
+    """Versions that decide the last digits: numerical packages, and the processor type that OpenBLAS found."""
     np.ones((2, 2)) @ np.ones((2, 2))
     kernels = {str(pool.get("architecture", "")) for pool in threadpool_info() if pool["user_api"] == "blas"}
     versions = {package: metadata.version(package) for package in ("numpy", "scipy", "numba")}

@@ -48,7 +48,7 @@ def told(scenario: str, end_s: float, *cases: str) -> CaseData:
 
 @cache
 def theory(scenario: str) -> SweepData:
-    """What theory needs to know of a scenario, without any runs."""
+    """A scenario's inputs of the theory, without any runs."""
     return SweepData(rows=pd.DataFrame(), base=load_scenario(scenario)[0], window="event1")
 
 

@@ -49,7 +49,7 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_result_is_a_figure_and_the_same_table_twice(tmp_path: Path) -> None:
-    """What never came is written as never, and drawn at the edge."""
+    """A value that was never reached is written as never, and drawn at the edge."""
     x = np.array([0.0, 0.1, 1.0])
     curves = [Curve(x=x, y=np.array([1.0, 2.0, np.inf]), style=0), Curve(x=x, y=x + 1.0, style=1, look="predicted")]
     panel = Panel(

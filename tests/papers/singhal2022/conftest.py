@@ -32,7 +32,7 @@ class Experiment:
 
 
 def expected(experiment: str) -> dict[str, str]:
-    """What the documentation says of each claim: it holds, or is a known miss."""
+    """The documentation's word on each claim: it holds, or is a known miss."""
     return {claim.name: "MISS" if claim.known_miss else "PASS" for claim in CLAIMS[experiment]}
 
 

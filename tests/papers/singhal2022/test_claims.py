@@ -93,7 +93,7 @@ def test_a_known_miss_is_told_with_its_reason() -> None:
 
 @pytest.mark.parametrize("V_error", [0.0, 0.00126])
 def test_a_V_error_is_judged_beside_its_own_size(V_error: float) -> None:
-    """What a tolerance of 0.003 pu passes, a zero for 0.001 or a quarter more than it at 0.002, is told as a miss."""
+    """A zero for 0.001 pu, or a quarter more at 0.002, is a miss, though a tolerance of 0.003 pu would pass it."""
     results = changed("III", "event2", V_error=V_error)
 
     assert verdict("table_II_V_error", results).status == "PASS"

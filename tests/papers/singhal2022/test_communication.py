@@ -76,5 +76,5 @@ def test_over_few_links_sharing_from_unequal_powers_takes_half_a_second_more(com
 
 
 def test_every_claim_holds_but_for_the_known_miss(communication: Experiment) -> None:
-    """What `gridpeers run reduced-communication` says of our run. Section 4, Table IV."""
+    """`gridpeers run reduced-communication` reports what the documentation says. Section 4, Table IV."""
     assert communication.statuses("communication") == expected("communication")

@@ -58,5 +58,5 @@ def test_voltage_and_vars_do_not_see_the_clouds(intermittency: Experiment) -> No
 
 
 def test_every_claim_holds(intermittency: Experiment) -> None:
-    """What `gridpeers run intermittency` says of our run. Section 4, Table III."""
+    """`gridpeers run intermittency` reports what the documentation says. Section 4, Table III."""
     assert intermittency.statuses("intermittency") == expected("intermittency")

@@ -116,7 +116,7 @@ def test_the_mean_voltage_returns_to_nominal_with_secondary_control(islanding: E
 
 
 def test_every_claim_holds_but_for_the_misses_that_are_explained(islanding: Experiment) -> None:
-    """What `gridpeers run islanding` says of our run is what the documentation says. Section 4, Tables I, II."""
+    """The report of `gridpeers run islanding` is the one in the documentation. Section 4, Tables I, II."""
     assert islanding.statuses("islanding") == expected("islanding")
 
 

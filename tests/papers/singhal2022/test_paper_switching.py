@@ -37,5 +37,5 @@ def test_each_island_carries_its_own_load(switching: Experiment) -> None:
 
 
 def test_every_claim_holds(switching: Experiment) -> None:
-    """What `gridpeers run microgrid-switching` says of our run. Section 4, Table V."""
+    """`gridpeers run microgrid-switching` reports what the documentation says. Section 4, Table V."""
     assert switching.statuses("switching") == expected("switching")

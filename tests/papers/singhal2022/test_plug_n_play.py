@@ -75,5 +75,5 @@ def test_mean_sharing_is_that_of_eight_while_one_is_away(plug_n_play: Experiment
 
 
 def test_every_claim_holds(plug_n_play: Experiment) -> None:
-    """What `gridpeers run plug-n-play` says of our run. Section 4."""
+    """`gridpeers run plug-n-play` reports what the documentation says. Section 4."""
     assert plug_n_play.statuses("plug-n-play") == expected("plug-n-play")

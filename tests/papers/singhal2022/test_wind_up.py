@@ -62,5 +62,5 @@ def test_a_reference_that_is_not_clipped_overshoots_three_times_as_far(wind_up: 
 
 
 def test_every_claim_holds(wind_up: Experiment) -> None:
-    """What `gridpeers run wind-up` says of our run: limits bring f and sharing back sooner. Remark 2."""
+    """`gridpeers run wind-up` reports that limits bring f and sharing back sooner. Remark 2."""
     assert wind_up.statuses("wind-up") == expected("wind-up")

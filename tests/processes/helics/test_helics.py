@@ -181,7 +181,7 @@ class Controller(threading.Thread):
 
 
 def test_a_bridged_plant_takes_set_points_from_the_tick_on_in_which_they_are_decided() -> None:
-    """What a controller publishes after t_k holds from t_k to t_(k+1); inverters of nobody stay, and are named."""
+    """Set-points published after t_k hold from t_k to t_(k+1); inverters without a controller stay, and are named."""
     broker = free_broker()
     settings = PlantSettings(feeder="toy2", helics=HelicsSettings(broker=broker, name="plant", federates=2))
     config = PlantConfig(

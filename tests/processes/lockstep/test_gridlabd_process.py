@@ -161,7 +161,7 @@ def test_a_network_without_solution_ends_the_run_with_gridlabds_words() -> None:
 
 
 def test_a_model_that_gridlabd_refuses_is_an_error_with_its_words(gridlabd: DeltaModeProcess) -> None:
-    """What GridLAB-D says of a GLM is passed on."""
+    """GridLAB-D's own message on a GLM reaches the user."""
     with pytest.raises(GridlabdError, match=r"(?s)GridLAB-D: it refuses the model.*nonsense"):
         gridlabd.load("module nonsense;\n", [])
 

@@ -135,7 +135,7 @@ def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
 
 
 def test_a_plant_that_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
-    """What is wrong with the plant's configuration is in its last lines."""
+    """The plant's last lines name the mistake in its configuration."""
     plant, agents = toy_configs(2)
     outcome = ProcessRun(msgspec.structs.replace(plant, end=0.41), agents, tmp_path)()
 

@@ -34,7 +34,7 @@ T_C = 0.02
 
 
 def setup(*, nodes: tuple[NodeFault, ...] = (), **netem: tuple[Fault | Partition, ...]) -> EmulationConfig:
-    """What processes of the toy run are told."""
+    """Configuration of the toy run's processes."""
     return EmulationConfig(netem=Netem(seed=5, nodes=nodes, **netem), microgrids=MICROGRIDS, real_nodes=True)  # type: ignore[arg-type]
 
 

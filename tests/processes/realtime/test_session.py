@@ -12,7 +12,7 @@ from wire.driver.session import Session, SessionError
 
 
 def test_a_port_in_use_is_explained() -> None:
-    """Who listens second is told which endpoint, and what to do."""
+    """The second session on an endpoint gets an error with the endpoint and a remedy."""
     endpoint = free_endpoint()
     first = Session("plant", listen=(endpoint,))
     try:
@@ -31,7 +31,7 @@ def test_a_missing_zenoh_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_subscription_proven_by_a_query_is_in_place() -> None:
-    """What discovery relies on: once a neighbour has answered after the subscription, its next publication arrives."""
+    """Once a neighbour has answered after the subscription, its next publication arrives: discovery relies on it."""
     for _ in range(20):
         endpoint = free_endpoint()
         sender, receiver = Session("a", listen=(endpoint,)), Session("b", connect=(endpoint,))

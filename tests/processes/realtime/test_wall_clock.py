@@ -160,7 +160,7 @@ def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(t
 
 
 def test_a_start_order_works_in_which_the_plant_is_neither_first_nor_last(tmp_path: Path) -> None:
-    """Agents wait for a plant; the plant waits for agents as long as told."""
+    """Agents wait for a plant; the plant waits for agents as long as its configuration says."""
     with Town(4, tmp_path) as town:
         town.start("inv3", "inv1", "plant", "inv4", "inv2")
         town.together(FOUR)

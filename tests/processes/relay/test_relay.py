@@ -123,7 +123,7 @@ def test_who_comes_while_the_relay_is_cut_is_refused(server: socket.socket) -> N
 
 
 def test_a_target_that_is_not_there_resets_the_connection() -> None:
-    """Who connects while the target is down sees its connection end, and may try again."""
+    """A connection made while the target is down ends, and may be tried again."""
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         relayed = Relay("tcp/127.0.0.1:0", endpoint_of(silent))

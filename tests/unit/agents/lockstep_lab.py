@@ -92,13 +92,13 @@ class Lab:
         self.hear(KEYS.state(name), state)
 
     def take(self) -> list[tuple[str, str]]:
-        """What was done since last asked."""
+        """Actions since the last call."""
         done, self.done = self.done, []
         return done
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Who is awaited, and for what."""
+        """Missing messages: their kind and sender."""
         return [(what, who) for what, who in self.node.missing_messages()]
 
 

@@ -15,7 +15,7 @@ ROSTER = ("inv1", "inv2", "inv3")
 
 
 def measurement(k: int = 0, **changes: Any) -> Measurement:
-    """What inv1 measures in an island at 59.7 Hz."""
+    """Measurement of inv1 in an island at 59.7 Hz."""
     values: dict[str, Any] = {
         "sender": "plant",
         "epoch": 1,
@@ -36,7 +36,7 @@ def measurement(k: int = 0, **changes: Any) -> Measurement:
 
 
 def state(sender: str, k: int = 0, *, P_set: float = 60e3, Q: float = 10e3, epoch: int = 1) -> State:
-    """What a neighbour decided."""
+    """State of a neighbour."""
     return State(sender=sender, epoch=epoch, seq=k, t=0.02 * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
@@ -132,7 +132,7 @@ def test_another_life_of_a_name_begins_anew() -> None:
 
 
 def test_unknown_names_on_the_roster_are_no_neighbours() -> None:
-    """Whose nameplate has not been seen cannot be judged by the rule."""
+    """The rule ignores agents whose nameplates have not been seen."""
     assert met().in_neighbours((*ROSTER, "inv7")) == ("inv2", "inv3")
 
 

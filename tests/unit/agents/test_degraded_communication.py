@@ -39,12 +39,12 @@ def agent(name: str = "inv1", **degraded_communication: Any) -> Agent:
 
 
 def state(sender: str, k: int, *, P_set: float = 80e3, Q: float = 10e3) -> State:
-    """What a neighbour decided at tick k."""
+    """State of a neighbour at tick k."""
     return State(sender=sender, epoch=1, seq=k, t=T * k, P_set=P_set, V_set=277.0, Q=Q)
 
 
 def measured(k: int, **changes: Any) -> Measurement:
-    """What is measured in an island at nominal frequency and voltage, on the droop characteristic."""
+    """Measurement in an island at nominal frequency and voltage, on the droop characteristic."""
     values: dict[str, Any] = dict(
         sender="plant", epoch=1, seq=k, t=T * k, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
         V_set=277.0, grid_connected=False, island="", roster=ROSTER,

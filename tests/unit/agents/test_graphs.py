@@ -95,7 +95,7 @@ def test_a_function_and_a_class_with_parameters_are_rules(folder: str) -> None:
 def test_a_rule_that_cannot_be_is_told_in_one_line(
     folder: str, use: str, parameters: dict[str, int], said: str
 ) -> None:
-    """What was asked for, and what there is."""
+    """One line says what is wrong with the rule, and what would be right."""
     (wrong,) = plugin_problems(GRAPHS, plugin_of({"use": use, **parameters}, folder))
     make_graph(Plugin(use="my_graphs:star", folder=folder))
 
@@ -116,7 +116,7 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
     ],
 )
 def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
-    """Whom it concerns, and what was returned or raised."""
+    """The error names the agent, and what the rule returned or raised."""
     with pytest.raises(GraphError) as caught:
         neighbours_by(rule, nameplates(2), "mine", strict=True)  # type: ignore[arg-type]
 
@@ -156,7 +156,7 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
 
 
 def test_a_decorators_name_is_a_rule_and_never_taken_over() -> None:
-    """What gridpeers or somebody else has under a name stays."""
+    """A rule that gridpeers or a plug-in has registered under a name stays."""
 
     @GRAPHS.register("nobody-at-all")
     def nobody(members):  # type: ignore[no-untyped-def]

@@ -136,7 +136,7 @@ def test_nothing_is_known_of_whom_nothing_was_heard_and_on_the_grid() -> None:
 
 
 def test_a_state_from_before_what_is_known_is_of_no_use() -> None:
-    """What is older than the own measurements, or much later than the last of them, is not compared."""
+    """Samples older than the own measurements, or much later than the last of them, are not compared."""
     here, there = pair()
     here.sensed(5.0, 60.0)
     for t in (0.0, 5.0 + 2 * T_GAP):

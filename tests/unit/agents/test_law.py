@@ -297,7 +297,7 @@ def test_many_neighbours_do_not_slow_the_frequency_down() -> None:
 
 @given(st.floats(-10.0, 10.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.booleans())
 def test_set_points_stay_within_their_limits(P_set: float, y_bar: float, e: float, leader: bool) -> None:
-    """Whatever comes in, P_set and V_set do not wind up."""
+    """P_set and V_set do not wind up, for any inputs."""
     gains = Gains(P_set_min=0.1, P_set_max=0.9, V_set_min=0.95, V_set_max=1.05)
 
     P = P_set_step(P_set, y_bar, 3.0, e, leader=leader, m_p=0.01, gains=gains, T=0.02)

@@ -40,7 +40,7 @@ def test_who_is_no_neighbour_is_met_and_not_heard() -> None:
 
 
 def test_a_ring_waits_for_the_roster() -> None:
-    """Who stands beside whom shows only on the roster: before it nobody is listened to."""
+    """An agent listens to nobody before the first roster, which decides who is a neighbour."""
     lab = Lab("ring")
     for name in NAMES[1:]:
         lab.token(name)
@@ -100,7 +100,7 @@ def test_a_token_that_was_lost_and_comes_back_must_prove_itself_anew() -> None:
 
 
 def test_of_two_processes_of_a_name_the_one_on_the_roster_speaks() -> None:
-    """Whatever the other says of itself, before or after."""
+    """Nothing that another process of a name sends, before or after, changes which one speaks for it."""
     lab = Lab()
     for instance, epoch in (("early", 8), ("inv2", 5)):
         lab.token("inv2", instance)

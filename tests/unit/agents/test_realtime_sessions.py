@@ -86,7 +86,7 @@ def test_whoever_hears_less_than_the_plant_opens_a_new_session(
 
 
 def test_a_neighbour_that_the_plant_does_not_hear_either_is_no_reason_for_a_new_session() -> None:
-    """Who is frozen, dead or waiting is silent for everybody."""
+    """A neighbour that is frozen, dead or waiting is silent for everybody, and no reason for a new session."""
     lab = running("inv2", "inv3")
     for k in range(1, 400):
         lab.measure(k, roster=("inv1", "inv2"))

@@ -39,7 +39,7 @@ def test_a_package_that_takes_one_of_our_names_is_told_in_one_line(tmp_path: Pat
 
 
 def test_every_public_name_is_there_and_an_unknown_one_is_told_with_the_nearest() -> None:
-    """What `dir` lists can be had."""
+    """Every name that `dir` lists can be imported."""
     assert all(getattr(gp, name) is not None for name in dir(gp))
     with pytest.raises(AttributeError, match='did you mean "load"'):
         _ = gp.lod  # type: ignore[attr-defined]

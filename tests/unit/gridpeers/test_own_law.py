@@ -94,7 +94,7 @@ def test_a_law_beside_a_session_is_found_again_and_again(tmp_path: Path) -> None
 
 
 def test_a_law_of_a_notebook_runs_where_it_is_and_is_refused_elsewhere(tmp_path: Path) -> None:
-    """What only the script knows runs in its process, and a run with processes says what to do before it starts."""
+    """A law that only the script knows runs in its process; a run with processes says what to do before it starts."""
     line, refusal = outputs(tmp_path, IN_A_NOTEBOOK)
 
     assert len(set(json.loads(line))) == 1

@@ -72,7 +72,7 @@ def test_a_saved_run_is_read_back_the_same_and_has_its_figures(run: gp.Result, t
 
 
 def test_a_folder_with_something_in_it_is_not_written_to(run: gp.Result, tmp_path: Path) -> None:
-    """What is there stays as it was."""
+    """Files that exist stay as they were."""
     (tmp_path / "mine.txt").write_text("mine")
 
     with pytest.raises(gp.FolderError, match="is not empty"):

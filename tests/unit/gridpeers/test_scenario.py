@@ -25,7 +25,7 @@ TABLES = {
 
 
 def test_one_slip_is_one_problem() -> None:
-    """What is wrong with the end of the run is not told again of each link; what replace writes is told as its own."""
+    """A wrong end of the run is reported once, not for each link; a mistake of `replace` is reported as its own."""
     case = {"IV": {"secondary": "all", "graph": "full", "link": [{"on": "* <-> *", "loss": 0.1}]}}
     with pytest.raises(gp.ScenarioError) as caught:
         gp.Scenario(time={"end_s": "7"}, case=case)
@@ -112,7 +112,7 @@ def test_check_returns_what_events_overload() -> None:
 
 
 def test_an_unknown_case_driver_or_clock_is_one_line() -> None:
-    """What cannot be run is told before anything starts."""
+    """A run that is impossible is refused before anything starts."""
     scenario = gp.load("islanding")
 
     for words, text in (

@@ -160,7 +160,7 @@ def test_the_command_compare_prints_the_table_and_draws_both(
 
 
 def test_runs_without_a_common_case_are_not_compared(runs: gp.Results) -> None:
-    """What cannot be compared is told."""
+    """Studies that cannot be compared are refused by name."""
     others = gp.load("islanding").replace({"time.end_s": 0.2, "event": None, "paper": ""}).run(["II", "III"])
 
     with pytest.raises(gp.ScenarioError, match="no case in common: the first has I, IV, the second II, III; run one"):

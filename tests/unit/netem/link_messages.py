@@ -30,7 +30,7 @@ def channel(seed: int = 1, src: str = "inv1", dst: str = "inv2", **kinds: Any) -
 
 
 def fates(judge: Channel, numbers: Iterable[int], size: int = 120) -> list[Fate]:
-    """What becomes of messages sent every control period."""
+    """Deliveries of messages sent every control period."""
     return [judge.judge(seq, seq * T_C, size) for seq in numbers]
 
 

@@ -32,7 +32,7 @@ def traced(fault: dict[str, Any], n: int = 2000, seed: int = 1, *more: Fault) ->
 
 
 def held_against(traces: tuple[LinkTrace, ...], told: dict[str, Any], seed: int = 1) -> Report:
-    """Check of the verdicts against what was, or was not, told."""
+    """Check of the verdicts against a link's law, or without one."""
     return verify(traces, {LINK: Fault(on="inv1 -> inv2", **told).spans(*LINK, MICROGRIDS)}, seed)
 
 

@@ -133,7 +133,7 @@ FALSE = {
 
 @pytest.mark.parametrize("name", FALSE)
 def test_a_falsified_link_is_caught_whatever_the_seed(name: str) -> None:
-    """What is done is not what was told, and every one of ten runs says of what."""
+    """A link that does otherwise than its law says is found in every one of ten runs, with the property that is off."""
     done, told, n, what = FALSE[name]
 
     for seed in range(10):

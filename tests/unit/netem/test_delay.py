@@ -47,7 +47,7 @@ def test_quantile_and_distribution_function_are_those_of_the_law(name: str) -> N
 @steady
 @given(st.sampled_from(list(LAWS)), st.floats(2.0**-53, 1.0 - 2.0**-53))
 def test_no_delay_is_negative_or_endless(name: str, u: float) -> None:
-    """Whatever number is drawn, the delay is finite and not below zero."""
+    """The delay is finite and not below zero for every drawn number."""
     assert 0.0 <= LAWS[name][0].quantile(u) < math.inf
 
 

@@ -21,7 +21,7 @@ TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf
 
 
 def test_the_example_is_a_scenario_without_a_problem() -> None:
-    """Who copies the example gets what it says."""
+    """The example of the page is a valid scenario and does what the page says."""
     (example,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.S)
     netem, form = read_table(Netem, tomllib.loads(example))
 

@@ -24,7 +24,7 @@ def test_numbers_lie_strictly_between_zero_and_one() -> None:
 
 
 def test_numbers_are_uniform_normal_and_independent_from_one_to_the_next() -> None:
-    """What the laws are made of has the law it claims, along the messages of a link."""
+    """The draws that the laws are made of have the distribution they claim, along the messages of a link."""
     stream = Stream(3, "inv1", "inv2", "loss")
     uniform = [stream.uniform(seq) for seq in range(N)]
     normal = [stream.normal(seq, 1) for seq in range(N)]

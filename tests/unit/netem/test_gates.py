@@ -50,7 +50,7 @@ def test_a_holding_cut_lets_everything_go_at_its_end() -> None:
 
 
 def test_a_holding_cut_without_an_end_never_lets_go() -> None:
-    """What such a cut keeps is neither delivered nor dropped."""
+    """Messages that such a cut keeps are neither delivered nor dropped."""
     fate = channel(cut=Cut(hold=True), loss=1.0).judge(0, 1.0, 10)
 
     assert fate.deliveries == ((math.inf, None),)

@@ -42,7 +42,7 @@ def test_independent_losses_are_as_frequent_as_configured(p: float) -> None:
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_states_follow_each_other_as_the_transition_matrix_says(name: str) -> None:
-    """What follows a received and a lost message is as frequent as two steps of the chain make it."""
+    """Losses after a received and a lost message are as frequent as two steps of the chain make them."""
     model = CHAINS[name]
     drawn = lost(model)
     # joint probability of (n lost or not, n + 1 lost), from the model's own matrix, summed by hand

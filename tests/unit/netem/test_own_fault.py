@@ -137,7 +137,7 @@ def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, 
 
 
 def rows(entry: Fault, **changed: float) -> tuple[dict[str, LinkTest], tuple[str, ...]]:
-    """What the self-check makes of 200 messages, of which some had another delay (s) than the link gave them."""
+    """Findings of the self-check on 200 messages, of which some had another delay (s) than the link gave them."""
     link = channel(entry)
     fates = [link.judge(seq, 0.02 * seq, 100) for seq in range(200)]
     outcomes = [fate.reason or fate.deliveries[0][0] for fate in fates]

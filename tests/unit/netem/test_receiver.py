@@ -50,7 +50,7 @@ def faults(on: str) -> st.SearchStrategy[Fault]:
 
 
 def send(to: Receiver, ticks: range, *sources: str) -> list[Arrival]:
-    """What arrives of a message a tick from each source, taken at every tick."""
+    """Arrivals of a message a tick from each source, taken at every tick."""
     arrived = []
     for k in ticks:
         for src in sources or ("inv1",):
@@ -136,7 +136,7 @@ def test_a_message_fares_alike_in_simulated_and_wall_clock_time(kinds: set[str],
 @steady
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 8)), max_size=30))
 def test_messages_are_handed_out_in_the_order_of_arrival_number_and_sender(offers: list[tuple[int, int]]) -> None:
-    """What arrives at one time is sorted by number, then by sender, whoever was offered first."""
+    """Messages that arrive at one time are sorted by number, then by sender, in any order of offering."""
     to = receiver(Fault(on="* -> inv2", delay=0.3))
     for src, seq in dict.fromkeys(offers):
         to.offer(f"inv{3 + src}", seq, seq * 0.1, seq * 0.1, bytes([seq, src]))

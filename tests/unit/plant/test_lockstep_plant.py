@@ -105,7 +105,7 @@ class Lab:
         return {parts[1:]: (message.reason, message.refused) for parts, message in stops if parts[0] == "stop_request"}
 
     def events(self) -> list[str]:
-        """What was noted of agents, once the run has been ended."""
+        """Notes on agents, once the run has ended."""
         self.node.abort("enough", self.now)
         self.do()
         telemetry = [message for _, message in self.sent if isinstance(message, Telemetry)]
@@ -114,7 +114,7 @@ class Lab:
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Who is awaited, and for what."""
+        """Missing messages: their kind and sender."""
         return [(what, who) for what, who in self.node.missing_messages()]
 
 
@@ -228,7 +228,7 @@ def test_a_state_that_is_not_awaited_is_refused(k: int, kind: str) -> None:
 
 
 def test_the_deadline_names_who_is_missing() -> None:
-    """Who, what, for how long, and the last sign of life; then the run is over for all."""
+    """The error names agent, message, waiting time and last sign of life; then the run is over for all."""
     lab = ticking()
     lab.now = 3.0
     lab.state(0, "inv1", "inv3", "inv4")

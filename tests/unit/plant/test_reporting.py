@@ -15,7 +15,7 @@ CALM = Reading(5e4, 1e3, 277.0, 60.0, 5e4, 277.0, False, "inv1")
 
 
 def measured(**changes: Any) -> Measurement:
-    """What an agent makes of a reading."""
+    """Measurement that an agent receives of a reading."""
     reading = CALM._replace(**changes)
     message = decode(encode(measurement_of("inv1", reading, epoch=1, tick=0, t=0.0)))
     assert isinstance(message, Measurement)

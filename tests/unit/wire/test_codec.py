@@ -47,7 +47,7 @@ def refusal(payload: bytes) -> str:
 
 @pytest.mark.parametrize("kind", MESSAGES)
 def test_every_message_survives_the_wire(kind: type[Message]) -> None:
-    """What is encoded comes back equal, for each type of message."""
+    """A message of each type comes back equal from its bytes."""
     message = decode(packed(sound(kind)))
 
     assert type(message) is kind

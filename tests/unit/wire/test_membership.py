@@ -79,7 +79,7 @@ def test_a_nameplate_without_a_token_is_a_ghosts() -> None:
 
 
 def test_a_dismissed_process_counts_no_more_but_may_still_speak() -> None:
-    """What it sends last is admitted until its token is gone; a successor takes its place at once."""
+    """The last messages of a process are admitted until its token is gone; a successor takes its place at once."""
     made, admission = members("a")
     made.dismiss("inv2")
     assert (made.instance("inv2"), made.nameplates, admission.epoch("inv2")) == ("", {}, 1)
@@ -101,7 +101,7 @@ def test_a_dismissed_process_that_is_gone_speaks_no_more() -> None:
 
 @given(st.integers(0, 2**32 - 1))
 def test_the_process_that_counts_is_there_and_its_nameplate_is_its_own(seed: int) -> None:
-    """Whatever comes in whatever order: nameplate and epoch of a name are those of one process whose token is there."""
+    """In any order of messages, nameplate and epoch of a name are those of one process whose token is there."""
     rng, admission = random.Random(seed), Admission()
     made, there = Membership(admission), set[str]()
     for _ in range(40):

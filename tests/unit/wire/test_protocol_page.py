@@ -30,7 +30,7 @@ NEEDED = (Nameplate, Ready, State, Leave, LinkAcknowledgement, Prepare, Measurem
 
 
 def words(text: str) -> set[str]:
-    """What stands in backticks, blocks of code apart."""
+    """Words in backticks, without blocks of code."""
     return set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL)))
 
 
@@ -53,7 +53,7 @@ def test_every_field_that_an_agent_meets_is_on_the_page(message: type[Message]) 
 
 @pytest.mark.parametrize("config", [AgentConfig, Control])
 def test_every_field_of_the_configuration_is_on_the_page(config: type[AgentConfig | Control]) -> None:
-    """What the plant tells an agent that asks."""
+    """The plant's answer to an agent's request."""
     named = words(SECTION)
     named |= {word.removeprefix("control.") for word in named}
 
@@ -61,7 +61,7 @@ def test_every_field_of_the_configuration_is_on_the_page(config: type[AgentConfi
 
 
 def test_every_key_of_an_agent_is_on_the_page() -> None:
-    """Whatever an agent publishes on, subscribes to, asks or answers, but for what the page says may be left out."""
+    """Keys that an agent publishes on, subscribes to, asks or answers, without those that the page calls optional."""
     kinds = {spec.expression.split("/")[2] for spec in describe() if "agent" in f"{spec.sender} {spec.listener}"}
     told = {word.split("/")[0] for word in words(SECTION)}
 

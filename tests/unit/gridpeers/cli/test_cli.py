@@ -33,7 +33,7 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
 
 @pytest.mark.parametrize("words", [(), ("link",)])
 def test_no_command_is_cut_short_in_the_help(words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """What each command does can be read to its end on a terminal of 80 columns."""
+    """The help of each command can be read to its end on a terminal of 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
 
     lines = invoke(*words, "--help")[1].partition("\nCommands:\n")[2].splitlines()
@@ -208,7 +208,7 @@ def test_a_scenario_without_events_runs_and_measures_nothing(elsewhere: Path) ->
 
 
 def test_a_failed_claim_is_exit_code_1(elsewhere: Path) -> None:
-    """Who departs from the paper and still asks for its verdict, gets it."""
+    """A run with other parameters than the paper's is judged by the paper's claims all the same, if asked."""
     text = ISLANDING.replace("k_p = 0.0007", "k_p = 0.1")
     (elsewhere / "slow.toml").write_text(text)
 

@@ -33,7 +33,7 @@ def test_a_signal_ends_a_command_as_ctrl_c_does(sent: signal.Signals, code: int)
 
 
 def test_under_nohup_a_command_outlives_its_terminal() -> None:
-    """Who has asked that the signal of a lost terminal is ignored is heeded."""
+    """The signal of a lost terminal stays ignored where the parent process ignores it."""
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
     with interruptible():

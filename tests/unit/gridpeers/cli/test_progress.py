@@ -68,7 +68,7 @@ def test_the_bar_of_many_runs_comes_and_goes() -> None:
 
 
 def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who waits for the first compilation is told that it is one."""
+    """Progress says that the first compilation takes some seconds."""
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     explained = threading.Event()
 

@@ -40,5 +40,5 @@ def test_a_mistyped_word_is_one_line(words: list[str], line: str) -> None:
 
 @pytest.mark.parametrize("words", [(), ("link",)])
 def test_a_command_alone_shows_its_help(words: tuple[str, ...]) -> None:
-    """Who types nothing wants to know what there is to type."""
+    """A command without arguments shows its help."""
     assert "Commands:" in invoke(*words)[1]

@@ -64,7 +64,7 @@ def carried(line: Segments, sent: list[float]) -> list[float]:
 def test_tcp_loses_nothing_and_keeps_the_order(
     delay: float, back: float, jitter: float, loss: float, gaps: list[float], seed: int
 ) -> None:
-    """Whatever the link does, all bytes come, in order, none before the shortest delay; without loss, none late."""
+    """All bytes come, in order, none before the shortest delay; without loss, none late."""
     faults = Faults(delay=delay, jitter=jitter * delay, loss=loss)
     sent = [sum(gaps[: n + 1]) for n in range(len(gaps))]
 

@@ -116,7 +116,7 @@ def test_switching_what_is_so_already_changes_nothing() -> None:
 
 
 def test_a_network_is_factored_once_for_the_same_inverters() -> None:
-    """What was factored ahead is used at the switching, unless other inverters are connected by then."""
+    """A network factored ahead is used at the switching, unless other inverters are connected by then."""
     plant = pair(GFM_D, GFM_D, 0.4)
     circuit = plant.network.circuit
     ahead = plant.network.reduced(circuit)
@@ -196,7 +196,7 @@ def test_a_tangent_that_leads_nowhere_is_renewed_in_the_middle_of_a_step() -> No
 
 @pytest.mark.parametrize("column", [0, 1])
 def test_a_set_point_that_is_no_number_takes_its_island_off(column: int) -> None:
-    """Whatever writes nan into a set-point, no row ever holds a number that is not finite."""
+    """No row ever holds a number that is not finite, though a set-point is nan."""
     plant = pair(GFM_D, GFM_D, 0.4)
     plant.inverters.set_points[0, column] = np.nan
 

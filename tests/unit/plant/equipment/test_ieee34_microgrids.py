@@ -10,7 +10,7 @@ from plant.tables import read_feeder
 
 
 def test_the_tables_are_the_import_of_the_published_feeder_with_our_modifications() -> None:
-    """What the engine makes of the script today is what is in the tables, to rounding."""
+    """The tables are the engine's present reading of the script, to rounding."""
     pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
     from tests.feeders.ieee34_microgrids import ieee34_microgrids
 

@@ -232,7 +232,7 @@ def test_a_switch_can_be_operated_by_hand() -> None:
 
 
 def test_a_spare_is_off_until_it_is_connected() -> None:
-    """A spare inverter changes nothing while it is off, and shares the load once it is on and told its set-points."""
+    """A spare inverter changes nothing while it is off, and shares the load once it is on and has set-points."""
     events = opened(0.1, "13-152")
     bare = plant(*events)
     feeder = read_feeder("microgrid123", "main")

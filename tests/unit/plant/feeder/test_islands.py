@@ -19,7 +19,7 @@ def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = 
 
 
 def test_islands_are_named_by_their_first_inverter(network: Network) -> None:
-    """What the substation feeds is "grid"; any other island has the name of its first inverter."""
+    """The island that the substation feeds is "grid"; any other has the name of its first inverter."""
     islands = Islands(network)
 
     whole, fed = islands.names(reduced(network, network.closed0))

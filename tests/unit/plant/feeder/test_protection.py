@@ -107,7 +107,7 @@ def test_many_steps_at_once_are_the_same_as_one_by_one() -> None:
 
 
 def test_an_inverter_that_is_off_does_not_trip() -> None:
-    """Who does not deliver, or stands in a dead island, sees no voltage and has nothing to protect."""
+    """An inverter that delivers nothing, or stands in a dead island, is not tripped."""
     relays = Relays(Protection(), 1, H, 60.0)
 
     assert not any(relays.watch(row(60.0), row(0.0), row(0.0), np.array([False])) for _ in range(2000))

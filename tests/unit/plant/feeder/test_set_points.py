@@ -1,4 +1,4 @@
-"""Set-points beyond what an inverter can do: limited, told, and never the end of a run."""
+"""Set-points beyond an inverter's bounds are limited and reported, and never end a run."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def over_frequency(parameters: GflParameters, P_set: float) -> float:
 
 
 def test_a_gfl_reference_above_the_rating_is_clipped_in_place_as_in_gridlabd() -> None:
-    """inverter-models 4.4: told 1.2 pu, a GFL gives 1 - 1/3 pu at 60.2 Hz; one that keeps it gives 1.2 - 1/3."""
+    """inverter-models 4.4: at P_set 1.2 pu a GFL gives 1 - 1/3 pu at 60.2 Hz; without the limit it gives 1.2 - 1/3."""
     parameters = replace(GFL_D, frequency_watt=True, T_ff=0.05, T_pf=0.05)
 
     assert over_frequency(parameters, 1.2) == pytest.approx(1.0 - OVER_HZ / 0.6, abs=1e-3)

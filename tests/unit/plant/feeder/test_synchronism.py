@@ -1,4 +1,4 @@
-"""Closing a switch between live islands: measured, refused, waited for, or told."""
+"""The closing of a switch between live islands is measured, and refused, delayed or reported."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def apart(p: Plant) -> tuple[float, float]:
 
 
 def test_the_angle_across_a_switch_grows_as_the_frequencies_differ(network: Network) -> None:
-    """In half a second the told angle grows by what the island's frequency makes of it, against 60 Hz."""
+    """In half a second the reported angle grows by the integral of the island's frequency above 60 Hz."""
     p = plant(network)
     run(p, 2.5)
     first, _ = apart(p)
@@ -108,7 +108,7 @@ def test_a_switch_that_is_never_in_step_gives_up(network: Network) -> None:
 
 
 def test_opening_a_switch_ends_its_wait(network: Network) -> None:
-    """Who operates a waiting switch has thought anew."""
+    """Opening a switch that waits to close ends its wait."""
     p = plant(network, close(2.5, synchronised=True), SwitchEvent(t=3.0, switch="13-152", action="open"), f=1.0)
     told = run(p, 12.0)
 
@@ -152,7 +152,7 @@ def test_islands_that_meet_across_a_dead_zone_are_told(network: Network) -> None
 
 
 def test_the_command_to_close_in_step_is_answered_with_the_differences(network: Network) -> None:
-    """What `gridpeers event close --synchronised` asks is refused with the plant's reason, and the run goes on."""
+    """`gridpeers event close --synchronised` is refused with the plant's reason, and the run goes on."""
     p = plant(network)
     run(p, 2.5)
     config = replace(toy_configs(9, end=60.0)[0], clock="wall")

@@ -139,7 +139,7 @@ def test_leaders_that_return_start_a_dead_island_with_all_that_tripped_there() -
 
 
 def test_an_island_that_cannot_carry_its_load_is_not_started_for_ever() -> None:
-    """What is left of the inverters tries twice more; then it stays off until somebody comes."""
+    """The remaining inverters try twice more; then they stay off until another joins."""
     p = plant(Protection(enter_service=0.2), *opened(1.0, "13-152"))
     run(p, 2.0)
     p.connect("inv1", False)

@@ -43,7 +43,7 @@ def test_power_flow_satisfies_the_equations(network: Network) -> None:
 
 
 def test_dead_buses_have_no_voltage_and_no_load() -> None:
-    """What the substation does not reach has zero volts and takes no power."""
+    """Nodes that the substation does not reach have zero volts and take no power."""
     network = two_buses(100e3 + 50e3j)
 
     solved = solve_power_flow(network, frozenset())

@@ -57,7 +57,7 @@ class Link:
 
 
 def report(number: int) -> LinkReport:
-    """What an agent's links did."""
+    """Records of an agent's links."""
     return LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=str(number).encode())
 
 

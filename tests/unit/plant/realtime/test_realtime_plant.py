@@ -274,7 +274,7 @@ def test_a_second_agent_of_a_name_and_one_of_no_inverter_are_refused() -> None:
 
 
 def test_commands_are_done_and_answered() -> None:
-    """Switches are operated, agents asked to leave, the run's state told as JSON."""
+    """The plant operates switches, asks agents to leave, and answers the run's state as JSON."""
     lab = running()
     opened, again, stopped = lab.ask("open", "sw1"), lab.ask("open", "sw1"), lab.ask("stop", "inv2")
     lab.step()

@@ -16,7 +16,7 @@ MAX_AGE = 0.25
 
 
 def status(name: str, ages: dict[str, float], seq: int = 0) -> AgentStatus:
-    """What an agent says of its neighbours."""
+    """Status of an agent on its neighbours."""
     return AgentStatus(
         sender=name,
         epoch=1,
@@ -83,7 +83,7 @@ def test_an_agent_on_the_roster_that_is_not_heard_is_told_once_and_once_when_it_
 
 @pytest.mark.parametrize("stalls", [(3.0,), (0.18, 0.18, 0.18)])
 def test_a_plant_that_stood_still_blames_nobody(stalls: tuple[float, ...]) -> None:
-    """What it missed while it slept, or rushed through, says nothing of the agents; a death or a leave is told once."""
+    """Ticks that the plant itself missed or hurried count against no agent; a death or a leave is reported once."""
     lab = running(end=None)
     all_tick(lab, 50)
     for delay in stalls:

@@ -29,7 +29,7 @@ def edit(folder: Path, file: str, row: int, **cells: str) -> None:
 
 
 def problems(folder: Path, load_set: str = "main") -> tuple[str, ...]:
-    """What reading a broken feeder tells."""
+    """Problems of a broken feeder."""
     with pytest.raises(FeederError) as caught:
         read_feeder(str(folder), load_set)
     return caught.value.problems

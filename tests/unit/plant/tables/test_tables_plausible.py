@@ -39,7 +39,7 @@ def drop(folder: Path, file: str, start: str) -> None:
 
 
 def problems(folder: Path) -> tuple[str, ...]:
-    """What reading a broken feeder tells."""
+    """Problems of a broken feeder."""
     with pytest.raises(FeederError) as caught:
         read_feeder(str(folder))
     return caught.value.problems

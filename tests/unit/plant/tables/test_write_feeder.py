@@ -29,7 +29,7 @@ def test_own_tables_survive_writing(name: str, tmp_path: Path) -> None:
 
 
 def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
-    """What `add_inverter` returns can be named by a scenario, once it is saved."""
+    """A scenario can name a feeder that `add_inverter` returned, once it is saved."""
     feeder = Feeder.read("microgrid123").add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
     for phase in "ABC":
         feeder = feeder.add_inverter(f"leg{phase}", bus="47", kind="GFM", P_rated=5e4, phases=phase)  # type: ignore[arg-type]

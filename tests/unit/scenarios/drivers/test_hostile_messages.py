@@ -44,18 +44,18 @@ TOKENS = tuple(
 
 
 def plate(name: str) -> Nameplate:
-    """What an agent truly is."""
+    """Valid nameplate of an agent."""
     return Agent(replace(agent_config(name), epoch=EPOCH)).nameplate
 
 
 def state(name: str, k: int) -> State:
-    """What a neighbour truly says at tick k."""
+    """Valid state of a neighbour at tick k."""
     share = 60e3 + 5e3 * NAMES.index(name)
     return State(sender=name, epoch=EPOCH, seq=k, t=round(k * T_C, 9), P_set=share, V_set=277.0, Q=1e3, island="inv1")
 
 
 def measurement(k: int) -> Measurement:
-    """What the plant truly measures of inv1 at tick k."""
+    """Valid measurement of inv1 at tick k."""
     return Measurement(
         sender="plant", epoch=EPOCH, seq=k, t=round(k * T_C, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.95,
         P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=NAMES,

@@ -49,7 +49,7 @@ def test_a_run_goes_to_its_end() -> None:
 @settings(max_examples=60)
 @given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
-    """Whatever the order in which links deliver, the rows are the same to the last bit, and nothing stalls."""
+    """The rows are the same to the last bit in any order of delivery, and nothing stalls."""
     run = links(seed, graph=graph, end=0.2)
     run.run()
 
@@ -151,7 +151,7 @@ def test_an_agent_of_an_unknown_name_is_refused() -> None:
 @settings(max_examples=20)
 @given(SEEDS)
 def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
-    """Whatever bytes arrive on whatever key, nothing is raised, it is counted, and the rows are the same."""
+    """Any bytes on any key are counted, raise nothing, and leave the rows the same."""
     run, rng = links(seed, n=3, end=0.1), random.Random(seed)
     ghost = Stop(sender="plant", epoch=0, seq=0, t=0.0, reason="a ghost")
     forged = State(sender="inv2", epoch=1, seq=0, t=0.0, P_set=0.0, V_set=0.0, Q=0.0)
@@ -175,7 +175,7 @@ def test_garbage_on_every_key_changes_nothing(seed: int) -> None:
 
 
 def test_a_plant_without_solution_breaks_the_run_for_all() -> None:
-    """What the plant says reaches the recorder, and the agents leave."""
+    """The plant's last telemetry reaches the recorder, and the agents leave."""
     plant, agents = toy_configs(2, P_set0=1.5)
     run = Links(plant, agents, random.Random(0))
     run.run()

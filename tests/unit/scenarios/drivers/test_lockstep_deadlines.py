@@ -24,7 +24,7 @@ def started(n: int = 2) -> LockstepPlant:
 
 
 def test_the_plants_deadline_names_who_is_missing() -> None:
-    """Who, what, the last tick and the last sign of life."""
+    """The error names the agent, the missing message, the last tick and the last sign of life."""
     plant = started()
     state = State(sender="inv1", epoch=1, seq=0, t=0.0, P_set=5e4, V_set=277.0, Q=0.0)
     plant.received(plant.keys.state("inv1"), encode(state), 3.0)

@@ -128,7 +128,7 @@ def test_a_silence_disturbs_its_window_unless_the_scenario_brings_it_about(
 
 @pytest.mark.parametrize(("ended", "whole"), [(0.5, 0), (3.99, 0), (4.0, 1), (6.99, 1), (7.0, 2), (60.0, 2)])
 def test_windows_count_once_they_are_reached_to_their_end(ended: float, whole: int) -> None:
-    """What is measured of a scenario ends with its last whole window, wherever the run does; the others are named."""
+    """Metrics of a scenario end with its last whole window, wherever the run does; the others are named."""
     scenario, feeder = one_case("islanding")
     compared = compare(scenario, feeder, [], ended)
 
@@ -218,7 +218,7 @@ def recorded() -> Recorded:
 
 
 def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
-    """What metrics.json and the report say of a live run that ended then (s)."""
+    """metrics.json and report of a live run that ended then (s)."""
     scenario, feeder = one_case("islanding")
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="live", folder=folder, clock="wall")
     rows = [row for row in recorded.rows if row[0] <= until]

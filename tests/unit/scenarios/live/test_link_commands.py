@@ -60,13 +60,13 @@ def order(lab: agent_side.Lab, number: int, t: float, tree: dict[str, Any] = CUT
 
 
 def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
-    """What the agent has answered so far."""
+    """Answers of the agent so far."""
     return [(m.seq, m.ok, m.text) for m in lab.published if isinstance(m, LinkAcknowledgement)]
 
 
 @given(st.integers(0, 10_000))
 def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
-    """Whatever is lost on either way, and however often the agent's process is a new one."""
+    """Every order arrives once, in spite of losses on either way and of restarts of the agent's process."""
     rng, taken, now = random.Random(seed), list[int](), 0.0
     wire: list[LinkRequest] = []
 
@@ -167,7 +167,7 @@ def test_a_heal_names_only_links_that_have_a_fault_and_says_so_if_there_is_none(
 
 
 def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> None:
-    """What stands in `link show` is impaired now or was, though messages over other links are counted as well."""
+    """`link show` lists links that are impaired now or were, though messages over other links are counted as well."""
     fault = Fault(on="inv2 -> inv1", loss=0.5, from_s=2.0, to_s=3.0)
     links = EmulatedLinks("inv1", replace(SETUP, netem=Netem(links=(fault,))))
     for k in range(200):
@@ -197,7 +197,7 @@ def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() 
 
 
 def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
-    """What was sent before counts, what was sent from then on does not; healed, it does again."""
+    """Messages sent before a cut count, later ones do not; healed, they do again."""
     lab = agent_lab()
     lab.measure(0)
     lab.state("inv2", 0, 0.0, P_set=60e3)

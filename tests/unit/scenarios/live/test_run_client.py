@@ -55,7 +55,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
 def test_a_plant_of_another_run_is_told_at_once_and_once(
     waiting: Callable[[dict[float, str], float], list[str]],
 ) -> None:
-    """Who has mistyped --run need not wait to the end to see it; the wait goes on, as the right one may yet come."""
+    """A --run that no run has is reported during the wait, which goes on, as the run may yet start."""
     told = waiting({0.5: "lab2", 3.0: "lab"}, 60.0)
 
     assert told == [

@@ -57,7 +57,7 @@ def line(monkeypatch: pytest.MonkeyPatch) -> Line:
 
 
 def telemetry(t: float, epoch: int = 7, inverters: tuple[str, ...] = NAMES) -> Telemetry:
-    """What the plant truly tells."""
+    """Valid telemetry of the plant."""
     row = (t, *(60.0, 5e4, 0.0, 277.0, 5e4, 277.0) * len(inverters))
     return Telemetry(
         sender="plant", epoch=epoch, seq=0, t=t, inverters=inverters, rows=(row,), events=(), final=False,

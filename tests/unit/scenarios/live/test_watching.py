@@ -67,7 +67,7 @@ def test_status_is_a_line_per_agent_with_units() -> None:
 
 
 def test_a_run_that_has_not_begun_shows_who_waits() -> None:
-    """Agents are listed by their tokens though the plant has told nothing."""
+    """Agents are listed by their tokens though the plant has sent nothing."""
     seen = RunMonitor("lab")
     seen.status(status("inv3", {}, (), waits_for="the plant"), now=1.0)
 
@@ -92,7 +92,7 @@ def test_a_silent_plant_is_told() -> None:
 
 
 def numbers(line: InverterStatus) -> set[float | None]:
-    """What the plant tells of an inverter."""
+    """Telemetry of an inverter."""
     return {line.f, line.P, line.P_set, line.P_share, line.Q, line.V, line.V_set}
 
 
@@ -110,7 +110,7 @@ def test_after_the_end_of_a_run_no_number_of_it_is_shown_as_if_it_went_on() -> N
 
 
 def test_numbers_of_a_silent_plant_are_not_shown() -> None:
-    """A plant that was killed has told no end: its numbers go when it has been silent, and come back with the next."""
+    """The numbers of a killed plant, which sends no end, disappear after a silence, and return with the next plant."""
     seen = monitor()
     before, silent = seen.snapshot({"inv1"}, now=11.4).inverters[0], seen.snapshot({"inv1"}, now=11.6).inverters[0]
     seen.telemetry(told(0.2, life=2), now=20.0)
@@ -131,7 +131,7 @@ def test_a_plant_that_comes_after_an_ended_run_runs() -> None:
 
 
 def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
-    """What happened before its new life belongs to another run."""
+    """Events before a restart of the plant belong to another run."""
     seen = monitor()
     seen.telemetry(told(0.2, life=2), now=20.0)
 
@@ -139,7 +139,7 @@ def test_a_restarted_plant_begins_a_new_list_of_events() -> None:
 
 
 def test_only_neighbours_in_use_count_as_heard() -> None:
-    """Who is too old, or in another island, is named in the note."""
+    """The note names neighbours whose state is too old, or which are in another island."""
     seen = monitor()
     seen.status(status("inv1", {"inv2": 0.01, "inv3": 0.02, "inv4": -1.0}, ("inv2", "inv3")), now=10.0)
     line = seen.snapshot({"inv1"}, now=10.0).inverters[0]
@@ -191,7 +191,7 @@ def test_impaired_links_are_shown_only_while_there_are_any() -> None:
 
 
 def test_telemetry_that_is_published_again_for_a_recorder_does_not_turn_the_clock_back() -> None:
-    """Who watches has seen it; a new life of the plant begins at 0 again."""
+    """Telemetry repeated for a recorder does not move the time back; a restarted plant begins at 0 again."""
     seen = monitor()
     seen.telemetry(told(2.2), now=10.2)
     seen.telemetry(told(1.4), now=10.3)

@@ -1,4 +1,4 @@
-"""The size of a run's files, told before its start."""
+"""The size of a run's files is known before its start."""
 
 import shutil
 from pathlib import Path

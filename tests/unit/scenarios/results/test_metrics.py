@@ -190,7 +190,7 @@ def test_sharing_among_those_present_is_equation_16_of_them() -> None:
 
 
 def test_a_GFM_that_is_off_does_not_hold_back_the_frequency() -> None:
-    """What a GFM off the network shows is no frequency of the island; with none left there is none."""
+    """The reading of a GFM off the network is no frequency of the island; without a GFM there is none."""
     both = replace(PLATES, GFM=np.array([True, True, False]))
     case = history([0.0, 1.0, 2.0], [60.0] * 3, [EQUAL] * 3)
     case.f[:, 1] = 55.0

@@ -59,7 +59,7 @@ class Unlisted(Mapping[str, float]):
 
 
 def of(metric: Callable[[WindowData], Any]) -> tuple[dict[str, float | None], dict[str, str]]:
-    """What a metric called "mine" comes to."""
+    """Value of a metric called "mine"."""
     found = measured([("mine", metric)], window_data())
     return dict(found.values), dict(found.reasons)
 

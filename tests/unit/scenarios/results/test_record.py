@@ -81,7 +81,7 @@ def test_every_number_reads_back_to_the_same_bits(
 
 
 def test_a_case_that_was_not_finished_has_no_history_under_its_name(tmp_path: Path) -> None:
-    """What a broken case leaves can be read, and cannot be taken for the whole."""
+    """The files of a broken case can be read, and cannot be taken for the whole."""
     event = PlantEvent(t=0.0, kind="roster", subject="inv3", text="inv3 died, says the plant")
     with Recorder(tmp_path / "I") as recorder:
         recorder(telemetry((row(0.0),), (event,)))

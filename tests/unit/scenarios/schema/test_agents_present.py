@@ -53,7 +53,7 @@ def test_in_a_live_run_people_move_the_agents(tmp_path: Path) -> None:
 
 
 def test_schedules_survive_the_runs_copy(tmp_path: Path) -> None:
-    """What a run leaves in its folder is the same scenario again."""
+    """The scenario file in a run's folder is the same scenario again."""
     scenario, _ = load_scenario("plug-n-play")
 
     assert load_scenario(written(tmp_path, to_toml(scenario, {})))[0] == scenario
@@ -93,7 +93,7 @@ def test_each_problem_is_told_with_its_place_and_what_would_be_right(
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
-    """Who leaves unknown, at no tick, and who joins while present, are told together."""
+    """An unknown leaver, a leave at no tick, and a join of a present agent are reported together."""
     text = PLUG.replace('leave = ["inv2"]', 'leave = ["inv99"]').replace("t_s = 2.0", "t_s = 2.006")
     found = problems(tmp_path, text)
 

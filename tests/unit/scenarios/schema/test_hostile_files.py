@@ -1,4 +1,4 @@
-"""Scenario and feeder files that somebody wrote to do harm, or that were damaged: told in lines that can be printed."""
+"""Damaged or hostile scenario and feeder files are refused in lines that can be printed."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_scenario_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 
 
 def test_the_last_line_of_a_command_is_printable(capsys: pytest.CaptureFixture[str]) -> None:
-    """Whatever an error quotes, it cannot clear the screen; a message of several lines stays one."""
+    """No text that an error quotes can clear the screen; a message of several lines stays one."""
     with pytest.raises(SystemExit):
         fail(['no "\x1b[2J"\nas said'], 2)
     assert capsys.readouterr().err == 'gridpeers: no "\\x1b[2J"\nas said\n'

@@ -33,7 +33,7 @@ graph = "full"
 
 @pytest.mark.parametrize("name", catalogue())
 def test_every_scenario_of_the_catalogue_can_be_run(name: str) -> None:
-    """What comes with gridpeers has no problem and is named as its file."""
+    """Every scenario that comes with gridpeers has no problem and is named as its file."""
     scenario, feeder = load_scenario(name)
 
     assert scenario.name == name

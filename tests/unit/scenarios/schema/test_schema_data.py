@@ -59,7 +59,7 @@ def test_data_that_cannot_be_meant_are_told_at_their_key(tmp_path: Path, keys: s
 
 
 def test_trip_settings_are_judged_at_the_nominal_frequency(tmp_path: Path) -> None:
-    """What is over-frequency at 50 Hz is under-frequency at 60 Hz."""
+    """A limit of over-frequency at 50 Hz is one of under-frequency at 60 Hz."""
     trips = "\n[protection]\ntrips = { OF2 = [52.0, 0.16] }\n"
     told = problems(tmp_path, with_plant(trips))
 

@@ -20,7 +20,7 @@ CLOUDS = (CATALOGUE / "intermittency.toml").read_text(encoding="utf-8")
 
 
 def test_a_case_has_its_own_available_power(tmp_path: Path) -> None:
-    """What a case says of an inverter takes the place of the event's number; the copy of a run says the same."""
+    """A case's value for an inverter replaces the event's; the copy of a run has the same."""
     text = CLOUDS.replace("clouds = { inv2 = 275, inv5 = 275, inv8 = 275 }", "clouds = { inv2 = 275 }")
     scenario, _ = load_scenario(written(tmp_path, text))
 

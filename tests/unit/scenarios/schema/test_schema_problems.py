@@ -198,7 +198,7 @@ def test_the_line_of_a_problem_is_that_of_its_key(tmp_path: Path) -> None:
 
 
 def test_all_problems_come_at_once_in_the_order_of_lines(tmp_path: Path) -> None:
-    """Who corrects a file sees everything that is wrong with it the first time."""
+    """All problems of a file are reported the first time."""
     text = ISLANDING.replace("T_c_s = 0.02", "T_c_s = 20").replace("k_p = 0.0007", "k_p = 0")
     text = text.replace('"60-160"', '"60-161"').replace('graph = "full"', 'graph = "mesh"')
 

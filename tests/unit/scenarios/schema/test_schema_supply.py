@@ -1,4 +1,4 @@
-"""Islands that nothing feeds: refused where a run would begin with them, told where an event makes them."""
+"""Islands that nothing feeds are refused where a run would begin with them, and reported where an event makes them."""
 
 import re
 import shutil
@@ -107,7 +107,7 @@ def test_an_island_with_more_load_than_rating_is_told(tmp_path: Path, folder: Pa
 
 
 def test_check_prints_its_notes_and_tries_the_operating_point(tmp_path: Path, folder: Path) -> None:
-    """What no table shows, a feeder whose lines are too long to carry its load, is found by trying it."""
+    """A feeder whose lines are too long to carry its load is found by solving it: no table shows it."""
     code, said = invoke("check", "islanding")
     assert (code, said.startswith('NOTE  event "event2" at 4 s de-energises 18 buses ')) == (0, True)
     lines = [line.split(",") for line in (folder / "lines.csv").read_text().splitlines()]

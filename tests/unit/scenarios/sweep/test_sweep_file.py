@@ -23,7 +23,7 @@ def problems_of(path: Path) -> list[str]:
 
 @pytest.mark.parametrize("name", sweeps())
 def test_every_sweep_of_the_catalogue_can_be_run(name: str) -> None:
-    """What comes with gridpeers has no problem and a title."""
+    """Every sweep that comes with gridpeers has no problem and a title."""
     plan = read_sweep(name)
 
     assert plan.title

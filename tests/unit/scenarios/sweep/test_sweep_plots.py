@@ -91,7 +91,7 @@ def test_axes_say_what_is_varied_in_words_with_units_and_no_key_of_the_file() ->
 
 
 def test_rounding_is_not_drawn_as_structure() -> None:
-    """What differs by 1e-16 lies flat at the foot of an axis, and has one colour in a map; 0.1 of MPSI is seen."""
+    """Values that differ by 1e-16 lie flat at the foot of an axis, with one colour in a map; 0.1 of MPSI is seen."""
     noise = [1e-16 * number for number in range(4)]
     swept = table({"a": [1, 2, 3, 4]}, MPSI=noise, V_error=[0.0, 0.1, 0.0, 0.1])
     flat, seen = curves(swept, "event1", "a").axes[:2]

@@ -188,7 +188,7 @@ def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_pa
 
 
 def test_a_copied_plant_gives_the_bytes_of_a_new_one() -> None:
-    """What a worker keeps between runs changes no digit, and no run changes what is kept."""
+    """Networks that a worker keeps between runs change no digit, and no run changes them."""
     scenario, feeder = load_scenario("islanding")
     plant, agents = configs(scenario, feeder, "IV")
     plant = msgspec.structs.replace(plant, end=1.5)
@@ -202,7 +202,7 @@ def test_a_copied_plant_gives_the_bytes_of_a_new_one() -> None:
 
 
 def test_a_copied_plant_factors_no_network_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was factored ahead for the switchings of a kept plant serves its copies: a hit for each."""
+    """Factorisations made ahead for the switchings of a kept plant serve its copies: a hit for each."""
     config = configs(*load_scenario("islanding"), "IV")[0]
     plant_at_start(config)
     factored: list[Circuit] = []
@@ -251,7 +251,7 @@ def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_pat
 
 
 def test_a_damaged_line_of_the_journal_is_named(sweep_file: Write, tmp_path: Path) -> None:
-    """What was not written by us is not guessed at."""
+    """A file that gridpeers did not write is refused, not guessed at."""
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005]\n')
     done(path, tmp_path / "here")
     (tmp_path / "here" / "runs.jsonl").write_text("not a run\n")

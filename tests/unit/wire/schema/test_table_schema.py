@@ -59,7 +59,7 @@ def test_a_key_and_a_parameter_of_the_same_annotations_have_the_same_problems(gi
 
 
 def test_values_within_all_rules_are_taken_as_they_are() -> None:
-    """What is left out has its default, and a whole number becomes the number that the field asks for."""
+    """A field that is left out has its default, and a whole number becomes the number that the field asks for."""
     assert parameter_values(Parameters, {"order": 2, "gain": 1}) == {
         "gain": 1.0,
         "most": 10.0,

@@ -26,7 +26,7 @@ def line(name: str, start: str, end: str, length: str = "100") -> str:
 
 
 def problems(path: Path, **options: list[str]) -> tuple[str, ...]:
-    """What the import says of a model that it refuses."""
+    """Problems of a model that the import refuses."""
     with pytest.raises(FeederError) as refused:
         read_glm(path, **options)
     assert all("\n" not in problem for problem in refused.value.problems)

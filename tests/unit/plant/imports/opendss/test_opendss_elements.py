@@ -118,7 +118,7 @@ def test_a_feeder_of_50_hertz_has_its_frequency(tmp_path: Path) -> None:
 
 
 def test_disabled_elements_are_not_there(tmp_path: Path) -> None:
-    """What the script disables comes over as little as the engine takes it into account."""
+    """Elements that the script disables are not imported, as the engine does without them."""
     more = "New Load.off bus1=c phases=3 kv=0.48 kw=200 kvar=50 enabled=no\nNew Capacitor.k bus1=c kvar=100 kv=0.48\n"
     path = write(tmp_path, LINE, STEP_DOWN, LOADS, more, "Disable Capacitor.k")
 

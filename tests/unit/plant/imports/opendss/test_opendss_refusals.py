@@ -13,7 +13,7 @@ pytest.importorskip("dss", reason="the import of .dss files needs the extra open
 
 
 def problems(path: Path, leave_out: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """What the import says of a script that it refuses."""
+    """Problems of a script that the import refuses."""
     with pytest.raises(FeederError) as refused:
         read_opendss(path, leave_out=leave_out)
     assert all("\n" not in problem for problem in refused.value.problems)

@@ -92,7 +92,7 @@ Edit Load.l kw=100
 
 
 def test_the_import_writes_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever a script saves, exports or traces, nothing is written to the working folder or beside the script."""
+    """A script that saves, exports or traces writes nothing to the working folder or beside the script."""
     control = "New RegControl.r transformer=down winding=2 vreg=120 band=2 ptratio=2.3 debugtrace=yes"
     saving = f'Set DataPath="{tmp_path / "made"}"\nExport voltages\nSave circuit dir=saved\nSave voltages\nDump debug'
     path = write(tmp_path, LINE, STEP_DOWN, LOAD, control, saving)
