@@ -11,8 +11,12 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, fail
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from gridpeers.feeder import Feeder
+    from plant.equipment import Feeder as Tables
     from scenarios.feeder_proposal import Proposal
+    from scenarios.schema import ScenarioModel
 
 TEMPLATE = Path(__file__).parents[1] / "template"
 """Folder that is copied."""
@@ -26,7 +30,7 @@ title = {title}
 [plant]
 feeder = "./{folder}"
 P_set0_pu = {P_set0}  # the substation gives the rest
-
+{gfl}
 [time]
 end_s = 6.0
 
@@ -46,6 +50,12 @@ secondary = "all"
 graph = "{graph}"
 """
 """Scenario file of a feeder of one's own."""
+
+GENTLE = """
+[plant.gfl]
+T_vf_s = 0.2  # 0.05 as a rule: here the volt-var droop would oscillate with the network between leader and followers
+"""
+"""Followers of a proposed scenario whose plant would oscillate on droop alone."""
 
 GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
 """Graphs of a proposed scenario, and their words."""
@@ -130,9 +140,23 @@ def _with_proposal(
     return feeder, propose(feeder, count)
 
 
+def _calm(project: tuple[ScenarioModel, Tables], rewritten: Callable[[str], tuple[ScenarioModel, Tables]]) -> None:
+    """Rewrite a project with gentle followers if its plant comes to rest with them alone; say what it does on droop."""
+    from scenarios.droop_alone import unsteady
+
+    if not (found := unsteady(*project, "none")):
+        return
+    if not unsteady(*rewritten(GENTLE), "none"):
+        typer.echo(f"NOTE  on droop alone, {found}: so [plant.gfl] has a slower volt-var droop, T_vf_s = 0.2")
+        return
+    rewritten("")
+    typer.echo(f"NOTE  on droop alone, {found}; more --inverters give more leaders, or try another --switch")
+
+
 def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str], count: int | None) -> None:
     """Import a feeder, and write its tables with proposed inverters, and a scenario that islands it."""
     import json
+    from functools import partial
 
     import msgspec
 
@@ -148,20 +172,26 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     name = folder_of(feeder.name)
     save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name)
     graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
-    problem = ""
-    for part in PARTS:
+
+    def written(part: float, gfl: str = "") -> tuple[ScenarioModel, Tables]:
         text = SCENARIO.format(
             feeder=feeder.name,
             folder=name,
             switch=json.dumps(proposal.switch),  # names of scripts may have quotes
             P_set0=round(part * proposal.P_set0, 3),
+            gfl=gfl,
             graph=graph,
             agents=GRAPHS[graph],
             title=json.dumps(f"Islanding of {feeder.name} at {proposal.switch}"),
         )
         (folder / "islanding.toml").write_text(text, encoding="utf-8")
-        found = start_problem(*load_scenario(str(folder / "islanding.toml")))
+        return load_scenario(str(folder / "islanding.toml"))
+
+    problem = ""
+    for part in PARTS:
+        found = start_problem(*(project := written(part)))
         if not found:
+            _calm(project, partial(written, part))
             break
         problem = problem or found
     else:

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from plant.tables import read_feeder
+from scenarios import feeder_proposal
 from tests.command_line import invoke
 from tests.unit.plant.imports.gridlabd.glm_models import LOADS
 
@@ -29,6 +30,49 @@ def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path, feeder: str) -
     line = next(line for line in ran.splitlines() if line.startswith("ring"))
     assert " 0.000 " in line
     assert float(line.split()[-2]) < 2.0
+
+
+LONG = """New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9
+New Line.sw bus1=sourcebus bus2=a r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
+New Line.l1 bus1=a bus2=b r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=8
+New Line.l2 bus1=b bus2=c r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=8
+New Load.a bus1=a kv=12.47 kw=2000 kvar=500
+New Load.b bus1=b kv=12.47 kw=2000 kvar=500
+New Load.c bus1=c kv=12.47 kw=2000 kvar=500
+Set VoltageBases=[12.47]
+CalcVoltageBases
+"""
+"""A long feeder with a load at each of its three buses."""
+
+
+@pytest.mark.parametrize(
+    ("leader", "note", "slower"),
+    [(0.4, "", False), (0.3, "so [plant.gfl] has a slower volt-var droop", True), (0.2, "more --inverters", False)],
+)
+def test_a_proposal_that_would_oscillate_is_calmed_or_said(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch, leader: float, note: str, slower: bool
+) -> None:
+    """A proposal whose leader is too small for its followers gets a slower volt-var droop, and a note."""
+    monkeypatch.setattr(feeder_proposal, "LEADER", leader)
+    Path("long.dss").write_text(LONG)
+
+    code, made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "3")
+
+    assert code == 0, made
+    assert ("NOTE" in made) == bool(note)
+    assert note in made
+    assert ("T_vf_s = 0.2" in Path("mine/islanding.toml").read_text()) == slower
+
+
+def test_an_import_that_no_run_could_read_leaves_no_tables(elsewhere: Path) -> None:
+    """Voltage bases that are no feeder's are refused by their rows, and the folder is not left behind."""
+    Path("tiny.dss").write_text("New Circuit.tiny basekv=0.003\nNew Load.l bus1=sourcebus kv=0.003 kw=0.001\n")
+
+    code, text = invoke("feeder", "import", "tiny.dss", "--out", "mine")
+
+    assert code == 2
+    assert "is not plausible for a nominal voltage" in text
+    assert not Path("mine").exists()
 
 
 def test_tables_named_as_a_feeder_of_ours_need_their_path(elsewhere: Path) -> None:

@@ -58,7 +58,7 @@ def test_the_fate_of_a_datagram_depends_on_its_number_alone() -> None:
 
 
 def test_reordered_datagrams_skip_the_delay() -> None:
-    """The burst has the configured number of messages, which arrive at once, before those sent earlier."""
+    """The configured part of the messages arrives at once, before messages sent earlier."""
     delays = carried(Faults(delay=2.5, reorder=0.25), gap=1.0)
     early = sum(delay == 0.0 for delay in delays.values())
 

@@ -1,0 +1,65 @@
+"""Find a plant that does not come to rest after its last event on droop alone: no secondary law can help there."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from plant.build import build_plant
+from plant.equipment import Feeder
+from scenarios.schema import ScenarioModel
+from scenarios.schema.configs import configs
+from wire.messages import OFF
+
+SETTLE = 1.2
+"""Time (s) given to the transient after the last event; the swings after it are judged."""
+
+WINDOW = 0.4
+"""Length (s) of each of the two windows that are compared: an oscillation of 3 Hz or more is there with a period."""
+
+SWING = 0.02
+"""Swing of a frequency (Hz) that is at rest."""
+
+FIRST = 0.1
+"""Time (s) to which the first event is moved: until then nothing happens."""
+
+
+def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
+    """Return what goes on after the last event on droop alone; "" if the plant comes to rest.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        A checked scenario whose plant can start; its events are made to come early.
+    feeder : Feeder
+        Its feeder.
+    case : str
+        The case whose events are taken.
+
+    Returns
+    -------
+    str
+        "its frequencies swing by 0.35 Hz, and do not calm down", or what tripped.
+    """
+    config, _ = configs(scenario, feeder, case)
+    early = FIRST - min((event.t for event in config.settings.events), default=FIRST)
+    events = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in config.settings.events)
+    plant = build_plant(
+        msgspec.structs.replace(config, settings=msgspec.structs.replace(config.settings, events=events))
+    )
+    forming = [row.name for row in feeder.inverters if row.kind == "GFM"]
+    last = max((event.t for event in events), default=FIRST)
+    end, window = round((last + SETTLE) / config.T_c), round(WINDOW / config.T_c)
+    found: list[list[float]] = []
+    for _ in range(end):
+        plant.advance()
+        readings = plant.measure()
+        found.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
+    for event in plant.take_events():
+        if event.kind == "trip":
+            return event.text
+    f = np.array(found)
+    before, after = (float(np.ptp(part, axis=0).max()) for part in (f[-2 * window : -window], f[-window:]))
+    if after < SWING or after < 0.5 * before:
+        return ""
+    return f"its frequencies swing by {after:.2g} Hz, and do not calm down"
