@@ -198,9 +198,10 @@ class Inverters:
         A GFL's P_set is clipped in place, as in GridLAB-D (section 4.4): the part beyond its rating is removed before
         the droop (7) is added, and cannot hide a later over-frequency.
         """
-        P_set = float(min(max(P_set, -self.P_set_lim[i]), self.P_set_lim[i]))
-        V_set = float(min(max(V_set, self.V_set_min[i]), self.V_set_max[i]))
-        self.set_points[i, :2] = P_set, V_set
+        limit = self.P_set_lim.item(i)
+        P_set = float(min(max(P_set, -limit), limit))
+        V_set = float(min(max(V_set, self.V_set_min.item(i)), self.V_set_max.item(i)))
+        self.set_points[i, 0], self.set_points[i, 1] = P_set, V_set
         return P_set, V_set
 
     def limit_power(self, i: int, P_max: float) -> None:

@@ -39,8 +39,6 @@ class LiveNetwork:
         Its arrays for the inner loop, linearised; set by the first `solve`.
     x : float64[2 m]
         [Re; Im] of the live branches' voltages (V), each in its island's frame: the next solution's first guess.
-    V_branch : complex128
-        Voltages of all branches (V) when last noted, in the common frame.
     """
 
     net: Reduced
@@ -54,7 +52,9 @@ class LiveNetwork:
         """Whether the ideal sources are connected; `plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
-        self.V_branch = circuit.V_branch.astype(complex)
+        self._noted: Complex = circuit.V_branch.astype(complex)
+        self._steps_since = False
+        """Whether steps were taken since `V_branch` was written."""
         self.source_voltage = self.reduction.circuit.source_voltage
         """Phasors of the connected ideal sources (V)."""
         self._excess = 0
@@ -148,9 +148,21 @@ class LiveNetwork:
         self._linearise(self._branch_voltages())
 
     def note(self) -> None:
-        """Note the present branch voltages."""
-        if self.x.size:
-            self.V_branch[self.reduction.branches] = self._branch_voltages()
+        """Note that the branches have other voltages: `V_branch` has those of the first time it is read."""
+        self._steps_since = True
+
+    @property
+    def V_branch(self) -> Complex:
+        """Voltages of all branches (V) when last noted, in the common frame; may be written."""
+        if self._steps_since:
+            self._steps_since = False
+            if self.x.size:
+                self._noted[self.reduction.branches] = self._branch_voltages()
+        return self._noted
+
+    @V_branch.setter
+    def V_branch(self, V: Complex) -> None:
+        self._noted, self._steps_since = V, False
 
     def _solve_islands(self, guess: Complex) -> Complex:
         """Voltages of the live branches (V) from a guess, or NoSolutionError."""

@@ -59,6 +59,8 @@ class Dynamics:
     ) -> None:
         self.h, self._method = h, method
         self.inverters = Inverters(inverters, connected, method)
+        self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))
+        """Of a network solution (V)."""
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[switching.Trip] = []
@@ -173,8 +175,7 @@ class Dynamics:
         )
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
-        units, network, arrays = self.inverters, self.network, self.arrays()
-        tolerance = TOLERANCE * float(units.V_b.max(initial=1.0))
+        units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
         if self._method == "first-order":
             return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
         return run_second_order_steps(

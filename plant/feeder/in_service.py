@@ -163,8 +163,10 @@ class InService:
     def _returning(self) -> list[tuple[list[int], bool]]:
         """Return the tripped inverters that return now, by island, and whether that is a black start."""
         recovery, forming = self._recovery, self._dynamics.inverters.forming
+        if not recovery.tripped.any():
+            return []
         island = self._dynamics.network.reduction.inverter_island
-        groups = []
+        groups: list[tuple[list[int], bool]] = []
         for k in np.unique(island[recovery.tripped]).tolist():
             here = np.flatnonzero(recovery.tripped & ~recovery.locked & (island == k)).tolist()
             ready = [i for i in here if recovery.passed(i)]

@@ -26,11 +26,18 @@ class Islands:
         self._network = network
         self._inverters = tuple(unit.name for unit in network.inverters)
         self._dead: list[str] = []
+        self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None
+        """The last switch state, and its `names`."""
         self._reported: dict[str, str] = {}
         """Last reported text of each island."""
 
     def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
         """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
+        if self._named is None or self._named[0] is not reduction:
+            self._named = reduction, self._names(reduction)
+        return self._named[1]
+
+    def _names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
         label = reduction.inverter_island.tolist()
         fed = [bool(reduction.has_source[k]) for k in label]
         first: dict[int, str] = {}

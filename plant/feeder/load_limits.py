@@ -51,6 +51,8 @@ class LoadLimits:
 
     def __init__(self, network: Network, V: NDArray[np.complex128]) -> None:
         self._jumps = _jumps(network)
+        self.any = bool(self._jumps)
+        """Whether a load has such a limit."""
         self._branches = np.array([jump.branch for jump in self._jumps], np.int64)
         self._V = np.array([jump.V for jump in self._jumps])
         self._side = np.array([LIMITS[jump.limit] for jump in self._jumps])

@@ -84,6 +84,8 @@ class Plant:
             self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
         self._P_rated = np.array([unit.P_rated for unit in network.inverters])
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
+        self._base = np.column_stack([self._P_rated, self._V_nom])
+        """Bases of P_set (W) and V_set (V)."""
         connected = [not unit.spare for unit in network.inverters]
         self._dynamics = Dynamics(
             self._circuits.of(self._switches.closed),
@@ -138,14 +140,13 @@ class Plant:
     def measure(self) -> dict[str, Reading]:
         """Read every inverter's sensors at t = tick * T_c."""
         reduction = self._dynamics.network.reduction
-        island, sourced = self._islands.names(reduction)
-        held = self._dynamics.inverters.set_points
+        islands = zip(*self._islands.names(reduction), reduction.online.tolist(), strict=True)
+        held = (self._dynamics.inverters.set_points[:, :2] * self._base).tolist()
         readings = {}
-        for i, name in enumerate(self.inverters):
-            f, P, Q, V = self._now[i].tolist()
-            P_set, V_set = float(held[i, 0] * self._P_rated[i]), float(held[i, 1] * self._V_nom[i])
-            where = island[i] if reduction.online[i] else OFF
-            readings[name] = Reading(P, Q, V, f, P_set, V_set, sourced[i], where)
+        for name, (f, P, Q, V), (P_set, V_set), (island, sourced, online) in zip(
+            self.inverters, self._now.tolist(), held, islands, strict=True
+        ):
+            readings[name] = Reading(P, Q, V, f, P_set, V_set, sourced, island if online else OFF)
         return readings
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
@@ -160,9 +161,10 @@ class Plant:
             return
         if self._in_service.has_tripped(i):
             return
-        P, V = self._dynamics.inverters.hold(i, P_set / self._P_rated[i], V_set / self._V_nom[i])
-        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * self._P_rated[i] / 1e3)
-        self._events += self._set_points.held(name, t, "V_set", V_set, V * self._V_nom[i])
+        P_rated, V_nom = self._base.item(i, 0), self._base.item(i, 1)
+        P, V = self._dynamics.inverters.hold(i, P_set / P_rated, V_set / V_nom)
+        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * P_rated / 1e3)
+        self._events += self._set_points.held(name, t, "V_set", V_set, V * V_nom)
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias, from the next step on.
@@ -225,7 +227,8 @@ class Plant:
             self._now = out[-1, :, :4].copy()
             self._in_service.watch(stop, out)
             step = stop
-        self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
+        if self._load_limits.any:
+            self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
         self.tick += 1
 
     # ---------------------------------------------------------------- for the recorder
@@ -251,8 +254,10 @@ class Plant:
         self._events.append(PlantEvent(t=self._time(step), kind=kind, subject=subject, text=text))
 
     def _as_row(self, step: int, readings: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> tuple[float, ...]:
-        set_points = self._dynamics.inverters.set_points[:, :2] * np.column_stack([self._P_rated, self._V_nom])
-        return (self._time(step), *np.hstack([readings, set_points]).ravel().tolist())
+        row = np.empty((len(self.inverters), 6))
+        row[:, :4] = readings
+        row[:, 4:] = self._dynamics.inverters.set_points[:, :2] * self._base
+        return (self._time(step), *row.ravel().tolist())
 
     # ---------------------------------------------------------------- events of the schedule
 

@@ -95,11 +95,22 @@ class Relays:
         self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
         self._count = np.zeros((n, len(chosen)), np.int64)
         """Number of steps for which each function's condition has held."""
+        self._shortest = int(np.min(self._need, initial=2**31))
+        self._counting = False
+        """Whether any condition has held at the last step."""
+        highest, lowest = np.full(3, np.inf), np.full(3, -np.inf)
+        for of, sign, threshold in zip(self._of, self._sign, self.thresholds, strict=True):
+            if sign > 0.0:
+                highest[of] = min(highest[of], threshold)
+            else:
+                lowest[of] = max(lowest[of], threshold)
+        self._usual = tuple(zip(lowest.tolist(), highest.tolist(), strict=True))
+        """Range within which no function's condition holds, of each quantity."""
 
     @property
     def quiet(self) -> int:
         """Number of steps within which no function can trip."""
-        return int(np.min(self._need - self._count, initial=2**31))
+        return int(np.min(self._need - self._count, initial=2**31)) if self._counting else self._shortest
 
     def watch(self, f: Floats, V_low: Floats, V_high: Floats, on: Flags) -> list[Tripped]:
         """Take the readings of the steps since the last call, at most `quiet` of them.
@@ -113,9 +124,15 @@ class Relays:
         """
         if not self.names:
             return []
+        readings = zip((f, V_low, V_high), self._usual, strict=True)
+        if all(low <= float(of.min()) and float(of.max()) <= high for of, (low, high) in readings):
+            if self._counting:
+                self._count[:], self._counting = 0, False
+            return []
         measured = np.stack([f, V_low, V_high], axis=2)[:, :, self._of]
         beyond = (self._sign * (measured - self.thresholds) > 0.0) & on[:, None]
-        if not beyond.any():
+        self._counting = bool(beyond.any())
+        if not self._counting:
             self._count[:] = 0
             return []
         for row in beyond:
@@ -191,6 +208,8 @@ class Recovery:
     @property
     def quiet(self) -> int:
         """Number of steps within which no delay ends."""
+        if not self.tripped.any():
+            return 2**31
         waits = (self._need - self._waited)[self.tripped & ~self.locked]
         return int(np.min(waits[waits > 0], initial=2**31))
 
@@ -205,9 +224,10 @@ class Recovery:
             Inverters in a de-energised island: there the delay counts from the trip, because there is no voltage.
         """
         steps = len(f)
-        self._served = np.where(self.tripped, 0, self._served + steps)
         if not self.tripped.any():
+            self._served += steps
             return
+        self._served = np.where(self.tripped, 0, self._served + steps)
         normal = (V_low >= V_ENTER[0]) & (V_high <= V_ENTER[1]) & (f >= self._f_band[0]) & (f <= self._f_band[1])
         normal |= dead
         since_last = np.where(normal.all(axis=0), steps, np.argmin(normal[::-1], axis=0))

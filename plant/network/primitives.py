@@ -35,10 +35,14 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
     Kersting, Distribution System Modeling and Analysis, section 6.1 (exact line segment model).
     """
     keep = [config.phases.index(phase) for phase in line.phases]
-    z = np.array(config.Z, dtype=np.complex128)[np.ix_(keep, keep)] * line.length
+    p = len(keep)
+    z = np.array([[config.Z[i][j] for j in keep] for i in keep], dtype=np.complex128) * line.length
     y = np.linalg.inv(z)
-    end = y + 0.5j * np.array(config.B)[np.ix_(keep, keep)] * line.length if charging else y
-    return np.block([[end, -y], [-y, end]])
+    end = y + 0.5j * np.array([[config.B[i][j] for j in keep] for i in keep]) * line.length if charging else y
+    Y = np.empty((2 * p, 2 * p), dtype=np.complex128)
+    Y[:p, :p] = Y[p:, p:] = end
+    Y[:p, p:] = Y[p:, :p] = -y
+    return Y
 
 
 def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> NDArray[np.complex128]:

@@ -10,13 +10,18 @@ from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.csv_table import required_columns
 from plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
 from plant.tables.imported import read_elements, read_load_parts
-from plant.tables.manifest import read_f_nom
+from plant.tables.manifest import MANIFEST, read_f_nom
 from plant.tables.parameter_sets import read_parameter_sets
 from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
 from wire.schema.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""
+
+KEPT = 8
+"""Feeders that are kept as they were read, by the bytes of their files: to read one again is a tenth of the work."""
+
+_read: dict[tuple[str | bytes, ...], Feeder] = {}
 
 
 class FeederError(ValueError):
@@ -77,6 +82,23 @@ def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     (134, ['inv1', 'inv4', 'inv7'])
     """
     folder = _folder(feeder)
+    key = (str(folder), load_set, *_contents(folder))
+    if (found := _read.get(key)) is None:
+        found = _read_tables(folder, feeder, load_set)
+        while len(_read) >= KEPT:
+            _read.pop(next(iter(_read)), None)
+        _read[key] = found
+    return found
+
+
+def _contents(folder: Path) -> tuple[str | bytes, ...]:
+    """Return the names and bytes of all files that a feeder is read from; none where one is no file."""
+    paths = sorted([*folder.glob("*.csv"), *folder.glob(MANIFEST)])
+    return tuple(part for path in paths for part in (path.name, path.read_bytes() if path.is_file() else b""))
+
+
+def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
+    """Read and check all tables; arguments as of `read_feeder`, and the feeder's folder."""
     problems: list[str] = []
     _report_strange_files(folder, problems)
     buses = BusTable(folder, problems)

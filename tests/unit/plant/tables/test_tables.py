@@ -44,6 +44,17 @@ def zone_powers(feeder: Feeder) -> dict[str, complex]:
     return powers
 
 
+def test_tables_are_read_again_when_a_file_has_other_bytes(folder: Path) -> None:
+    """A feeder that did not change is the one read before; an edit is seen, and its problems are told each time."""
+    first = read_feeder(str(folder))
+
+    assert read_feeder(str(folder)) is first
+    edit(folder, "lines.csv", 2, length_m="321")
+    assert read_feeder(str(folder)).lines[0].length == 0.321
+    edit(folder, "lines.csv", 2, length_m="-1")
+    assert problems(folder) == problems(folder) != ()
+
+
 def test_standard_feeder_has_the_published_load() -> None:
     """The standard feeder's spot loads add up to the published 3490 kW and 1920 kvar."""
     feeder = read_feeder("standard123")
