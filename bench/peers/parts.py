@@ -95,6 +95,11 @@ def tick(extent: Extent) -> list[Measure]:
     ]
 
 
+def _rounds(agents: int, many: int) -> int:
+    """Return the rounds of a size: one from so many agents on, so that the whole bench takes some minutes."""
+    return 1 if agents >= many else 2
+
+
 def agents(extent: Extent) -> list[Measure]:
     """A tick against the number of agents, a process each, beside bare Zenoh and ZeroMQ."""
     sizes = OurCase(extent.end).sizes
@@ -108,11 +113,17 @@ def agents(extent: Extent) -> list[Measure]:
     for n in extent.sizes:
         for graph in GRAPHS if n > 3 else ("full",):  # three in a ring are three in a full graph
             measures.append(
-                Measure(f"ours, {graph}, {n}", partial(our_scale.with_processes, n, graph, extent.ticks), rounds=2)
+                Measure(
+                    f"ours, {graph}, {n}",
+                    partial(our_scale.with_processes, n, graph, extent.ticks),
+                    rounds=_rounds(n, 18),
+                )
             )
             for transport in ("zenoh", "zeromq"):
                 measure = partial(mesh, transport, graph, n)
-                measures.append(Measure(f"{transport}, {graph}, {n}", measure, PACKAGE[transport], rounds=2))
+                measures.append(
+                    Measure(f"{transport}, {graph}, {n}", measure, PACKAGE[transport], rounds=_rounds(n, 18))
+                )
     return measures
 
 
@@ -122,7 +133,7 @@ def links(extent: Extent) -> list[Measure]:
         Measure(
             f"in process, {graph}, {n}",
             partial(our_scale.in_process, n, graph, extent.ticks),
-            rounds=1 if n > 99 else 2,
+            rounds=_rounds(n, 72),
         )
         for graph, sizes in (("ring", extent.rings), ("full", extent.full))
         for n in sizes
