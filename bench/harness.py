@@ -15,7 +15,7 @@ from statistics import median
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
 
-def options(text: str | None, **defaults: int | str) -> argparse.Namespace:
+def options(text: str | None, **defaults: float | str) -> argparse.Namespace:
     """Return the options of the command line, each of its default's type; `text` is the docstring of the bench."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in defaults.items():

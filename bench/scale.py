@@ -1,0 +1,222 @@
+"""Cost of agents in one process against their number: joined copies of a feeder, islanded, on three graphs.
+
+For each number of agents (nine an island of `microgrid123`) and each graph: processor time per simulated second, split
+at the plant's interface; of it the part that is not the plant's, per agent and tick and per link and tick; memory.
+Ratios to real time are of processor time: below 1 is faster than real time. Cost per link is that of the graph beside
+the same agents without links: it is a difference, so it needs several simulated seconds and a quiet machine.
+
+    .venv/bin/python -m bench.scale [--agents 9,27,99,297,999] [--T_c 0.1] [--end 4] [--json scale.json]
+                                    [--figure docs/performance-scale.svg]
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from time import process_time
+from typing import Any
+from unittest.mock import patch
+
+from agents.graphs import RosterGraph
+from agents.topology import rule_of
+from bench.harness import load, machine, options, say
+from gridpeers.feeder import Feeder
+from plant.build import build_plant
+from plant.equipment.joined_copies import copy_name, joined_copies
+from plant.feeder import Plant
+from plant.plant_config import PlantConfig
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.results.record import Recorder
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+
+ISLAND, JOINT = 9, "450"
+"""Inverters of the feeder `microgrid123`, and its bus at which copies are joined."""
+
+GRAPHS = ("none", "ring", "clustered", "full")
+
+MOST_FULL, MOST_CLUSTERED = 99, 297
+"""Most agents on a graph whose links grow with the square of their number."""
+
+AGENT_SECONDS = 600
+"""Least agents times simulated seconds (s): with fewer, a difference of two runs says nothing."""
+
+SCENARIO = """\
+name = "scale"
+[plant]
+feeder = "grown"
+[time]
+T_c_s = {T_c}
+end_s = {end}
+[[event]]
+label = "islanding"
+t_s = {islanding}
+open = {switches}
+"""
+
+CASE = '[case.{graph}]\nsecondary = "all"\ngraph = "{graph}"\n'
+
+
+class PlantClock:
+    """Processor time (s) spent in the plant."""
+
+    def __init__(self) -> None:
+        self.spent = 0.0
+
+    def timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return the function with its time counted."""
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            began = process_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                self.spent += process_time() - began
+
+        return call
+
+
+def write_scenario(folder: Path, agents: int, T_c: float, end: float) -> Path:
+    """Write a feeder of joined copies and its scenario; return the scenario's path."""
+    copies = agents // ISLAND
+    joined_copies(Feeder.read("microgrid123"), copies, JOINT).save(folder / "grown")
+    switches = [f"{copy_name('13', k)}-{copy_name('152', k)}" for k in range(1, copies + 1)]
+    text = SCENARIO.format(T_c=T_c, end=end, islanding=1.0, switches=json.dumps(switches))
+    path = folder / "scale.toml"
+    path.write_text(text + "".join(CASE.format(graph=graph) for graph in graphs_of(agents)), encoding="utf-8")
+    return path
+
+
+def graphs_of(agents: int) -> tuple[str, ...]:
+    """Return the graphs to run with so many agents."""
+    most = {"full": MOST_FULL, "clustered": MOST_CLUSTERED}
+    return tuple(graph for graph in GRAPHS if agents <= most.get(graph, agents))
+
+
+def megabytes() -> float:
+    """Return the largest size of this process so far (MB)."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def measure(agents: int, T_c: float, end: float) -> Iterator[dict[str, float | str]]:
+    """Yield one row for each graph; the plant's code is compiled, or loaded, before the first."""
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        path = write_scenario(folder, agents, T_c, end)
+        began = process_time()
+        scenario, feeder = load_scenario(str(path))
+        read = process_time() - began
+        plant, agent_configs = configs(scenario, feeder, "none")
+        built = build_plant(plant)
+        if agents <= MOST_FULL:  # the first run of a process is slower, which shows in few agents
+            _run(plant, agent_configs, built, folder / "first")
+        alone = 0.0
+        for graph in scenario.cases:
+            plant, agent_configs = configs(scenario, feeder, graph)
+            began = process_time()
+            built = build_plant(plant)
+            row = _run(plant, agent_configs, built, folder / graph)
+            members = {config.name: config for config in agent_configs}
+            edges = RosterGraph(rule_of(agent_configs[0].control), members, graph)
+            links = sum(len(edges.in_neighbours(name)) for name in members)
+            own, ticks = row["agents_s"], end / T_c
+            alone = own if graph == "none" else alone
+            yield {
+                "agents": agents,
+                "graph": graph,
+                "links": links,
+                "T_c_s": T_c,
+                "end_s": end,
+                "read_s": read,
+                "build_s": row["began"] - began,
+                "meet_s": row["meet"],
+                "plant_per_s": row["plant_s"] / end,
+                "agents_per_s": own / end,
+                "of_real_time": (own + row["plant_s"]) / end,
+                "us_per_agent_and_tick": 1e6 * own / agents / ticks,
+                "us_per_link_and_tick": 1e6 * (own - alone) / links / ticks if links else 0.0,
+                "memory_MB": megabytes(),
+                "load": load(),
+            }
+
+
+def _run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> dict[str, float]:
+    """Return processor times (s) of one recorded case."""
+    assert plant.end is not None
+    clock = PlantClock()
+    first: list[tuple[float, float]] = []
+    with ExitStack() as stack:
+        for name in ("advance", "measure", "hold", "take_rows"):
+            stack.enter_context(patch.object(Plant, name, clock.timed(getattr(Plant, name))))
+        recorder = stack.enter_context(Recorder(folder))
+
+        def take(telemetry: Any) -> None:
+            if not first:
+                first.append((process_time(), clock.spent))
+            recorder(telemetry)
+
+        began = process_time()
+        outcome = run_inprocess(plant, agents, take, plant=built)
+        ended, spent = process_time(), clock.spent
+        recorder.finish(plant.end, plant.record_step)
+    assert not outcome.broke, outcome.broke
+    at, before = first[0]
+    plant_s = spent - before
+    return {"began": began, "meet": at - began, "plant_s": plant_s, "agents_s": ended - at - plant_s}
+
+
+def draw(rows: list[dict[str, Any]], file: Path) -> None:
+    """Draw cost per simulated second and cost per link against the number of agents."""
+    import matplotlib.pyplot as plt
+
+    figure, (whole, link) = plt.subplots(1, 2, figsize=(9.0, 3.6), layout="constrained")
+    for graph in GRAPHS:
+        own = [row for row in rows if row["graph"] == graph]
+        n = [row["agents"] for row in own]
+        (line,) = whole.plot(n, [row["agents_per_s"] for row in own], "o-", label=f"agents, {graph}")
+        if graph != "none":
+            link.plot(n, [row["us_per_link_and_tick"] for row in own], "o-", color=line.get_color(), label=graph)
+    alone = [row for row in rows if row["graph"] == "ring"]
+    whole.plot([row["agents"] for row in alone], [row["plant_per_s"] for row in alone], "k--", label="plant")
+    whole.axhline(1.0, color="grey", lw=0.8)
+    whole.set(xscale="log", yscale="log", xlabel="agents", ylabel="processor time per simulated second (s/s)")
+    link.set(xscale="log", xlabel="agents", ylabel="processor time per link and tick (us)", ylim=(0, None))
+    for axes in (whole, link):
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
+    figure.savefig(file)
+
+
+def main() -> None:
+    """Measure each number of agents in a process of its own, print a table, write JSON and the figure."""
+    given = options(__doc__, agents="9,27,99,297,999", T_c=0.1, end=4, json="", figure="", only=0)
+    if given.only:  # the child: one number of agents, so that memory is its own
+        print(json.dumps(list(measure(given.only, given.T_c, float(given.end)))))
+        return
+    print(machine())
+    rows: list[dict[str, Any]] = []
+    for agents in map(int, given.agents.split(",")):
+        say(f"{agents} agents")
+        end = max(given.end, round(AGENT_SECONDS / agents))
+        words = ["--only", str(agents), "--T_c", str(given.T_c), "--end", str(end)]
+        child = subprocess.run([sys.executable, "-m", "bench.scale", *words], stdout=subprocess.PIPE, check=True)
+        rows += json.loads(child.stdout)
+    names = [name for name in rows[0] if name not in ("graph", "load", "T_c_s")]
+    print(f"T_c {given.T_c:g} s, processor time")
+    print("graph    " + "".join(f"  {name}" for name in names))
+    for row in rows:
+        print(f"{row['graph']:9}" + "".join(f"  {row[name]:>{len(name)}.5g}" for name in names))
+    if given.json:
+        Path(given.json).write_text(json.dumps({"machine": machine(), "rows": rows}, indent=1) + "\n", encoding="utf-8")
+    if given.figure:
+        draw(rows, Path(given.figure))
+
+
+if __name__ == "__main__":
+    main()
