@@ -9,6 +9,7 @@ import json
 import queue
 import signal
 import sys
+import threading
 import time
 import zlib
 from math import exp, inf, isfinite
@@ -121,11 +122,13 @@ class ForeignAgent:
         if not all(isfinite(message[name]) for name in needed.split()):
             raise ValueError("not finite")
         who, speaker = tuple(key[-2:]), self.plate(key[-1] if message["type"] == "State" else "plant")
-        if key[0] == "alive" and item:
+        if (key[0] == "alive" and item) or (key[0] == "asked" and who in self.alive):
             self.alive.setdefault(who, {"sender": "plant", "epoch": int(who[1])} if who[0] == "plant" else None)
             if key[1] == "agent" and not self.alive[who]:  # ask who it is; we have subscribed before
-                self.session.get(f"{self.root}nameplate/{who[0]}/{who[1]}", lambda r: r.ok and self.enqueue(r.ok))
-        elif key[0] == "alive":
+                again = threading.Timer(0.1, self.inbox.put, [(f"{self.root}asked/{who[0]}/{who[1]}", None)]).start
+                answer = zenoh.handlers.Callback(lambda r: r.ok and self.enqueue(r.ok), again)  # again: once it is over
+                self.session.get(f"{self.root}nameplate/{who[0]}/{who[1]}", answer)
+        elif key[0] in ("alive", "asked"):
             self.alive.pop(who, None)
             if who[0] == "plant":
                 self.measurement, self.due, self.status = None, 0.0, -1 if self.wall else 3
@@ -189,8 +192,8 @@ class ForeignAgent:
 if __name__ == "__main__":
     config = json.load(sys.stdin) if len(sys.argv) == 1 else None
     lease = 2_000 if config is None or config["clock"] == "wall" else 60_000
-    settings = SETTINGS % (config["connect"][0] if config else sys.argv[1], lease)
-    with zenoh.open(zenoh.Config.from_json5(settings)) as session:
+    endpoint = config["connect"][0] if config else sys.argv[1]
+    with zenoh.open(zenoh.Config.from_json5(SETTINGS % (endpoint, lease))) as session:
         while config is None:
             for reply in session.get("gridpeers/{}/config/{}".format(*sys.argv[2:]), timeout=1.0):
                 config = json.loads(reply.ok.payload.to_string()) if reply.ok else None
