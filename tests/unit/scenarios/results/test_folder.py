@@ -3,6 +3,7 @@
 import errno
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 
@@ -60,11 +61,15 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_the_status_still_tells(
     """Where no new file can be made, the reason is written into the room that status.txt has; it may be longer."""
     set_status(tmp_path, "running")
 
-    def full(path: Path, *_: object, **__: object) -> None:
+    opened = Path.open
+
+    def full(path: Path, mode: str = "r", **options: Any) -> IO[Any]:
+        if "w" not in mode:
+            return opened(path, mode, **options)
         path.touch()
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "open", full)
     with pytest.raises(OSError, match="No space left"):
         write_whole(tmp_path / "metrics.json", "{}")
     set_broken(tmp_path, "cannot be\nwritten")
