@@ -51,6 +51,7 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
         ({"bus": "96", "m_p": 0.0}, 'm_p_pu: .* above 0.*; .*bus "96" has no phase A, C; it has B'),
         ({"bus": "96", "phases": "C"}, 'bus "96" has no phase C; it has B'),
         ({"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C"'),
+        ({"phases": 3}, 'phases "3": must be "ABC" or "A" or "B" or "C"'),
         ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
     ],
 )
