@@ -163,7 +163,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
             V_nom=found.V_nom,
             m_p=m_p,
             m_q=m_q,
-            phases=str(phases).strip() or "ABC",
+            phases=str(phases).strip() or "ABC",  # type: ignore[arg-type]  # `problems_of` refuses others
         )
         load = sum(S.real for load in self.loads for S in load.S if S.real > 0.0)
         if problems := problems_of(row, found, load, (*self.inverters, *self.spares)):
