@@ -168,3 +168,16 @@ def test_who_left_does_not_come_back_by_itself() -> None:
 
     on = {name for name, reading in p.measure().items() if reading.P != 0.0}
     assert on == {f"inv{k}" for k in (1, 3, 4, 5, 6, 7, 8, 9)}
+
+
+def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> None:
+    """Where a closing lets one of two live islands collapse, only its own inverters trip."""
+    actions = ((1.0, "13-152", "open"), (1.5, "60-160", "open"), (1.62, "sw1_2", "open"), (1.88, "60-160", "close"))
+    events = tuple(SwitchEvent(t=t, switch=switch, action=action) for t, switch, action in actions)
+    plant = Plant(network, PlantSettings(events=events), T_C, T_C)
+    for _ in range(110):
+        plant.advance()
+
+    tripped = [event.text for event in plant.take_events() if event.kind == "trip"]
+    assert len(tripped) == 1
+    assert tripped[0].startswith("inv1, inv2, inv3 tripped, as the island has no solution")
