@@ -27,7 +27,7 @@ class TransientFolder:
         self.path = Path(tempfile.mkdtemp(prefix=prefix))
         """Where it is."""
         end, self.user = os.pipe()
-        """What makes a process a user: a file descriptor, to be inherited."""
+        """File descriptor; the folder stays while a process has inherited it and runs."""
         command = ["sh", "-c", REMOVER, str(self.path)]
         self._remover = subprocess.Popen(command, stdin=end, cwd="/", start_new_session=True)
         os.close(end)

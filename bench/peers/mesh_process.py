@@ -20,7 +20,7 @@ WARM_UP = 20
 
 
 class Transport(Protocol):
-    """What carries the messages of one process."""
+    """The rival's way to publish and to receive, for one process of the mesh."""
 
     def subscribe(self, topic: str) -> None:
         """Take in the messages of a topic."""

@@ -41,6 +41,16 @@ class Inverter:
     f_nom: float = F_NOM
     """Nominal frequency (Hz), base of its per-unit frequency; one for all inverters of a circuit."""
 
+    @property
+    def single(self) -> bool:
+        """Whether it has one phase."""
+        return len(self.phases) == 1
+
+    @property
+    def S_3(self) -> float:
+        """Base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter."""
+        return 3.0 * self.S_b if self.single else self.S_b
+
 
 class Inverters:
     """All inverters of a circuit, in the order of its terminals.
@@ -108,8 +118,8 @@ class Inverters:
         self.gfm_state = np.zeros(self.gfm_at.size, gfm_model.STATE)
         self.gfl_state = np.zeros(self.gfl_at.size, gfl_model.STATE)
         self.S_b = np.array([unit.S_b for unit in units])
-        self.single = np.array([len(unit.phases) == 1 for unit in units], dtype=bool)
-        self.S_3 = np.where(self.single, 3.0, 1.0) * self.S_b
+        self.single = np.array([unit.single for unit in units], dtype=bool)
+        self.S_3 = np.array([unit.S_3 for unit in units])
         self.phase = np.array(["ABC".index(unit.phases[0]) for unit in units], dtype=np.int64)
         self.V_b = np.array([unit.V_b for unit in units])
         self.m_p = np.array([unit.m_p for unit in units])
@@ -237,8 +247,7 @@ class Inverters:
 
 def _pack(unit: Inverter, method: Method) -> NDArray[np.void]:
     """Return the record of one unit for the compiled pass of its kind."""
-    S_3 = unit.S_b if len(unit.phases) > 1 else 3.0 * unit.S_b
-    own = S_3, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
+    own = unit.S_3, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
     if isinstance(unit.parameters, GfmParameters):
         return gfm_model.pack(unit.parameters, *own)
     return gfl_model.pack(unit.parameters, *own, method)

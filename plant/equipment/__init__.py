@@ -1,4 +1,4 @@
-"""What a feeder consists of: the rows of its tables, the parameters of its inverters, and which nodes they connect."""
+"""A feeder's equipment: rows of its tables, parameters of its inverters, and the nodes that they connect."""
 
 from plant.equipment.equipment import (
     F_NOM,

@@ -18,7 +18,7 @@ from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
 from wire.messages import PLANT
 
 PRELOAD = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.laws.consensus")
-"""What most processes of agents import."""
+"""Modules, and a function to call, that the fork server loads once for all agents."""
 
 
 class Supervisor:

@@ -1,4 +1,4 @@
-"""What the agents of one process share: one roster, one evaluation of the graph's rule, and nobody else's numbers."""
+"""Agents of one process share the roster and the evaluation of the graph's rule, but no message numbers."""
 
 from __future__ import annotations
 
