@@ -16,10 +16,16 @@ from scipy.optimize import root
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
-from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
 from plant.dynamics.phasors import PHASES, aligned_sum
 from plant.dynamics.reduction.reduce_network import reduce_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
+
+MOST_ROUNDS = 500
+"""Most rounds between the network and inverters of constant power."""
+
+NEAR = 4
+"""Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,60 +51,67 @@ class _PowerFlow:
         self.reduction = reduce_network(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
+        self.I_b = np.empty(self.V_b.size, complex)
+        """Currents of the live load branches (A), of the last solution."""
         self.net = self._linearise()
+        self._near = False
 
     def _linearise(self) -> Reduced:
         theta = np.zeros(len(self.units))
         return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
 
-    def voltages(self, J: Complex) -> Complex:
-        """Return the terminal voltages (V) for injections J (A)."""
-        m = self.V_b.size
-        I_b, V = np.empty(m, complex), np.empty(J.shape, complex)
-        work = np.empty(12 * J.shape[0] + 6 * m)
-        still = np.ones(self.reduction.count, complex)
-        tolerance = 1e-12 * float(self.units.V_b.max())
-        for renewed in (False, True):
-            x = np.concatenate([self.V_b.real, self.V_b.imag])
-            if solve_network(self.net, J, still, x, I_b, V, tolerance, work) >= 0:
-                break
-            # the tangent does not lead there, e.g. across a limit of the loads' law: Newton's method does
-            self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
-            if renewed or failed:
-                raise PlantError(
-                    "no initial operating point: the power flow did not converge; the load may be more than the "
-                    "network can carry; try smaller loads or another P_set0"
-                )
-            self.net = self._linearise()
-        self.V_b, self.I_b = x[:m] + 1j * x[m:], I_b
-        return V
+    def _renew(self, J: Complex) -> None:
+        """Move the tangent to where Newton's method leads: across a limit of the loads' law it does not itself."""
+        self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
+        if failed:
+            raise _no_power_flow()
+        self.net = self._linearise()
 
     def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
-        units, y = self.units, self.y[:, None]
-        S = ((P + 1j * Q) * units.S_3)[:, None]
-        keep = (frozen | ~self.reduction.online)[:, None]
-        scale = units.S_3 / units.V_b
-        for iteration in range(500):
-            V = self.voltages(J)
-            V_1 = aligned_sum(V)[:, None] / 3.0
-            V_1 = np.where(V_1 == 0.0, 1.0, V_1)
-            own = np.sum(V * np.conj(y * V), axis=1, keepdims=True)
-            updated = np.conj((S + own) / (3.0 * V_1)) * PHASES
-            if units.balanced.any():
-                equal = np.conj(S / (3.0 * np.where(V == 0.0, 1.0, V)))
-                updated = np.where(units.balanced[:, None], equal, updated)
-            updated = np.where(keep, J, updated)
-            change = float(np.max(np.abs(updated - J) / scale[:, None], initial=0.0))
-            J = updated
-            if iteration == 3:
-                self.net = self._linearise()
-            if change < 1e-13 or (iteration > 100 and change < 1e-11):
-                return J, self.voltages(J)
+        units, m = self.units, self.V_b.size
+        J, V = J.copy(), np.empty(J.shape, complex)
+        tolerance, left, renewed = 1e-12 * float(units.V_b.max()), MOST_ROUNDS, False
+        while left > 0:
+            most = left if self._near else min(left, NEAR)
+            x = np.concatenate([self.V_b.real, self.V_b.imag])
+            rounds, change = settle_powers(
+                most,
+                self.net,
+                J,
+                (P + 1j * Q) * units.S_3,
+                self.y,
+                units.S_3 / units.V_b,
+                ~frozen & self.reduction.online,
+                units.balanced,
+                x,
+                self.I_b,
+                V,
+                tolerance,
+            )
+            if rounds == NO_NETWORK:
+                if renewed:
+                    raise _no_power_flow()
+                renewed = True
+                self._renew(J)
+                continue
+            left, renewed = left - rounds, False
+            self.V_b = x[:m] + 1j * x[m:]
+            if rounds <= most:
+                return J, V
+            if not self._near:
+                self.net, self._near = self._linearise(), True
         raise PlantError(
-            f"no initial operating point: injections still change by {change:.1e} pu after 500 iterations; "
+            f"no initial operating point: injections still change by {change:.1e} pu after {MOST_ROUNDS} iterations; "
             "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
         )
+
+
+def _no_power_flow() -> PlantError:
+    return PlantError(
+        "no initial operating point: the power flow did not converge; the load may be more than the "
+        "network can carry; try smaller loads or another P_set0"
+    )
 
 
 def equilibrium(
@@ -140,15 +153,17 @@ def equilibrium(
     for k in np.unique(island[units.forming & online & ~sourced]):
         swing[_swings(units, np.flatnonzero((island == k) & units.forming & online))] = True
 
-    own = ~circuit.copies[swing]
-    nodes = circuit.terminals[swing][own]
-    of_phase = swing_voltage[(units.phase[swing, None] + np.arange(3)) % 3]
-    at_swing = (units.V_b[swing, None] * of_phase)[own]
-    held = replace(
-        circuit,
-        sources=np.concatenate([circuit.sources, nodes]),
-        source_voltage=np.concatenate([circuit.source_voltage, at_swing]),
-    )
+    held = circuit
+    if swing.any():
+        own = ~circuit.copies[swing]
+        nodes = circuit.terminals[swing][own]
+        of_phase = swing_voltage[(units.phase[swing, None] + np.arange(3)) % 3]
+        at_swing = (units.V_b[swing, None] * of_phase)[own]
+        held = replace(
+            circuit,
+            sources=np.concatenate([circuit.sources, nodes]),
+            source_voltage=np.concatenate([circuit.source_voltage, at_swing]),
+        )
     flow = _PowerFlow(held, units, swing)
     J = np.zeros((n, 3), complex)
     if V_set is None:

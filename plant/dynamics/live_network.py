@@ -15,7 +15,7 @@ TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
 
 WORTH = 40
-"""Iterations of a network solution that cost as much time as a new tangent of a large network."""
+"""Iterations of a network solution that cost as much time as new sparse factors."""
 
 KEPT = 64
 """Number of factored networks to keep, 1 MB each: enough for all scheduled ones, and a bound for many switchings."""
@@ -127,10 +127,10 @@ class LiveNetwork:
         self._linearise(self._solve_islands(self._branch_voltages()))
 
     def refresh(self, iterations: int, solutions: int) -> None:
-        """Linearise a large network again once its tangent has cost more iterations than a new one costs time.
+        """Linearise sparse factors again once their tangent has cost more iterations than a new one costs time.
 
-        A tangent at the present voltages needs one iteration or two a solution. A small network's is never renewed
-        for its speed: it costs more, and pinned histories depend on it.
+        A tangent at the present voltages needs one iteration a solution. Dense matrices are never renewed for their
+        speed: a new inverse costs more than it saves.
 
         Parameters
         ----------

@@ -85,8 +85,11 @@ class SwitchState:
         np.add.at(y_diagonal, G, np.where(injects, np.tile(y_f, 3), 0.0))
         whole = np.bincount(self.label[circuit.sources], minlength=self.count) >= 3
         whole[self.inverter_island[forming & self.online & ~circuit.copies[:, 1]]] = True
+        self.to_ground = np.zeros(n)
+        """Admittance added at each node (S), so that nothing floats."""
         if (on_few_phases := fed & ~whole).any():
-            y_diagonal += np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
+            self.to_ground = np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
+            y_diagonal += self.to_ground
         self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
         self.C = C[:, self.branches]
         self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)

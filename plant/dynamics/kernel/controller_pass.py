@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120
+from plant.dynamics.kernel.arithmetic import A120, magnitude, unit_phasor
 from plant.dynamics.kernel.compiled import compiled
 from plant.dynamics.kernel.gfl import advance_gfl
 from plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
@@ -60,27 +60,31 @@ class Units(NamedTuple):
 
 
 @compiled
-def read_voltage(V: NDArray[np.complex128], reading: NDArray[np.float64]) -> None:
+def read_voltage(i: int, V: NDArray[np.complex128], readings: NDArray[np.float64]) -> None:
     """Write the mean of the phases' voltages, the lowest and the highest (V) into an inverter's reading."""
-    a, b, c = abs(V[0]), abs(V[1]), abs(V[2])
-    reading[3], reading[4], reading[5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
+    a, b, c = magnitude(V[i, 0]), magnitude(V[i, 1]), magnitude(V[i, 2])
+    readings[i, 3], readings[i, 4], readings[i, 5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
 
 
 @compiled
 def read_terminal(
+    i: int,
     y_f: complex,
     J: NDArray[np.complex128],
     V: NDArray[np.complex128],
     I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
-    reading: NDArray[np.float64],
+    readings: NDArray[np.float64],
 ) -> None:
-    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2)."""
+    """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2).
+
+    The compiled functions take whole tables and a row: each view of a row would count references to its table.
+    """
     S = 0.0j
     for phase in range(3):
-        I[phase] = J[phase] - y_f * V[phase]
-        S += V[phase] * I[phase].conjugate()
-    reading[1], reading[2] = S.real, S.imag
-    read_voltage(V, reading)
+        I[i, phase] = J[i, phase] - y_f * V[i, phase]
+        S += V[i, phase] * I[i, phase].conjugate()
+    readings[i, 1], readings[i, 2] = S.real, S.imag
+    read_voltage(i, V, readings)
 
 
 @compiled
@@ -88,7 +92,7 @@ def read_offline(units: Any, readings: NDArray[np.float64]) -> None:
     """Write the readings of the inverters that deliver nothing: `f_nom`, or 0 Hz where there is no voltage."""
     for i in range(units.online.size):
         if not units.online[i]:
-            read_voltage(units.V[i], readings[i])
+            read_voltage(i, units.V, readings)
             readings[i, 0] = units.f_nom if readings[i, 3] > 0.0 else 0.0
             readings[i, 1], readings[i, 2] = 0.0, 0.0
 
@@ -100,7 +104,9 @@ def keep_start(units: Any) -> None:
         units.gfm_0[k] = units.gfm_state[k]
     for k in range(units.gfl_at.size):
         units.gfl_0[k] = units.gfl_state[k]
-    units.J_0[:] = units.J
+    for i in range(units.J.shape[0]):
+        for phase in range(3):
+            units.J_0[i, phase] = units.J[i, phase]
 
 
 @compiled
@@ -123,7 +129,7 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
     for island in range(net.leader.size):
         rotation[island] = 1.0
         if net.leader[island] >= 0:
-            rotation[island] = np.exp(-1j * (theta[net.leader[island]] - net.theta_lin[island]))
+            rotation[island] = unit_phasor(net.theta_lin[island] - theta[net.leader[island]])
 
 
 @compiled
@@ -147,11 +153,11 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
         if not units.online[i]:
             continue
         former = units.gfm[k]
-        read_terminal(former.y_f, J[i], V[i], units.I[i], readings[i])
+        read_terminal(i, former.y_f, J, V, units.I, readings)
         state = units.gfm_state[k]
         P, Q, v = readings[i, 1] / former.S_b, readings[i, 2] / former.S_b, readings[i, 3] / former.V_b
         if former.positive_sequence:
-            P, Q, v = measure_positive_sequence(former, V[i], units.I[i])
+            P, Q, v = measure_positive_sequence(former, i, V, units.I)
         advance_gfm(
             former,
             set_points[i, 0],
@@ -165,7 +171,7 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
             h,
             second,
         )
-        J_A = state.E * former.V_b * np.exp(1j * state.theta) * former.y_f
+        J_A = state.E * former.V_b * unit_phasor(state.theta) * former.y_f
         J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120
         readings[i, 0] = units.f_nom + state.w / (2.0 * np.pi)
         if units.limiting[i]:
@@ -176,7 +182,7 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
         if not units.online[i]:
             continue
         follower = units.gfl[k]
-        read_terminal(follower.y_f, J[i], V[i], units.I[i], readings[i])
+        read_terminal(i, follower.y_f, J, V, units.I, readings)
         J[i, 0], J[i, 1], J[i, 2] = advance_gfl(
             follower,
             set_points[i, 0],

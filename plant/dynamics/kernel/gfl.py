@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, heun, sat
+from plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat, unit_phasor
 from plant.dynamics.kernel.compiled import compiled
 from plant.plant_config import GflParameters, Method
 
@@ -214,7 +214,7 @@ def current_pass(
 
     The output is the internal voltage e in the voltage-source form, the current in the other.
     """
-    slope = (i_ref - c) / g.T_if if g.current_source else g.k_ic * (i_ref - i)
+    slope = (i_ref - c) * (1.0 / g.T_if) if g.current_source else g.k_ic * (i_ref - i)
     c_new = c0 + 0.5 * h * (d1 + slope) if second else c0 + h * slope
     if g.current_source:
         return c_new, c_new, slope
@@ -261,16 +261,17 @@ def advance_gfl(
         Whether this is the corrector.
     """
     # 1: measure in the frame the pass starts with
-    to_dq = np.exp(-1j * x.theta)
+    to_dq = unit_phasor(-x.theta)
     to_dq_B, to_dq_C = to_dq * A120, to_dq * A120.conjugate()
     if g.balanced_power:
-        to_dq_B, to_dq_C = np.exp(-1j * x.theta_B), np.exp(-1j * x.theta_C)
-    u_A, u_B, u_C = V_A * to_dq / g.V_b, V_B * to_dq_B / g.V_b, V_C * to_dq_C / g.V_b
-    u = (u_A + u_B + u_C) / 3.0  # the positive sequence in the frame of phase A
-    i_A = (J_A - g.y_f * V_A) * to_dq / g.I_b
-    i_B = (J_B - g.y_f * V_B) * to_dq_B / g.I_b
-    i_C = (J_C - g.y_f * V_C) * to_dq_C / g.I_b
-    v = (abs(V_A) + abs(V_B) + abs(V_C)) / (3.0 * g.V_b)
+        to_dq_B, to_dq_C = unit_phasor(-x.theta_B), unit_phasor(-x.theta_C)
+    per_V, per_I = 1.0 / g.V_b, 1.0 / g.I_b  # numba divides a phasor by a number as by a phasor
+    u_A, u_B, u_C = V_A * (to_dq * per_V), V_B * (to_dq_B * per_V), V_C * (to_dq_C * per_V)
+    u = (u_A + u_B + u_C) * (1.0 / 3.0)  # the positive sequence in the frame of phase A
+    i_A = (J_A - g.y_f * V_A) * (to_dq * per_I)
+    i_B = (J_B - g.y_f * V_B) * (to_dq_B * per_I)
+    i_C = (J_C - g.y_f * V_C) * (to_dq_C * per_I)
+    v = (magnitude(V_A) + magnitude(V_B) + magnitude(V_C)) / (3.0 * g.V_b)
 
     # 2: PLL
     u_q = u_A.imag if g.balanced_power else u.imag
@@ -322,7 +323,7 @@ def advance_gfl(
 
     # 9: back with the new angle
     scale = g.I_b if g.current_source else g.V_b * g.y_e
-    turn = np.exp(1j * x.theta) * scale
+    turn = unit_phasor(x.theta) * scale
     if g.balanced_power:
-        return out_A * turn, out_B * np.exp(1j * x.theta_B) * scale, out_C * np.exp(1j * x.theta_C) * scale
+        return out_A * turn, out_B * unit_phasor(x.theta_B) * scale, out_C * unit_phasor(x.theta_C) * scale
     return out_A * turn, out_B * turn * A120.conjugate(), out_C * turn * A120

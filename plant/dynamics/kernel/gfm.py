@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, heun, sat
+from plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat
 from plant.dynamics.kernel.compiled import compiled
 from plant.plant_config import GfmParameters
 
@@ -120,14 +120,15 @@ def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> No
 @compiled
 def measure_positive_sequence(
     g: Any,
+    i: int,
     V: NDArray[np.complex128],
     I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
 ) -> tuple[float, float, float]:
-    """Return P, Q and V (pu) of the positive sequence, from phase voltages (V) and currents out (A); section 3.8."""
-    V_1 = (V[0] + A120 * V[1] + A120.conjugate() * V[2]) / 3.0
-    I_1 = (I[0] + A120 * I[1] + A120.conjugate() * I[2]) / 3.0
+    """Return P, Q and V (pu) of inverter i's positive sequence, from its V (V) and I out of it (A); section 3.8."""
+    V_1 = (V[i, 0] + A120 * V[i, 1] + A120.conjugate() * V[i, 2]) / 3.0
+    I_1 = (I[i, 0] + A120 * I[i, 1] + A120.conjugate() * I[i, 2]) / 3.0
     S = 3.0 * V_1 * I_1.conjugate() / g.S_b
-    return S.real, S.imag, abs(V_1) / g.V_b
+    return S.real, S.imag, magnitude(V_1) / g.V_b
 
 
 @compiled

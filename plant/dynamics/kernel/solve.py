@@ -18,6 +18,9 @@ MAX_ITERATIONS = 60
 CAUTION = 0.1
 """Part of the tolerance that what is left of an iteration may have by its rate so far."""
 
+NOISE = 100.0
+"""Change of an iteration, as a multiple of the tolerance, from which on the next one tells its rate, not rounding."""
+
 
 @compiled
 def load_currents(
@@ -33,10 +36,12 @@ def load_currents(
     if limited_at.size < m:
         for b in range(m):
             re, im = x[b], x[m + b]
-            square = re * re + im * im
-            V = complex(re, im)
-            # (S/V)* = S* V / |V|^2
-            I_b[b] = (S[b].conjugate() / square + I0[b] / np.sqrt(square)) * V
+            per_square = 1.0 / (re * re + im * im)
+            per_V = np.sqrt(per_square)
+            # (S/V)* + I0 V/|V| = g V; in real numbers, because numba's complex division branches
+            g = S[b].real * per_square + I0[b].real * per_V
+            h = I0[b].imag * per_V - S[b].imag * per_square
+            I_b[b] = complex(g * re - h * im, g * im + h * re)
     limited_currents(limited_at, law, x, I_b)
 
 
@@ -70,6 +75,7 @@ def solve_sparse(
                     turned = J[i, phase] * turn
                     base[2 * at] += turned.real
                     base[2 * at + 1] += turned.imag
+    rate = maps.rate
     iterations, former = 0, 0.0
     while True:
         iterations += 1
@@ -78,8 +84,12 @@ def solve_sparse(
         draw_remainders(maps, I_b, net.i_c, net.A, net.B, x, right)
         solve_blocks(maps.factored, right)
         change = branch_voltages(maps, right, x)
+        if former > NOISE * tolerance:
+            rate[0] = change / former
+        else:
+            rate[0] += change * rate[1]
         # the changes fall in a geometric series: what would follow is bounded by its sum
-        if change <= tolerance or (change < former and change * change <= CAUTION * tolerance * (former - change)):
+        if change <= tolerance or change * rate[0] <= CAUTION * tolerance * (1.0 - rate[0]):
             break
         if iterations >= MAX_ITERATIONS or not change < 1e12:
             return -1
@@ -90,7 +100,7 @@ def solve_sparse(
         for phase in range(3):
             at = maps.terminals[i, phase]
             V[i, phase] = complex(right[2 * at], right[2 * at + 1]) * back if at >= 0 else maps.fixed[i, phase]
-            size += abs(V[i, phase])
+            size += abs(V[i, phase].real) + abs(V[i, phase].imag)
         if maps.terminals[i, 1] == COPY:
             V[i, 1], V[i, 2] = V[i, 0] * A120.conjugate(), V[i, 0] * A120
     return iterations if np.isfinite(size) else -1

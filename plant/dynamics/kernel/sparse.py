@@ -1,4 +1,4 @@
-"""The network of a large feeder in the inner loop, compiled: its factors, and where branches and inverters are."""
+"""A network by sparse factors in the inner loop, compiled: the factors, and where branches and inverters are."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COPY = -2
 
 
 class SparseMaps(NamedTuple):
-    """The network of a large feeder for the inner loop.
+    """A network by sparse factors for the inner loop.
 
     Unknowns are node voltages, [Re V_1, Im V_1, Re V_2, ...].
     """
@@ -43,7 +43,10 @@ class SparseMaps(NamedTuple):
     scratch: Real
     """Room for the solution and its right-hand side."""
     increments: Real
-    """How the branch voltages changed from one solution to the next (V): the last but one, the last; 2 x 2 m."""
+    """How the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last."""
+    rate: Real
+    """Part of an iteration's change that the next one has, when last seen, 1: unknown; and how much it can grow by a
+    change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
 
 
 def no_maps() -> SparseMaps:
@@ -51,7 +54,7 @@ def no_maps() -> SparseMaps:
     nowhere, values = np.zeros(0, np.int64), np.zeros(0)
     terminals, fixed = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128)
     none = np.zeros(0, np.complex128)
-    held, increments = np.zeros(0, np.bool_), np.zeros((2, 0))
+    held, increments = np.zeros(0, np.bool_), np.zeros((4, 0))
     return SparseMaps(
         no_factors(),
         values,
@@ -65,6 +68,7 @@ def no_maps() -> SparseMaps:
         held,
         values,
         increments,
+        values,
     )
 
 
@@ -136,14 +140,16 @@ def draw_remainders(
 
 @compiled
 def extrapolate(maps: SparseMaps, x: Real) -> None:
-    """Guess the next solution x (V): predictor and corrector alternate, so it changes as it did two solutions ago."""
-    for i in range(maps.increments.shape[1]):
-        x[i] += maps.increments[0, i]
+    """Guess the next solution x (V): predictor and corrector alternate, so changes follow those two solutions ago."""
+    increments = maps.increments
+    for i in range(increments.shape[1]):
+        x[i] += 2.0 * increments[2, i] - increments[0, i]
 
 
 @compiled
 def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
     """Note how a solution x differs from the one before, x_0 (V)."""
-    for i in range(maps.increments.shape[1]):
-        maps.increments[0, i] = maps.increments[1, i]
-        maps.increments[1, i] = x[i] - x_0[i]
+    increments = maps.increments
+    for i in range(increments.shape[1]):
+        increments[0, i], increments[1, i], increments[2, i] = increments[1, i], increments[2, i], increments[3, i]
+        increments[3, i] = x[i] - x_0[i]

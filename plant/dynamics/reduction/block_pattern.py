@@ -54,9 +54,19 @@ class BlockPattern:
         both = (self.first >= 0) & (self.second >= 0)
         self._across = np.where(both, self._entry(self.first, self.second), -1)
 
-    def matrix(self, A: Complex, B: Complex) -> BlockFactors:
-        """Return V -> Y V + C (A C' V + B C' V^*), to be factored in place; A and B in S, one for each branch."""
+    def matrix(self, A: Complex, B: Complex, y: Complex | None = None) -> BlockFactors:
+        """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place.
+
+        Parameters
+        ----------
+        A, B
+            Of each branch (S).
+        y
+            Of each node (S).
+        """
         f = self._Y._replace(D=self._Y.D.copy(), L=self._Y.L.copy(), U=self._Y.U.copy())
+        if y is not None:
+            f.D[:] += np.column_stack([y.real, -y.imag, y.imag, y.real])
         add_tangent(f, self.first, self.second, self._across, self.a_first, self.a_second, A, B)
         return f
 

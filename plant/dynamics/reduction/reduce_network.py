@@ -1,4 +1,4 @@
-"""The form in which a switch state is solved: dense matrices for a small network, sparse factors for a large one."""
+"""The form in which a switch state is solved: sparse factors, or dense matrices where few branches have a load."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from plant.dynamics.reduction.sparse_reduction import SparseReduction
 
 Reduction = DenseReduction | SparseReduction
 
-MOST_DENSE = 300
+MOST_DENSE = 30
 """Load branches up to which dense matrices are faster: their cost grows with the square of it."""
 
 

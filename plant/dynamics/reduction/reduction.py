@@ -1,4 +1,4 @@
-r"""The network in the form of the inner loop: small dense matrices, made once per switch state.
+r"""A network of few load branches in the form of the inner loop: dense matrices, made once per switch state.
 
 With the filters' admittances in Y, the network seen from the load branches (voltages V_b, currents I_b)
 and from the inverter terminals (voltages V_G, injections J) is

@@ -1,4 +1,4 @@
-"""A switch state of a large network: its admittances stay sparse, and are factored with the loads' tangent."""
+"""A switch state by sparse admittances, factored with the tangent of the loads."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from plant.dynamics.island_newton import TOLERANCE, solve_island
 from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
 from plant.dynamics.kernel.sparse import COPY, SparseMaps
 from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
-from plant.dynamics.reduction.elimination import eliminated
+from plant.dynamics.reduction.block_pattern import BlockPattern
+from plant.dynamics.reduction.kept_network import kept_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 from plant.dynamics.switch_state import SwitchState
 
@@ -29,34 +29,29 @@ class SparseReduction(SwitchState):
 
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
         super().__init__(circuit, y_f, forming, online)
-        rows, by_node = self.Y[self.unknown], self.C.tocsr()
-        self._whole, Y_S, C = rows[:, self.unknown], rows[:, circuit.sources], by_node[self.unknown]
-        needed = (np.diff(C.indptr) > 0) | (np.diff(Y_S.indptr) > 0)
-        at = self.place[circuit.terminals]
-        needed[at[at >= 0]] = True
-        kept, Y = eliminated(self._whole, needed)
-        order = elimination_order(Y, C[kept].tocsc())
-        kept, self._Y = kept[order], Y[order][:, order].tocsc()
-        self._label = self.label[self.unknown[kept]]
-        self._Y_S, self._C, self._C_S = Y_S[kept].tocsc(), C[kept].tocsc(), by_node[circuit.sources].tocsc()
-        self._Y_S_whole, self._C_whole = Y_S, C
-        self._pattern = BlockPattern(self._Y, self._C)
-        self._lu: SuperLU | None = None
-        place = np.full(circuit.Y.shape[0], -1, np.int64)
-        place[self.unknown[kept]] = np.arange(kept.size)
-        self._at, self._whole_at = (np.where(circuit.copies, COPY, of[circuit.terminals]) for of in (place, self.place))
+        self._kept = kept = kept_network(circuit, self.unknown, self.branches, self.C, self.to_ground)
+        self._at, self._whole_at = (
+            np.where(circuit.copies, COPY, of[circuit.terminals]) for of in (kept.place, self.place)
+        )
         self._feeds = np.zeros(len(circuit.terminals), bool)
         self._feeds[self.feeding % max(self._feeds.size, 1)] = True
+        self._filters = np.zeros(kept.nodes.size, complex)
+        joined = (self._at >= 0) & self.online[:, None]
+        np.add.at(self._filters, self._at[joined], np.broadcast_to(np.asarray(y_f)[:, None], joined.shape)[joined])
+        self._Y = (kept.Y + sp.diags_array(self._filters)).tocsc()
+        self._label = self.label[kept.nodes]
+        self._lu: SuperLU | None = None
 
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Return the inner loop's arrays; see `DenseReduction.linearise`."""
         net = self.at_tangent(V_b, theta)
-        from_sources = self._C_S.T @ source_voltage
+        kept = self._kept
+        from_sources = kept.C_S.T @ source_voltage
         drawn = net.i_c + net.A * from_sources + net.B * np.conj(from_sources)
-        constant = -(self._Y_S @ source_voltage) - self._C @ drawn
+        constant = -(kept.Y_S @ source_voltage) - kept.C @ drawn
         if not constant.size:
             return self._without_unknowns(net, from_sources, source_voltage)
-        pattern, matrix = self._pattern, self._pattern.matrix(net.A, net.B)
+        pattern, matrix = kept.pattern, kept.pattern.matrix(net.A, net.B, self._filters)
         factorise_blocks(matrix)
         return net._replace(
             sparse=SparseMaps(
@@ -71,7 +66,8 @@ class SparseReduction(SwitchState):
                 fixed=self._held_voltages(source_voltage),
                 feeds=self._feeds,
                 scratch=np.empty(4 * constant.size),
-                increments=np.zeros((2, 2 * self._C.shape[1])),
+                increments=np.zeros((4, 2 * V_b.size)),
+                rate=np.array([1.0, 1.0 / np.min(np.abs(V_b), initial=np.inf)]),
             ),
         )
 
@@ -90,15 +86,15 @@ class SparseReduction(SwitchState):
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
         """Return branch voltages by Newton's method; see `DenseReduction.solve_islands`."""
-        V_b, failed = guess.copy(), []
-        from_sources = self._C_S.T @ source_voltage
-        right = self._injected(J, self._at, self._Y.shape[0]) - self._Y_S @ source_voltage
+        V_b, failed, C = guess.copy(), [], self._kept.C
+        from_sources = self._kept.C_S.T @ source_voltage
+        right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
         nominal = self._node_guess(guess, from_sources)
         for k in np.flatnonzero(self.live).tolist():
             nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
             island = SparseIsland(
                 self._Y[nodes][:, nodes].tocsc(),
-                self._C[nodes][:, own].tocsc(),
+                C[nodes][:, own].tocsc(),
                 self.loads.of(own),
                 from_sources[own],
                 right[nodes],
@@ -107,14 +103,15 @@ class SparseReduction(SwitchState):
             if solution is None:
                 failed.append(k)
             else:
-                V_b[own] = self._C[nodes][:, own].T @ solution + from_sources[own]
+                V_b[own] = C[nodes][:, own].T @ solution + from_sources[own]
         return V_b, tuple(failed)
 
     def _node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
         """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
         A, _ = self.loads.tangent(V_b)
-        Y = (self._Y + self._C @ sp.diags_array(A) @ self._C.T).tocsc()
-        constant = -self._C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
+        C = self._kept.C
+        Y = (self._Y + C @ sp.diags_array(A) @ C.T).tocsc()
+        constant = -C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
@@ -126,9 +123,9 @@ class SparseReduction(SwitchState):
         V = np.zeros(self.circuit.Y.shape[0], complex)
         if self.unknown.size:
             if self._lu is None:
-                self._lu = splu(sp.csc_matrix(self._whole))
+                self._lu = splu(sp.csc_matrix(self.Y[self.unknown][:, self.unknown]))
             right = self._injected(J, self._whole_at, self.unknown.size)
-            V[self.unknown] = self._lu.solve(right - self._Y_S_whole @ source_voltage - self._C_whole @ I_b)
+            V[self.unknown] = self._lu.solve(right - self._kept.Y_S_whole @ source_voltage - self._kept.C_whole @ I_b)
         V[self.circuit.sources] = source_voltage
         return V
 

@@ -21,7 +21,7 @@ from scipy.stats import binomtest
 from plant.build import build_plant
 from plant.dynamics import Circuit
 from plant.dynamics.live_network import LiveNetwork
-from plant.dynamics.reduction.reduction import DenseReduction
+from plant.dynamics.reduction.sparse_reduction import SparseReduction
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
@@ -215,7 +215,7 @@ def test_a_copied_plant_factors_no_network_anew(monkeypatch: pytest.MonkeyPatch)
 
         return counting
 
-    monkeypatch.setattr(DenseReduction, "__init__", count(factored, DenseReduction.__init__))
+    monkeypatch.setattr(SparseReduction, "__init__", count(factored, SparseReduction.__init__))
     monkeypatch.setattr(LiveNetwork, "reduced", count(asked, LiveNetwork.reduced))
     switchings = len(config.settings.events)
     for _ in range(2):
