@@ -18,6 +18,7 @@ from plant.dynamics.kernel.step import FAILURES, run_steps
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduction.reduced import Complex, Real
+from plant.dynamics.unsettled_island import unsettled_island
 from plant.plant_config import Method
 
 
@@ -131,8 +132,7 @@ class Dynamics:
             if what == 2:
                 islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
             elif solution == renewed:  # just renewed, but not solved: limited currents, or rounding at the largest load
-                limited = network.reduction.inverter_island[self.inverters.limiting]
-                islands = set(limited.tolist()) or set(np.flatnonzero(network.reduction.live).tolist())
+                islands = {unsettled_island(network.net, self.arrays(), network.x, self._tolerance)}
             else:
                 try:
                     network.renew()

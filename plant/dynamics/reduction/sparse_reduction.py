@@ -89,7 +89,7 @@ class SparseReduction(SwitchState):
         V_b, failed, C = guess.copy(), [], self._kept.C
         from_sources = self._kept.C_S.T @ source_voltage
         right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
-        nominal = self._node_guess(guess, from_sources)
+        beginning = self._node_guess(guess, from_sources, right)
         for k in np.flatnonzero(self.live).tolist():
             nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
             island = SparseIsland(
@@ -99,19 +99,19 @@ class SparseReduction(SwitchState):
                 from_sources[own],
                 right[nodes],
             )
-            solution = solve_island(island, nominal[nodes]) if nodes.size else np.zeros(0, complex)
+            solution = solve_island(island, beginning[nodes]) if nodes.size else np.zeros(0, complex)
             if solution is None:
                 failed.append(k)
             else:
                 V_b[own] = C[nodes][:, own].T @ solution + from_sources[own]
         return V_b, tuple(failed)
 
-    def _node_guess(self, V_b: Complex, from_sources: Complex) -> Complex:
+    def _node_guess(self, V_b: Complex, from_sources: Complex, right: Complex) -> Complex:
         """Return node voltages (V) that go with the loads' currents at these branch voltages (V)."""
         A, _ = self.loads.tangent(V_b)
         C = self._kept.C
         Y = (self._Y + C @ sp.diags_array(A) @ C.T).tocsc()
-        constant = -C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
+        constant = right - C @ (self.loads.currents(V_b) - A * V_b + A * from_sources)
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
