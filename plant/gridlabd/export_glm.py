@@ -7,7 +7,6 @@ from collections import Counter
 from pathlib import Path
 
 from plant.equipment import Feeder, Regulator
-from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder import Plant
 from plant.gridlabd.glm import START, read_table, write_glm
 from plant.gridlabd.glm_block import TableRow
@@ -57,10 +56,8 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
     """
     problems = unrepresentable(feeder)
     for row in feeder.inverters:
-        own = feeder.parameters_of(row, settings.gfm, settings.gfl)
-        if isinstance(own, GfmParameters):
-            for key, value in beyond_gridlabd(own).items():
-                problems.append(f"{row.name} has {key} = {value}, which no GFM of GridLAB-D has; leave it out")
+        for key, value in beyond_gridlabd(feeder.parameters_of(row, settings.gfm, settings.gfl)).items():
+            problems.append(f"{row.name} has {key} = {value}, which no {row.kind} of GridLAB-D has; leave it out")
     if problems:
         raise FeederError(feeder.name, tuple(problems))
     with tempfile.TemporaryDirectory() as name:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from plant.equipment import Feeder
 from plant.equipment.inverter_parameters import GfmParameters
+from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.glm_inverters import node_of
 from plant.gridlabd.glm_network import F_NOM
 
@@ -46,10 +47,20 @@ def unrepresentable(feeder: Feeder) -> list[str]:
     return problems
 
 
-def beyond_gridlabd(own: GfmParameters) -> dict[str, str]:
-    """Return, by their keys, the values that make a GFM another than that of GridLAB-D."""
-    found = {} if own.model == "gridlabd" else {"model": f'"{own.model}"'}
-    return found if own.voltage_control else {**found, "voltage_control": "false"}
+def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
+    """Return, by their keys in a file, the values that no inverter of GridLAB-D has.
+
+    Every other parameter is written by `glm_inverters`, or bounds set-points, which is done before GridLAB-D gets them.
+    """
+    found: dict[str, str] = {}
+    if isinstance(own, GfmParameters):
+        if own.model != "gridlabd":
+            found["model"] = f'"{own.model}"'
+        if not own.voltage_control:
+            found["voltage_control"] = "false"
+        if own.V_lim != GfmParameters().V_lim:  # fixed in GridLAB-D
+            found["V_lim_pu"] = f"{own.V_lim:g}"
+    return found
 
 
 def _names(feeder: Feeder) -> Iterator[tuple[str, str, str]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from plant.equipment import Feeder
-from plant.equipment.inverter_parameters import GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
 from scenarios.schema.scenario_errors import Problems
@@ -58,14 +58,10 @@ def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problem
 
 def _parameters_beyond(name: str, own: InverterParameters) -> Iterator[tuple[str, str]]:
     """Yield the key and a sentence for every parameter of one inverter that GridLAB-D does not take."""
-    if isinstance(own, GfmParameters):
-        for key, value in beyond_gridlabd(own).items():
-            yield f"plant.gfm.{key}", f"GridLAB-D has no such GFM, got {value} at {name}; leave it out"
-        default = GfmParameters().V_lim
-        if own.V_lim != default:
-            text = f"GridLAB-D has no such bound, got {own.V_lim:g} pu at {name}; leave it at {default:g}"
-            yield "plant.gfm.V_lim_pu", text
-    elif own.P_set_lim > own.S_max:
+    kind = "gfm" if isinstance(own, GfmParameters) else "gfl"
+    for key, value in beyond_gridlabd(own).items():
+        yield f"plant.{kind}.{key}", f"GridLAB-D has no such {kind.upper()}, got {value} at {name}; leave it out"
+    if isinstance(own, GflParameters) and own.P_set_lim > own.S_max:
         yield (
             "plant.gfl.P_set_lim_pu",
             f"GridLAB-D clips P_set at S_max_pu = {own.S_max:g} pu, got {own.P_set_lim:g} pu at {name}; "
