@@ -90,7 +90,7 @@ class Connectivity:
         ----------
         closed : Collection[str]
             Names of the closed switches.
-        forming : Iterable[str]
+        forming : Iterable[InverterRow]
             The connected grid-forming inverters.
         """
         alive, whole = set[Node](), list[str]()

@@ -68,7 +68,6 @@ class PowerFlowModel:
     def solve(self) -> dict[str, Any]:
         """Solve the power flow at the model's first moment."""
         result: dict[str, Any] = {
-            "version": str(self._module.__version__),
             "objects": self._objects(),
             "has_powerflow": self._gridlabd.get_global("powerflow::nominal_frequency") != "",
         }
@@ -90,7 +89,6 @@ class PowerFlowModel:
             ("kmlfile", ""),
         ):
             self._gridlabd.set_global(name, value)
-        result["time"] = self._gridlabd.get_global("starttime")
         self._keep_quiet()
         if result["method"] != "NR":
             self._give_a_swing()
@@ -164,8 +162,6 @@ class PowerFlowModel:
             "from": branch.from_,
             "to": branch.to,
             "phases": branch.original_phases | branch.phases,
-            "kind": branch.kind,
-            "ratio": branch.ratio,
             "open": bool(branch.status) and ctypes.c_uint.from_address(branch.status).value == 0,
         }
         for key in ("Y_from", "Y_to", "YS_from", "YS_to"):
@@ -177,7 +173,6 @@ class PowerFlowModel:
 
     def _takes(self, name: str, kind: str) -> dict[str, Any]:
         """Return the powers, currents and admittances of one object itself."""
-        head = self._core.head(name)
         delta = bool(self._core.bits(name, "phases") & PHASE_D)
         takes: dict[str, dict[str, list[list[float]]]] = {}
         for letter, word in KINDS.items():
@@ -194,7 +189,6 @@ class PowerFlowModel:
                 _put(takes[letter], AROUND, [self._inverse(name, f"constant_impedance_{ends}") for ends in AROUND])
                 _put(takes[letter], WYE, [self._inverse(name, f"constant_impedance_{phase}N") for phase in WYE])
         row: dict[str, Any] = {"name": name, "class": kind, "takes": takes}
-        row["parent"] = ObjectHead.from_address(head.parent).name.decode() if head.parent else ""
         if kind == "capacitor":
             row["connected_delta"] = bool(self._core.bits(name, "phases_connected") & PHASE_D) and not delta
             row["connected"] = self._core.bits(name, "phases_connected") & 0x07

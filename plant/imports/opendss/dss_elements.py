@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import NODES, Bus, Source, Switch
+from plant.equipment.connectivity import Node
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.imports.opendss.dss_engine import DssEngine
 from plant.tables.feeder_columns import SOURCE_VOLTAGE
@@ -45,7 +46,7 @@ class DssElements:
         self.switches: list[Switch] = []
         self.source: list[Source] = []
         self.used_switches: set[str] = set()
-        self._places = [str(name).lower().rpartition(".") for name in engine.circuit.YNodeOrder]
+        self._node_order = nodes_of(engine.circuit)
         self._added: dict[str, tuple[str, str]] = {}
         """Buses that are not in the script: their phases, and the bus whose voltage and place they have."""
         self._own_V_nom: dict[str, float] = {}
@@ -164,7 +165,7 @@ class DssElements:
         self._engine.circuit.SetActiveElement(name)
         return self._engine.circuit.ActiveCktElement
 
-    def _append(self, name: str, nodes: list[tuple[str, str]], Y: Complex) -> None:
+    def _append(self, name: str, nodes: list[Node], Y: Complex) -> None:
         """Keep an element between the nodes that are not ground; nodes that stand twice are one."""
         if Y.shape[0] != len(nodes) or not np.isfinite(Y).all():
             self._problems.append(f"{name}: the engine gives no admittance matrix for it; leave it out or change it")
@@ -177,7 +178,7 @@ class DssElements:
         rows = tuple(tuple(complex(value) for value in row) for row in own)
         self.rows.append(LinearElement(name=name, nodes=tuple(distinct), Y=rows))
 
-    def _nodes(self, element: Any) -> list[tuple[str, str]]:
+    def _nodes(self, element: Any) -> list[Node]:
         """Nodes of an element in the order of its matrix; ground is a bus and no letter.
 
         They need not be at the bus of their terminal: the series winding of an autotransformer ends at another bus.
@@ -186,8 +187,7 @@ class DssElements:
         buses = [str(name).partition(".")[0].lower() for name in element.BusNames]
         nodes = []
         for k, reference in enumerate(element.NodeRef):
-            bus, _, number = self._places[reference - 1] if reference > 0 else (buses[k // per], "", "0")
-            nodes.append((bus, letter_of(int(number))))
+            nodes.append(self._node_order[reference - 1] if reference > 0 else (buses[k // per], ""))
         return nodes
 
     def _add_bus(self, name: str, like: str, letters: str) -> str:
@@ -208,6 +208,16 @@ class DssElements:
         self._engine.circuit.SetActiveBus(bus)
         active = self._engine.circuit.ActiveBus
         return (float(active.x), float(active.y)) if active.Coorddefined else (0.0, 0.0)
+
+
+def numbered_nodes(circuit: Any) -> list[tuple[str, int]]:
+    """Return bus and number of every node, in the order of the engine's matrix."""
+    return [(bus, int(number)) for bus, _, number in (str(name).lower().rpartition(".") for name in circuit.YNodeOrder)]
+
+
+def nodes_of(circuit: Any) -> list[Node]:
+    """Return every node as ours, in the order of the engine's matrix."""
+    return [(bus, letter_of(number)) for bus, number in numbered_nodes(circuit)]
 
 
 def letter_of(node: int) -> str:

@@ -25,6 +25,7 @@ FEW = 3
 """How many are told of a script that makes no circuit."""
 
 SNAPSHOT = 0
+"""The engine's number of the mode that solves one moment."""
 
 
 class DssEngine:

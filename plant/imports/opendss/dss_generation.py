@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.equipment.imported_equipment import LoadPart
-from plant.imports.opendss.dss_elements import complex_of, letter_of
+from plant.imports.opendss.dss_branches import branches_of
+from plant.imports.opendss.dss_elements import complex_of
 from plant.imports.opendss.dss_engine import DssEngine
 
 GENERATION = frozenset({"generator", "pvsystem", "storage"})
@@ -20,17 +19,6 @@ IMPEDANCE = 2
 
 CLOSE = 1e-6
 """Largest difference between the engine's current and that of the parts, beside the largest current."""
-
-
-class Branches(NamedTuple):
-    """The phases of a generator between its nodes."""
-
-    ends: list[tuple[int, int]]
-    """Conductors of each phase."""
-    V: NDArray[np.complex128]
-    """Voltage across each (V)."""
-    V_nom: float
-    """Nominal voltage across each (V)."""
 
 
 def read_generation(engine: DssEngine, name: str, notes: list[str], problems: list[str]) -> list[LoadPart]:
@@ -46,15 +34,17 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
     if abs(total) < 1.0:
         notes.append(f"{name}: delivers nothing; left out")
         return []
-    branches = _branches(element, V)
-    model = int(_property(element, "model") or 1)
+    is_delta = _property(element, "conn").lower().startswith(("d", "l"))
+    branches = branches_of(element, float(_property(element, "kv")), is_delta=is_delta)
+    across = np.array([V[start] - V[end] for start, end in branches.conductors])
+    constant = int(_property(element, "model") or 1) != IMPEDANCE
     V_min, V_max = (float(_property(element, key)) for key in ("vminpu", "vmaxpu"))
-    m = np.abs(branches.V) / branches.V_nom
+    m = np.abs(across) / branches.V_nom
     inside = (m > V_min) & (m <= V_max)
-    factor = m**2 if model == IMPEDANCE else np.where(inside, 1.0, (m / np.where(m <= V_min, V_min, V_max)) ** 2)
+    factor = np.where(inside, 1.0, (m / np.where(m <= V_min, V_min, V_max)) ** 2) if constant else m**2
     S = total / factor.sum()
     of_parts = np.zeros(current.size, complex)
-    for (start, end), delivered in zip(branches.ends, np.conj(S * factor / branches.V), strict=True):
+    for (start, end), delivered in zip(branches.conductors, np.conj(S * factor / across), strict=True):
         of_parts[start] -= delivered
         of_parts[end] += delivered
     if np.abs(of_parts - current).max() > CLOSE * np.abs(current).max():
@@ -63,45 +53,22 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
             f'control); leave it out (leave_out=["{name}"]) or put an inverter there'
         )
         return []
-    kind = "as an impedance" if model == IMPEDANCE else "constant"
     kW, kvar = (round(power / 1e3, 3) + 0.0 for power in (total.real, total.imag))
+    kind = "constant" if constant else "as an impedance"
     notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {kind}")
-    return _parts(name, element, branches, S, model, (V_min, V_max))
-
-
-def _parts(
-    name: str, element: Any, branches: Branches, S: complex, model: int, limits: tuple[float, float]
-) -> list[LoadPart]:
-    letters = [letter_of(node) for node in element.NodeOrder]
-    constant = model != IMPEDANCE
-    parts = []
-    for start, end in branches.ends:
-        pair = letters[start], letters[end]
-        if pair[0] == pair[1]:
-            continue  # both ends at one node, or at ground
-        parts.append(
-            LoadPart(
-                name=name,
-                bus=str(element.BusNames[0]).partition(".")[0].lower(),
-                ends=pair if pair[0] else (pair[1], pair[0]),
-                S=-S,
-                V_nom=branches.V_nom,
-                exponents=(0.0, 0.0) if constant else (2.0, 2.0),
-                V_min=limits[0] if constant else 0.0,
-                V_max=limits[1] if constant else 0.0,
-            )
+    return [
+        LoadPart(
+            name=name,
+            bus=branches.bus,
+            ends=ends,
+            S=-S,
+            V_nom=branches.V_nom,
+            exponents=(0.0, 0.0) if constant else (2.0, 2.0),
+            V_min=V_min if constant else 0.0,
+            V_max=V_max if constant else 0.0,
         )
-    return parts
-
-
-def _branches(element: Any, V: NDArray[np.complex128]) -> Branches:
-    phases, conductors = int(element.NumPhases), int(element.NumConductors)
-    kV = float(_property(element, "kv"))
-    if _property(element, "conn").lower().startswith(("d", "l")):
-        ends, V_nom = [(k, (k + 1) % conductors) for k in range(phases)], kV * 1e3
-    else:
-        ends, V_nom = [(k, phases) for k in range(phases)], kV * 1e3 / (sqrt(3.0) if phases in (2, 3) else 1.0)
-    return Branches(ends, np.array([V[start] - V[end] for start, end in ends]), V_nom)
+        for ends in branches.ends()
+    ]
 
 
 def _property(element: Any, key: str) -> str:

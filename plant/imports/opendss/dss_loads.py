@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 from plant.equipment.imported_equipment import LoadPart
-from plant.imports.opendss.dss_elements import letter_of
+from plant.imports.opendss.dss_branches import branches_of
 from plant.imports.opendss.dss_engine import DssEngine
 
 EXPONENTS = {1: (0.0, 0.0), 2: (2.0, 2.0), 3: (0.0, 2.0), 5: (1.0, 1.0)}
@@ -66,30 +65,19 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
 
 
 def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, problems: list[str]) -> list[LoadPart]:
-    phases = int(element.NumPhases)
-    nodes = [letter_of(node) for node in element.NodeOrder]
-    bus = str(element.BusNames[0]).partition(".")[0].lower()
-    kV, per = float(load.kV), int(element.NumConductors)
-    if load.IsDelta:
-        V_nom = kV * 1e3
-        ends = [(nodes[k], nodes[(k + 1) % per]) for k in range(phases)]
-    else:
-        V_nom = kV * 1e3 / (sqrt(3.0) if phases in (2, 3) else 1.0)
-        ends = [(nodes[k], nodes[phases]) for k in range(phases)]
-    shares = _shares(element, name, load, phases, scale, impedances, problems)
+    branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
+    shares = _shares(element, name, load, int(element.NumPhases), scale, impedances, problems)
     found = []
-    for pair in ends:
-        if pair[0] == pair[1]:
-            continue  # both ends at one node, or at ground
+    for ends in branches.ends():
         for share in shares:
             limited = share.exponents != (2.0, 2.0) or share.V_off > 0.0
             found.append(
                 LoadPart(
                     name=name,
-                    bus=bus,
-                    ends=pair if pair[0] else (pair[1], pair[0]),
+                    bus=branches.bus,
+                    ends=ends,
                     S=share.S,
-                    V_nom=V_nom,
+                    V_nom=branches.V_nom,
                     exponents=share.exponents,
                     V_low=share.V_low if limited else 0.0,
                     V_min=float(load.Vminpu) if limited and float(load.Vminpu) > share.V_low else 0.0,

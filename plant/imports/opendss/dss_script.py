@@ -44,7 +44,7 @@ COORDINATES = frozenset({"buscoords", "latlongcoords"})
 """Commands that name a file without saying so."""
 
 METERS = frozenset({"energymeter", "monitor", "sensor"})
-"""Classes that measure."""
+"""Classes that measure: they have no part in the network."""
 
 ASIDE = METERS | {"loadshape", "tshape", "priceshape", "spectrum", "tcc_curve"}
 """Classes that a snapshot does without: one that fails is a note."""

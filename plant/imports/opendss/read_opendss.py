@@ -19,17 +19,15 @@ from plant.equipment import NODES, Feeder
 from plant.equipment.imported_equipment import LoadPart
 from plant.imports.import_checks import SHOWN, left_out_by, number_of, refuse_if, refuse_unsolvable, without_unfed
 from plant.imports.import_comparison import MATCH, difference, loads_without_ground
-from plant.imports.opendss.dss_elements import DssElements, complex_of, letter_of
+from plant.imports.opendss.dss_elements import DssElements, complex_of, nodes_of, numbered_nodes
 from plant.imports.opendss.dss_engine import DssEngine
 from plant.imports.opendss.dss_generation import GENERATION, read_generation
 from plant.imports.opendss.dss_loads import read_loads
+from plant.imports.opendss.dss_script import METERS
 from wire.schema.suggestion import suggestion
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""
-
-WATCHING = frozenset({"energymeter", "monitor", "sensor"})
-"""Classes that measure: they have no part in the network."""
 
 PROTECTION = frozenset({"fuse", "recloser", "relay", "swtcontrol"})
 """Classes that open lines by themselves: the lines are imported and stay as they are."""
@@ -97,7 +95,7 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
             )
         elif kind in PROTECTION:
             notes.append(f"{name}: what it controls stays as it is")
-        elif kind not in CONTROLS | WATCHING | {"load"}:
+        elif kind not in CONTROLS | METERS | {"load"}:
             problems.append(f'{name}: elements of class {kind} are not supported; leave it out (leave_out=["{name}"])')
     load_parts = [*read_loads(engine, left_out, notes, problems), *generated]
     lines = [name for name, kind in there if kind == "line"]
@@ -128,19 +126,18 @@ def _read(path: Path, scratch: Path, f_nom: float | None, leave_out: Sequence[st
 
 def _compared(path: Path, feeder: Feeder, circuit: Any) -> Feeder:
     """Return the feeder with a note if our power flow has not the engine's voltages; refuse it if it has none."""
-    places = [str(name).lower().rpartition(".") for name in circuit.YNodeOrder]
-    nodes = [(bus, letter_of(int(number))) for bus, _, number in places]
-    theirs = dict(zip(nodes, complex_of(circuit.YNodeVarray).tolist(), strict=True))
+    theirs = dict(zip(nodes_of(circuit), complex_of(circuit.YNodeVarray).tolist(), strict=True))
+    solved = True
     try:
         worst, (bus, letter), two_solutions = difference(feeder, theirs)
+        if worst <= MATCH:
+            return feeder
         node = f"{bus}.{number_of(letter)}"
         told = f"{path.name}: our power flow differs from the engine's by {worst:.2g} pu, most at {node}"
         if two_solutions:
             told += "; both are solutions, as loads allow whose law jumps at Vminpu or Vmaxpu (models 3 and 4)"
     except ArithmeticError as error:
-        worst, told = 1.0, f"{path.name}: the engine solves it, our {error}"
-    if worst <= MATCH:
-        return feeder
+        solved, told = False, f"{path.name}: the engine solves it, our {error}"
     alone = loads_without_ground(feeder)
     if alone:
         more = f" and {len(alone) - SHOWN} more" if len(alone) > SHOWN else ""
@@ -148,7 +145,7 @@ def _compared(path: Path, feeder: Feeder, circuit: Any) -> Feeder:
             f"{', '.join(alone[:SHOWN])}{more}: constant power to ground behind a delta winding, where nothing else is "
             "grounded: the voltage to ground has no single solution; make it conn=delta or model=2, or ground a winding"
         )
-    if alone or worst == 1.0:
+    if alone or not solved:
         refuse_if(path, [told])
     return msgspec.structs.replace(feeder, notes=(*feeder.notes, told))
 
@@ -166,6 +163,5 @@ def _elements(circuit: Any) -> list[tuple[str, str]]:
 
 def _too_many_nodes(circuit: Any) -> list[str]:
     """Return a problem for each bus with more nodes than we have letters."""
-    nodes = [str(name).partition(".") for name in circuit.YNodeOrder]
-    buses = dict.fromkeys(bus.lower() for bus, _, number in nodes if int(number) > len(NODES))
+    buses = dict.fromkeys(bus for bus, number in numbered_nodes(circuit) if number > len(NODES))
     return [f"bus {bus}: nodes above {len(NODES)} are not supported; give its nodes lower numbers" for bus in buses]
