@@ -128,6 +128,14 @@ def test_nominal_angles_are_those_of_the_nominal_voltages() -> None:
     np.testing.assert_allclose(loads.voltages(network.nominal), loads.V_nom * np.exp(1j * loads.phi0), rtol=1e-12)
 
 
+def test_loads_of_an_imported_feeder_have_the_angles_without_load() -> None:
+    """phi0 of a branch is the angle of the voltage across it without load, which transformers of any kind turn."""
+    network = Network(read_feeder("ieee34"))
+    loads = network.loads()
+
+    np.testing.assert_allclose(loads.phi0, np.angle(loads.voltages(network.nominal)), rtol=1e-12)
+
+
 def test_dead_loads_draw_nothing() -> None:
     """Without voltage a load draws no current, instead of an infinite one."""
     loads = one_bus(load("P", "Y", S, S, S), load("I", "D", S, S, S)).loads()

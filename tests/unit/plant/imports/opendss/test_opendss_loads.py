@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from plant.imports.opendss import read_opendss
+from plant.network import Network, solve_power_flow
 from tests.unit.plant.imports.opendss.opendss_scripts import CONNECTIONS, LOAD_CASES, MODELS, RANGES
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 
@@ -62,12 +64,16 @@ def test_fixed_reactive_power_is_not_scaled(tmp_path: Path, model: int) -> None:
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load, "Set LoadMult=0.6")) < TOLERANCE
 
 
-@pytest.mark.parametrize("cut_off", [0.6, 0.98, 1.005])
-def test_a_zip_load_drops_out_at_its_cut_off_voltage(tmp_path: Path, cut_off: float) -> None:
+@pytest.mark.parametrize(("cut_off", "part"), [(0.98, 1.0), (1.0195, 0.5), (1.05, 0.0)])
+def test_a_zip_load_drops_out_at_its_cut_off_voltage(tmp_path: Path, cut_off: float, part: float) -> None:
     """A ZIP load is off below its cut-off voltage, on above it, and partly on close to it."""
-    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=90 kvar=30 model=8 zipv=(0.3 0.5 0.2 0.1 0.6 0.3 {cut_off})"
+    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=9 kvar=3 model=8 zipv=(0.3 0.5 0.2 0.1 0.6 0.3 {cut_off})"
+    path = write(tmp_path, LINE, STEP_DOWN, load)
+    network = Network(read_opendss(path))
+    taken = solve_power_flow(network, network.closed0).S_loads.real
 
-    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
+    assert taken == pytest.approx(part * 9.3e3, abs=2.5e3)
+    assert largest_difference(path) < TOLERANCE
 
 
 def test_the_admittance_model_of_loads_is_an_impedance(tmp_path: Path) -> None:
