@@ -183,7 +183,8 @@ class Agent:
         if state.quiet:
             return  # its law sends nothing: its last state stays valid
         self._heard[state.sender] = state
-        self._weights.arrived(state.sender)
+        if self._weights.ages_count:
+            self._weights.arrived(state.sender)
 
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
@@ -225,11 +226,10 @@ class Agent:
             self._saturation_P.begin()
             self._saturation_V.begin()
             self._law_runs = False
-        counted = self._counted(measurement.t, neighbours, ages)  # on hold too, to learn the usual ages of links
+        around = self._around(measurement.t, neighbours, ages)  # on hold too, to learn the usual ages of links
         shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
-            around = [neighbour_of(self._known[name], self._heard[name], *of) for name, *of in counted]
             try:
                 if not self._law_runs:
                     start_law(self._law, own)
@@ -306,21 +306,22 @@ class Agent:
             V_saturated,
         )
 
-    def _counted(
-        self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None
-    ) -> list[tuple[str, float, float]]:
-        """Return each neighbour that counts, with the age (s) and the weight of its last state."""
-        heard, islands = self._heard, self._islands
+    def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
+        """Return the neighbours that count, with the age (s) and the weight of their last states."""
+        heard, known, islands = self._heard, self._known, self._islands
         if self._detector is None and self._islands_from_switches and islands[0]:  # as `shares_island`, in one go
             here = [
-                name
+                state
                 for name in neighbours
                 if (state := heard.get(name)) is not None and (state.island in islands or not state.island)
             ]
         else:
-            here = [name for name in neighbours if self.shares_island(name)]
-        aged = {name: t - heard[name].t for name in here} if ages is None else {name: ages[name] for name in here}
-        return [(name, aged[name], weight) for name, weight in self._weights.at_tick(aged).items()]
+            here = [heard[name] for name in neighbours if self.shares_island(name)]
+        if ages is None and self._weights.all_count:
+            return [neighbour_of(known[state.sender], state, t - state.t, 1.0) for state in here]
+        aged = {state.sender: t - state.t if ages is None else ages[state.sender] for state in here}
+        weights = self._weights.at_tick(aged)
+        return [neighbour_of(known[name], heard[name], aged[name], weight) for name, weight in weights.items()]
 
     def _saturated_sides(self, measurement: Measurement, e: float) -> tuple[int, int]:
         """Return the saturated sides of P by (3), (7) and V by (4), (8), for the set-points that the plant holds."""

@@ -146,17 +146,19 @@ class AgentNode(PlantFollower):
     def _hear(self, message: State | Measurement, payload: bytes, at: float) -> None:
         """Use a message off the wire at this time (s of run time), unless an emulated link takes it."""
         if is_usable(self._links, message, payload, at, self.admission):
-            if type(message) is State:
-                self._agent.hear(message)
-            self.states.keep(message, at)
+            self._keep(message, at)
 
     def _hear_late(self, at: float) -> None:
         """Use the messages that the emulated links have delivered by now (s of run time)."""
         for message in arrived(self._links, at, self.rejects, self.admission):
             if isinstance(message, State | Measurement):
-                if isinstance(message, State):
-                    self._agent.hear(message)
-                self.states.keep(message, at)
+                self._keep(message, at)
+
+    def _keep(self, message: State | Measurement, at: float) -> None:
+        """Keep a usable message, which arrived at this time (s of run time)."""
+        if type(message) is State:
+            self._agent.hear(message)
+        self.states.keep(message, at)
 
     # ---------------------------------------------------------------- reports
 

@@ -54,6 +54,10 @@ class StalenessWeights:
     def __init__(self, options: DegradedCommunication) -> None:
         self._stale, self._T_age = options.stale, options.T_age
         self._max_age = options.max_age or inf
+        self.ages_count = self._stale != "hold"
+        """Whether a weight depends on when states arrived."""
+        self.all_count = not self.ages_count and self._max_age == inf
+        """Whether every state has the weight 1, whatever its age."""
         self._fresh: set[str] = set()
         """Neighbours with a new state since the last tick."""
         self._usual: dict[str, deque[float]] = {}
@@ -61,7 +65,7 @@ class StalenessWeights:
 
     def arrived(self, name: str) -> None:
         """Note that a newer state of a neighbour has arrived."""
-        if self._stale != "hold":
+        if self.ages_count:
             self._fresh.add(name)
 
     def forget(self, name: str) -> None:
@@ -78,7 +82,7 @@ class StalenessWeights:
             Age (s of run time) of each neighbour's last state.
         """
         most = self._max_age
-        if self._stale == "hold":
+        if not self.ages_count:
             return {name: 1.0 for name, age in ages.items() if age <= most}
         weights = {name: self._of(name, age) for name, age in ages.items() if age <= most}
         self._fresh.clear()

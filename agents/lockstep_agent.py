@@ -77,6 +77,7 @@ class LockstepAgent(AgentNode):
             self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
         self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
+        self._last_heard = self._barrier.last_heard
         self._pairwise = is_pairwise(config.control)
         self._roster: Prepare | None = None
         """The last roster with this process."""
@@ -100,6 +101,8 @@ class LockstepAgent(AgentNode):
         """In-neighbours on the roster of the last tick."""
         self._neighbours_of: dict[str, str] = {}
         """Roster of the last tick."""
+        self._present: tuple[int, dict[str, str], tuple[str, ...]] = -1, {}, ()
+        """Changes of the members by then, the roster, and the in-neighbours whose processes on it count."""
         self._ending = ""
         """Why the agent is about to close; empty otherwise."""
         self._reported = False
@@ -184,7 +187,7 @@ class LockstepAgent(AgentNode):
     # ---------------------------------------------------------------- messages of the plant
 
     def _used(self, message: AnyMessage, now: float) -> None:
-        self._barrier.heard(message.sender, message.seq, now)
+        self._last_heard[message.sender] = message.seq, now
 
     def _on_control(self, message: Prepare | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
@@ -310,19 +313,25 @@ class LockstepAgent(AgentNode):
         self._compute(now)
 
     def _on_state(self, message: State, payload: bytes, now: float) -> None:
-        name, seq = message.sender, message.seq
-        if self._tick is None or seq == self._tick:
+        name, seq, tick = message.sender, message.seq, self._tick
+        if tick is None or seq == tick:
             self._early[name] = message, payload
             return
-        if seq > self._tick:  # the others continue without this agent: a roster without it is on its way
+        if seq > tick:  # the others continue without this agent: a roster without it is on its way
             return
-        if seq != self._tick - 1:
-            raise RejectedError("stale", f"State({seq}) of {name} before tick {self._tick}")
+        if seq != tick - 1:
+            raise RejectedError("stale", f"State({seq}) of {name} before tick {tick}")
         self._barrier.came(name)
         if not message.quiet:  # no link carries what its law did not send
             self._hear(message, payload, message.t)
         if (self._grant is not None and self._barrier.is_open) or self._ending:
             self._compute(now)
+
+    def _keep(self, message: State | Measurement, at: float) -> None:
+        if type(message) is State:  # by its tick its age is known: nothing asks when it arrived
+            self._agent.hear(message)
+        else:
+            super()._keep(message, at)
 
     def _compute(self, now: float) -> None:
         """Compute and send the next tick, if no message is missing."""
@@ -355,11 +364,12 @@ class LockstepAgent(AgentNode):
             self._neighbours_of, self._neighbours = self._processes, self._roster_neighbours
         early, self._early = self._early, {}
         self._grant, self._tick = None, grant.seq + 1
-        needed, counts = f"State({grant.seq})", self.members.instance
-        awaited = {PLANT: f"Measurement({self._tick})"}
-        for name in self._neighbours:
-            if name not in early and counts(name) == self._processes.get(name):
-                awaited[name] = needed
+        if self._present[0] != self.members.changes or self._present[1] is not self._processes:
+            here = tuple(name for name in self._neighbours if self.members.instance(name) == self._processes.get(name))
+            self._present = self.members.changes, self._processes, here
+        awaited = {PLANT: f"Measurement({self._tick})"} | dict.fromkeys(self._present[2], f"State({grant.seq})")
+        for name in early:
+            awaited.pop(name, None)
         self._barrier.wait_for(awaited, now)
         for state, payload in early.values():
             if not state.quiet:

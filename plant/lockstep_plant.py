@@ -65,6 +65,7 @@ class LockstepPlant(PlantNode):
         self._joining: tuple[str, ...] = ()
         """Newcomers that the held tick waits for: they may appear although the run has begun."""
         self._barrier = TickBarrier(PLANT, config.deadline)
+        self._last_heard = self._barrier.last_heard
         self._states: dict[str, State] = {}
         for name in self._everyone:
             self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
@@ -180,7 +181,7 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- messages
 
     def _used(self, message: AnyMessage, now: float) -> None:
-        self._barrier.heard(message.sender, message.seq, now)
+        self._last_heard[message.sender] = message.seq, now
 
     def _on_state(self, state: State, payload: bytes, now: float) -> None:
         if self.phase != "ticking" or state.seq != self.tick or not self._barrier.awaits(state.sender):

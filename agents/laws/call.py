@@ -67,26 +67,34 @@ def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
     """Return a law's result within its limits; raise LawError if it is no decision."""
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
-    P_set, V_set = _number("P_set", result.P_set, own.t), _number("V_set", result.V_set, own.t)
+    P_set, V_set, shared, send = result.P_set, result.V_set, result.shared, result.send
+    if not (type(P_set) is type(V_set) is float and isfinite(P_set) and isfinite(V_set)):
+        P_set, V_set = _number("P_set", P_set, own.t), _number("V_set", V_set, own.t)
+    elif (
+        shared is NOTHING
+        and send is True
+        and law.P_set_min <= P_set <= law.P_set_max
+        and law.V_set_min <= V_set <= law.V_set_max
+    ):
+        return result
     return SetPoints(
         min(max(P_set, law.P_set_min), law.P_set_max),
         min(max(V_set, law.V_set_min), law.V_set_max),
-        NOTHING if result.shared is NOTHING else _checked(result.shared, own.t),
-        bool(result.send),
+        NOTHING if shared is NOTHING else _checked(shared, own.t),
+        bool(send),
     )
 
 
 def _number(name: str, value: Any, t: float) -> float:
-    if type(value) is not float or not isfinite(value):
-        if isinstance(value, (str, bytes)):
-            raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number")
-        try:
-            value = float(value)  # a whole number, or one of numpy's
-        except (TypeError, ValueError, OverflowError):
-            raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number") from None
-        if not isfinite(value):
-            raise LawError(f"step at t = {t:.6g} s returned {name} = {value}; it must be a finite number (pu)")
-    return float(value)
+    if isinstance(value, (str, bytes)):
+        raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number")
+    try:
+        number = float(value)  # a whole number, or one of numpy's
+    except (TypeError, ValueError, OverflowError):
+        raise LawError(f"step at t = {t:.6g} s returned {name} = {_shown(value)}; it must be a number") from None
+    if not isfinite(number):
+        raise LawError(f"step at t = {t:.6g} s returned {name} = {number}; it must be a finite number (pu)")
+    return number
 
 
 def _checked(shared: Any, t: float) -> Mapping[str, float]:

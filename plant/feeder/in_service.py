@@ -64,7 +64,7 @@ class InService:
 
     def has_tripped(self, i: int) -> bool:
         """Whether an inverter is off because it tripped."""
-        return bool(self._recovery.tripped[i])
+        return bool(self._recovery.tripped.item(i))
 
     @property
     def quiet(self) -> int:

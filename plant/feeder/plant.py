@@ -73,6 +73,8 @@ class Plant:
         self.inverters = tuple(unit.name for unit in network.inverters)
         self.tick = 0
         """k: the plant is at k T_c."""
+        self._t = 0.0
+        """Its time (s)."""
         self._row = {name: i for i, name in enumerate(self.inverters)}
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
@@ -86,6 +88,7 @@ class Plant:
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
         self._base = np.column_stack([self._P_rated, self._V_nom])
         """Bases of P_set (W) and V_set (V)."""
+        self._bases: list[tuple[float, float]] = list(map(tuple, self._base.tolist()))
         connected = [not unit.spare for unit in network.inverters]
         self._dynamics = Dynamics(
             self._circuits.of(self._switches.closed),
@@ -155,16 +158,18 @@ class Plant:
         A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell.
         A tripped inverter accepts none: it returns at no load.
         """
-        i, t = self._row[name], time_of(self.tick, self._T_c)
+        i, t = self._row[name], self._t
         if not (isfinite(P_set) and isfinite(V_set)):
             self._events += self._set_points.refused(name, t)
             return
         if self._in_service.has_tripped(i):
             return
-        P_rated, V_nom = self._base.item(i, 0), self._base.item(i, 1)
+        P_rated, V_nom = self._bases[i]
         P, V = self._dynamics.inverters.hold(i, P_set / P_rated, V_set / V_nom)
-        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * P_rated / 1e3)
-        self._events += self._set_points.held(name, t, "V_set", V_set, V * V_nom)
+        if events := self._set_points.held(name, t, "P_set", P_set / 1e3, P * P_rated / 1e3):
+            self._events += events
+        if events := self._set_points.held(name, t, "V_set", V_set, V * V_nom):
+            self._events += events
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias, from the next step on.
@@ -230,6 +235,7 @@ class Plant:
         if self._load_limits.any:
             self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
         self.tick += 1
+        self._t = time_of(self.tick, self._T_c)
 
     # ---------------------------------------------------------------- for the recorder
 

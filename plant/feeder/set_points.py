@@ -45,9 +45,13 @@ class SetPointLimits:
 
     def held(self, name: str, t: float, quantity: str, set_point: float, held: float) -> list[PlantEvent]:
         """Compare an inverter's set-point at t (s) with the held one (kW or V), apart from rounding."""
-        key, unit, distance = (name, quantity), _UNIT[quantity], abs(set_point - held)
+        distance = abs(set_point - held)
+        limited = distance > 1e-9 * abs(set_point)
+        if not (limited or self._spells):
+            return []
+        key, unit = (name, quantity), _UNIT[quantity]
         spell = self._spells.get(key)
-        if distance > 1e-9 * abs(set_point):
+        if limited:
             if spell is None:
                 self._spells[key] = _Spell(1, t, set_point, distance)
                 beyond = f"{name} gets {quantity} {set_point:g} {unit}, which is beyond its bound"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 
@@ -29,7 +28,7 @@ class TickBarrier:
     --------
     >>> barrier = TickBarrier("plant", 10.0)
     >>> barrier.wait_for({"inv2": "State(41)", "inv3": "State(41)"}, now=2.0)
-    >>> barrier.came("inv2"); barrier.heard("inv3", 40, now=2.0)
+    >>> barrier.came("inv2"); barrier.last_heard["inv3"] = 40, 2.0
     >>> barrier.is_open, barrier.deadline
     (False, 12.0)
     >>> barrier.complaint(barrier.missing_messages(), now=12.0)
@@ -44,8 +43,8 @@ class TickBarrier:
         """Senders in the same process, whose messages do not come from outside."""
         self._from_outside = 0
         """Number of missing messages of the others."""
-        self._last: dict[str, tuple[int, float]] = {}
-        """Number and time (s) of each sender's last message."""
+        self.last_heard: dict[str, tuple[int, float]] = {}
+        """Number and time (s) of each sender's last message, its last sign of life; the node notes them."""
         self.deadline: float | None = None
         """End of the present wait (s); None if it has none."""
 
@@ -59,9 +58,9 @@ class TickBarrier:
         """Number of missing messages from outside; at least one."""
         return max(1, self._from_outside)
 
-    def wait_for(self, awaited: Mapping[str, str], now: float) -> None:
-        """Start a new wait for a message of each of these senders."""
-        self._awaited = dict(awaited)
+    def wait_for(self, awaited: dict[str, str], now: float) -> None:
+        """Start a new wait for a message of each of these senders; the dict goes to the barrier."""
+        self._awaited = awaited
         self._from_outside = len(self._awaited.keys() - self.siblings) if self.siblings else len(self._awaited)
         self.renew(now)
 
@@ -78,10 +77,6 @@ class TickBarrier:
         """Return the missing messages with their senders."""
         return tuple(Awaited(message, sender) for sender, message in self._awaited.items())
 
-    def heard(self, name: str, seq: int, now: float) -> None:
-        """Note a sign of life: a message numbered `seq`."""
-        self._last[name] = (seq, now)
-
     def renew(self, now: float) -> None:
         """Note progress: the deadline restarts from now."""
         self.deadline = now + self._timeout
@@ -94,8 +89,8 @@ class TickBarrier:
         """Return the error of a passed deadline: each missing sender with its last tick and last sign of life."""
         parts = []
         for message, sender in missing:
-            if sender in self._last:
-                tick, at = self._last[sender]
+            if sender in self.last_heard:
+                tick, at = self.last_heard[sender]
                 sign = f"last heard of {sender}: tick {tick}, {now - at:.1f} s ago"
             else:
                 sign = f"nothing was ever heard from {sender}"

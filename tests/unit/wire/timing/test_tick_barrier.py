@@ -48,7 +48,7 @@ def test_the_deadline_counts_from_the_last_progress() -> None:
 def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
     """Also of who has never been heard."""
     made = barrier()
-    made.heard("inv1", 3, 2.0)
+    made.last_heard["inv1"] = 3, 2.0
 
     assert made.complaint(made.missing_messages(), 15.0) == (
         "plant: no State(4) from inv1 within 10 s; last heard of inv1: tick 3, 13.0 s ago. "
