@@ -8,12 +8,27 @@ import os
 import selectors
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
 from plant.transient_folder import TransientFolder
+
+ROOT = str(Path(__file__).parents[1])
+"""Folder of our packages."""
+
+
+def program(module: str, *arguments: str) -> list[str]:
+    """Return the command that runs `main` of a module of ours, wherever this process has found our packages.
+
+    It has one BLAS thread: our matrices are small, and a process with one thread can be forked at any time.
+    """
+    run = "import os, sys; os.environ.setdefault('OPENBLAS_NUM_THREADS', '1'); "
+    run += f"sys.path.insert(0, {ROOT!r}); from {module} import main; main()"
+    return [sys.executable, "-P", "-c", run, *arguments]
 
 
 class ProcessEndedError(RuntimeError):

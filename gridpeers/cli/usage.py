@@ -102,12 +102,13 @@ def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
     import subprocess
 
+    from plant.wheels import damaged
+
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
     if done.returncode:
         reason = done.stderr.strip().rpartition("\n")[2] or f"exit status {done.returncode}"
-        again = f"pip install --force-reinstall {module}"
-        fail([f"{module} is installed, but cannot be imported ({reason}); {user} needs it: {again}"], BAD_INPUT)
+        fail([damaged(module, reason, user)], BAD_INPUT)
 
 
 def fail(lines: list[str], code: int) -> NoReturn:

@@ -14,8 +14,8 @@ Requests are JSON objects, one a line on standard input, answered one a line on 
 
 A reading is f (Hz), P (W), Q (var), mean line-to-neutral V (V), the set-points as GridLAB-D holds them: `Pset` (pu)
 of a GFM or `Pref` (W) of a GFL, and `Vset` (pu); then the lowest and the highest phase voltage (V). What goes wrong is
-answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text}. The process ends
-with standard input, and with its parent, whose id is its argument.
+answered as {"error": text}, a package gridlabd that cannot be imported as {"not_importable": text, "installed": bool}.
+The process ends with standard input, and with its parent, whose id is its argument.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 STAY = 0
@@ -127,6 +128,28 @@ class GridlabdInverter:
         return f, self._S[0], self._S[1], sum(V) / len(V), *set_points, min(V), max(V)
 
 
+class NotImportableError(Exception):
+    """The package gridlabd is missing, or damaged; `installed` tells which."""
+
+    def __init__(self, reason: Exception) -> None:
+        super().__init__(f"{type(reason).__name__}: {reason}")
+        self.installed = not (isinstance(reason, ModuleNotFoundError) and reason.name == "gridlabd")
+
+
+def gridlabd_package() -> ModuleType:
+    """Return the package gridlabd.
+
+    Raises
+    ------
+    NotImportableError
+        If it cannot be imported.
+    """
+    try:
+        return importlib.import_module("gridlabd")
+    except Exception as error:  # a damaged package may raise anything
+        raise NotImportableError(error) from error
+
+
 class Simulation:
     """A model whose delta steps are taken when they are asked for; GridLAB-D itself runs in a thread.
 
@@ -139,7 +162,7 @@ class Simulation:
     """
 
     def __init__(self, model: str, inverters: list[tuple[str, str, str, str]]) -> None:
-        gridlabd = importlib.import_module("gridlabd")
+        gridlabd = gridlabd_package()
         self.version = str(gridlabd.__version__)
         self._gridlabd = gridlabd.DirectGridLabD()
         if self._gridlabd.load_glm([model]) != gridlabd.GLDErrorCode.SUCCESS:
@@ -228,8 +251,8 @@ def main() -> None:
     try:
         for answer in answers(json.loads(line) for line in sys.stdin):
             print(json.dumps(answer), file=out, flush=True)
-    except ImportError as error:
-        print(json.dumps({"not_importable": str(error)}), file=out, flush=True)
+    except NotImportableError as error:
+        print(json.dumps({"not_importable": str(error), "installed": error.installed}), file=out, flush=True)
     except Exception as error:
         text = str(error) if isinstance(error, RuntimeError) else f"{type(error).__name__}: {error}"
         print(json.dumps({"error": text}), file=out, flush=True)

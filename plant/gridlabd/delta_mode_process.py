@@ -11,6 +11,7 @@ from typing import Any
 from plant.imports.gridlabd.gridlabd_process import messages
 from plant.request_process import ProcessEndedError, RequestProcess
 from plant.transient_folder import TransientFolder
+from plant.wheels import damaged
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 
@@ -98,7 +99,10 @@ class DeltaModeProcess:
         if answer is None:
             raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
         if "not_importable" in answer:
-            raise GridlabdError(MISSING.format(python=self._python, error=answer["not_importable"]))
+            reason = answer["not_importable"]
+            if answer["installed"]:
+                raise GridlabdError(damaged("gridlabd", reason, "GridLAB-D as the plant"))
+            raise GridlabdError(MISSING.format(python=self._python, error=reason))
         if "error" in answer:
             raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
         return answer

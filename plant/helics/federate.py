@@ -11,8 +11,13 @@ from typing import Any
 from plant.helics.helics_settings import HelicsSettings, endpoint
 from plant.helics.topics import Topic, Value
 from plant.request_process import ProcessEndedError, RequestProcess
+from plant.wheels import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
+
+USER = "a HELICS federate"
+
+MISSING = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
 
 IMPORT = 60.0
 """Longest time (s) until the process has imported HELICS, on a machine that is busy."""
@@ -53,9 +58,9 @@ class HelicsFederate:
         """Names of the other federates."""
         self._process = RequestProcess([sys.executable, str(PROCESS)])
         ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
-        if "error" in ready:
+        if "not_importable" in ready:
             self._process.close(FAREWELL)
-            raise HelicsError(ready["error"])
+            raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else MISSING)
         host, port = endpoint(settings.broker)
         late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
         self._ask(

@@ -34,9 +34,6 @@ BROKER_LEAVES = 3000
 FAREWELL = 0.3
 """Time (s) for the word of an abort to reach the others."""
 
-INSTALL = "install it: pip install 'gridpeers[helics]'"
-"""Advice when the package is missing or damaged."""
-
 NOBODY = "any"
 """Type of a topic that nobody publishes."""
 
@@ -52,10 +49,8 @@ class Federate:
     """The federate with its topics."""
 
     def __init__(self) -> None:
-        try:
-            import helics
-        except ImportError as error:
-            raise RefusedError(f"HELICS cannot be imported ({error}); {INSTALL}") from None
+        import helics
+
         self.helics: Any = helics
         self.fed: Any = None
         self.broker: Any = None
@@ -259,8 +254,9 @@ def main() -> None:
 
     try:
         federate = Federate()
-    except RefusedError as refused:
-        answer({"error": str(refused)})
+    except Exception as error:  # a damaged package may raise anything
+        missing = isinstance(error, ModuleNotFoundError) and error.name == "helics"
+        answer({"not_importable": f"{type(error).__name__}: {error}", "installed": not missing})
         return
     answer({"ready": True})
     threading.Thread(target=listen, daemon=True).start()

@@ -11,7 +11,6 @@ import numpy as np
 
 from plant.equipment import NODES, PHASES, Feeder
 from plant.equipment.connectivity import Connectivity, Node, by_bus
-from plant.network import Network
 from plant.tables.read import FeederError
 
 BEYOND = 100.0
@@ -197,6 +196,8 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
 
 def _report_undetermined(feeder: Feeder, problems: list[str], remedy: str) -> None:
     """Add a problem for each bus whose voltage to ground nothing determines: without load it is beyond all bounds."""
+    from plant.network import Network  # a process that only reads loads no compiler of the plant's steps
+
     try:
         network = Network(feeder)
     except RuntimeError:  # of the factorisation

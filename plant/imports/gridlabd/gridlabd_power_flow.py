@@ -5,13 +5,12 @@ then holds, as one JSON object: buses, branches with their admittance matrices a
 currents and admittances that every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so
 they are read from its tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
 
-Usage: `python -m plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT`
+Usage: `python -m plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT PARENT`
 """
 
 from __future__ import annotations
 
 import ctypes
-import importlib
 import json
 import math
 import os
@@ -19,6 +18,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from plant.gridlabd.delta_mode import NotImportableError, end_with, gridlabd_package
 from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS
 from plant.imports.gridlabd.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
 
@@ -54,7 +54,7 @@ class PowerFlowModel:
 
     def __init__(self, path: str, scratch: Path) -> None:
         self._scratch = scratch
-        self._module = importlib.import_module("gridlabd")
+        self._module = gridlabd_package()
         self._gridlabd = self._module.DirectGridLabD()
         if self._gridlabd.load_glm([path]) != self._module.GLDErrorCode.SUCCESS:
             raise RuntimeError("the model was not loaded")
@@ -216,8 +216,11 @@ def _put(takes: dict[str, list[list[float]]], keys: tuple[str, ...], pairs: list
 def main() -> None:
     """Solve the model and write the result."""
     model, result = sys.argv[1], Path(sys.argv[2])
+    end_with(int(sys.argv[3]))
     try:
         answer = PowerFlowModel(model, result.parent).solve()
+    except NotImportableError as error:
+        answer = {"not_importable": str(error)}
     except Exception as error:
         answer = {"error": f"{type(error).__name__}: {error}"}
     result.write_text(json.dumps(answer), encoding="utf-8")

@@ -7,17 +7,21 @@ import json
 import os
 import re
 import subprocess
-import sys
+from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from plant.request_process import program
 from plant.tables.read import FeederError
+from plant.transient_folder import TransientFolder
+from plant.wheels import damaged
 from wire.printable import printable
 
-PROGRAM = "from plant.imports.gridlabd.gridlabd_power_flow import main; main()"
+POWER_FLOW = "plant.imports.gridlabd.gridlabd_power_flow"
 
 MISSING = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
+
+USER = "the import of .glm files"
 
 LONGEST = 600.0
 """Time (s) after which a model that does not end is given up."""
@@ -46,18 +50,18 @@ def solved_model(path: Path) -> dict[str, Any]:
     """
     if importlib.util.find_spec("gridlabd") is None:
         raise FeederError(path.name, (MISSING,))
-    with TemporaryDirectory(prefix="gridpeers-") as folder:
-        result = Path(folder) / "result.json"
-        command = [sys.executable, "-P", "-c", PROGRAM, path.name, str(result)]
-        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3]), "PYTHONDONTWRITEBYTECODE": "1"}
+    with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
+        result = folder.path / "result.json"
+        command = program(POWER_FLOW, path.name, str(result), str(os.getpid()))
         try:
             done = subprocess.run(
                 command,
                 cwd=path.parent,
-                env=environment,
+                env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
+                pass_fds=(folder.user,),
                 timeout=LONGEST,
                 check=False,
             )
@@ -70,6 +74,8 @@ def solved_model(path: Path) -> dict[str, Any]:
             )
             raise FeederError(path.name, tuple(messages(printed)) or (ended,))
         answer: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
+    if "not_importable" in answer:
+        raise FeederError(path.name, (damaged("gridlabd", printable(answer["not_importable"]), USER),))
     if "error" in answer:
         raise FeederError(path.name, tuple(messages(printed)) or (f"GridLAB-D: {printable(answer['error'])}",))
     if not answer.get("solved", True):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from plant.imports.import_checks import not_a_file
 from plant.imports.opendss.dss_script import HUNTING, DssScript
-from plant.tables.read import FeederError
 
 SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
 """Solves with controls, which set taps and capacitor steps."""
@@ -31,6 +31,11 @@ SNAPSHOT = 0
 class DssEngine:
     """One circuit in an engine of its own.
 
+    Parameters
+    ----------
+    tell : Callable[[str], None]
+        Takes what the engine is about to do, with file and line.
+
     Attributes
     ----------
     circuit : dss.ICircuit
@@ -39,18 +44,14 @@ class DssEngine:
         What was not done as the script says.
     """
 
-    def __init__(self) -> None:
-        try:
-            from dss import DSS
-        except ImportError:
-            raise FeederError(
-                "OpenDSS",
-                ("reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'",),
-            ) from None
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        from dss import DSS
+
         engine = DSS.NewContext()
         engine.AllowForms = engine.AllowEditor = engine.AllowChangeDir = False
         engine.Error.ExtendedErrors = True
         self._engine: Any = engine
+        self._tell = tell
         self.notes: list[str] = []
 
     @property
@@ -83,7 +84,7 @@ class DssEngine:
             self.notes.append(f"{where}: {verb} was not run")
         self.notes += script.notes
         for command in SETTLE:
-            message = self.execute(command)
+            message = self.execute(command, path.name)
             if HUNTING in message:
                 self.notes.append(
                     f"{path.name}: its controls hunt; they stay at their positions of the 1000th iteration"
@@ -93,7 +94,7 @@ class DssEngine:
         if not self.circuit.Solution.Converged:
             return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]
         for command in EXACT:  # may end at rounding instead: not every circuit allows its tolerance
-            self.execute(command)
+            self.execute(command, path.name)
         return []
 
     def _clear(self, problems: list[str]) -> list[str]:
@@ -116,10 +117,11 @@ class DssEngine:
                 found.append(str(line.Name).lower())
         return found
 
-    def execute(self, command: str) -> str:
-        """Run one command; return the engine's message if it fails."""
+    def execute(self, command: str, where: str = "") -> str:
+        """Run one command, from there in a script; return the engine's message if it fails."""
         from dss import DSSException
 
+        self._tell(f"{where}: {command}")
         try:
             self._engine.Text.Command = command
         except DSSException as error:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from wire.printable import printable
 
-Execute = Callable[[str], str]
-"""Runs one command in the engine; returns its message if it fails, else an empty text."""
+Execute = Callable[[str, str], str]
+"""Runs one command in the engine, from this file and line; returns its message if it fails, else an empty text."""
 
 RESULTS = frozenset(
     [
@@ -139,18 +139,19 @@ class DssScript:
             else:
                 command = FILE.sub(lambda match: f'{match[1]}"{self._whole_path(_bare(match[2]))}"', command)
             self._element = element_of(command, self._element)
-            message = printable(self._execute(command))
+            message = printable(self._execute(command, where))
             if message and not (verb == "solve" and HUNTING in message):
-                self._failed(verb, f"{where}: {message}")
+                self._failed(verb, where, message)
 
-    def _failed(self, verb: str, text: str) -> None:
+    def _failed(self, verb: str, where: str, message: str) -> None:
+        text = f"{where}: {message}"
         kind = self._element.partition(".")[0]
         if verb not in COORDINATES and kind not in ASIDE:
             self.problems.append(text)
             return
         self.notes.append(text)
         if kind in METERS:  # the engine solves nothing while one measures nowhere
-            self._execute(f"disable {self._element}")
+            self._execute(f"disable {self._element}", where)
 
     def _include(self, rest: str, where: str, depth: int) -> None:
         name = _bare(rest)

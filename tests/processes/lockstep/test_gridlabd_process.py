@@ -199,7 +199,10 @@ def test_a_damaged_wheel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert (code, text.count("\n")) == (2, 1)
     assert "gridlabd is installed, but cannot be imported (ImportError: libdamaged.so)" in text
     process = DeltaModeProcess(sys.executable, deadline=1.0)
-    with pytest.raises(GridlabdError, match=r"cannot import the package gridlabd \(libdamaged.so\); install it"):
+    with pytest.raises(
+        GridlabdError,
+        match=r"cannot be imported \(ImportError: libdamaged.so\); GridLAB-D as the plant needs it: pip install",
+    ):
         process.load("", [])
     process.close()
 
