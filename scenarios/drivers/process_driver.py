@@ -25,10 +25,6 @@ from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
 
-MESHED = 20
-"""Most processes of agents that link to each other in simulated time. More link to the plant alone, which relays: a
-link for each pair costs more than the way through the plant (bench/discovery.py)."""
-
 LEAVING = 2.5
 """Time (s) that processes have to close at the end by themselves."""
 
@@ -53,6 +49,7 @@ def run_processes(
     on_links: Callable[[LinkReport], None] = lambda report: None,
     plant_command: Sequence[str] = (),
     shared: int = 0,
+    star: bool = True,
 ) -> Outcome:
     """Run a scenario with a plant process and processes of agents, in simulated or in wall-clock time.
 
@@ -82,6 +79,9 @@ def run_processes(
         Arguments of the interpreter for another plant than the usual one; tests have smaller ones.
     shared : int, optional
         Number of processes that agents share; 0 gives each agent its own.
+    star : bool, optional
+        In simulated time: whether all processes link to the plant alone, which relays; if not, they link to each
+        other, as they do in wall-clock time. docs/protocol.md, "One link each", compares the two.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def run_processes(
     wall = plant_config.clock == "wall"
     endpoint = free_endpoint(*plant_config.listen[:1])
     deadline = "deadline" if wall else "plant_wait"  # an agent that waits for the plant waits for its compiler too
-    star = not wall and (plant_config.star or (shared or len(agents)) > MESHED)
+    star = star and not wall
     own = {deadline: BUILD_DEADLINE, "connect": (endpoint,), "star": star}
     configs = [replace(config, **own) for config in agents.values()]
     plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,), star=star)

@@ -145,6 +145,7 @@ class Session:
         config = _config(listen, connect, gossip, meets_all, profile)
         if star and rendezvous:
             config["mode"] = "router"
+            config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
         elif star:
             config = _config((), connect, False, meets_all, profile)
         self._session = self._open(who, config)

@@ -57,17 +57,15 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
     assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
 
 
-def test_a_plant_that_relays_gives_the_same_rows_and_notices_a_death(tmp_path: Path) -> None:
-    """As for many agents: each has one link, to the plant. A kill -9 is noticed as in a mesh."""
+def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tmp_path: Path) -> None:
+    """Bytes and deaths do not depend on whether the plant relays, as in all other tests, or all have links to all."""
     plant, agents = toy_configs(4, end=2.0)
-    mesh = ProcessRun(plant, agents, tmp_path / "mesh")
-    star = ProcessRun(msgspec.structs.replace(plant, star=True), agents, tmp_path / "star")
-    hurt = ProcessRun(msgspec.structs.replace(plant, star=True), agents, tmp_path / "hurt")
+    star, mesh, hurt = (ProcessRun(plant, agents, tmp_path / name) for name in ("star", "mesh", "hurt"))
     hurt.at(0.4, lambda: hurt.child("inv3").signal(signal.SIGKILL))
 
-    assert [mesh().broke, star().broke] == ["", ""]
-    assert star.rows == mesh.rows
-    outcome = hurt()
+    assert [star().broke, mesh(star=False).broke] == ["", ""]
+    assert mesh.rows == star.rows
+    outcome = hurt(star=False)
     assert outcome.broke == ""
     assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
     assert hurt.rows[-1][0] == 2.0
@@ -128,7 +126,7 @@ def test_who_cannot_start_ends_the_run_at_once(tmp_path: Path) -> None:
     """An agent that dies before t = 0 is reported with its exit status, its last lines and its log."""
     plant, agents = toy_configs(3)
     bad = msgspec.structs.replace(agents[1], listen=("tcp/256.0.0.1:0",))
-    outcome = ProcessRun(plant, (agents[0], bad, agents[2]), tmp_path)()
+    outcome = ProcessRun(plant, (agents[0], bad, agents[2]), tmp_path)(star=False)
 
     assert outcome.broke.startswith("inv2 exited with status 2 before t = 0. Its last lines:")
     assert "cannot open a Zenoh session (listening on tcp/256.0.0.1:0)" in outcome.broke
