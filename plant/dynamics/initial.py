@@ -18,11 +18,18 @@ from plant.dynamics.error import PlantError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
 from plant.dynamics.phasors import PHASES, aligned_sum
+from plant.dynamics.reduction.blas import one_thread
 from plant.dynamics.reduction.reduce_network import reduce_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
 MOST_ROUNDS = 500
 """Most rounds between the network and inverters of constant power."""
+
+MOST_BY_DIFFERENCES = 100
+"""Inverters up to which a Jacobian by differences is worth its power flows, one an inverter; else Newton-Krylov."""
+
+KRYLOV = {"fatol": 1e-12, "maxiter": 20, "jac_options": {"rdiff": 1e-6}}
+"""Largest deviation (pu), most iterations of Newton's method (it takes 3 to 5), and its relative difference."""
 
 NEAR = 4
 """Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
@@ -243,7 +250,12 @@ def _by_droop(
         measured = np.where(units.positive_sequence, units.measured(V, I_out)[0].imag, trial)
         return np.asarray((by_droop - measured)[free] * units.m_q[free])
 
-    solution = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
+    solution = None
+    if free.size > MOST_BY_DIFFERENCES:
+        with one_thread():
+            solution = root(deviation, Q[free], method="krylov", options=KRYLOV)
+    if solution is None or not solution.success:
+        solution = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
     if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:
         raise PlantError(
             "no initial operating point: V_set0 cannot be met by droop, "

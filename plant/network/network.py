@@ -113,7 +113,7 @@ class Network:
         ValueError
             If no switch has this name.
         """
-        return switch_name(self.feeder, text)
+        return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
         """Return the nodes that these closed switches and the regulators merge, with their ratios.
