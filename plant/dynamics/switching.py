@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
@@ -43,18 +44,36 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Tr
         try:
             for i in np.flatnonzero(regained & units.forming).tolist():
                 _black_start(units, i)
+            followers = regained & ~units.forming
+            if (behind_filter := followers & (units.y_f != 0.0)).any():
+                _solve_without(behind_filter, units, network)
+            units.J[followers] = units.y_f[followers, None] * units.V[followers]
             network.guess()
             network.solve()
-            followers = np.flatnonzero(regained & ~units.forming).tolist()
-            for i in followers:
-                units.J[i], units.I[i] = units.y_f[i] * units.V[i], 0.0
+            for i in np.flatnonzero(followers).tolist():
+                units.I[i] = 0.0
                 units.rest(i, 0.0, _mean_voltage(units, i))
-            if regained.any():
-                network.solve()
             return trips
         except NoSolutionError as error:
             trips.append(_trip(units, network, error.islands, 0))
             network.change(circuit)
+
+
+def _solve_without(away: NDArray[np.bool_], units: Inverters, network: LiveNetwork) -> None:
+    """Find the voltages at the open terminals of inverters that are about to return.
+
+    Behind its filter an inverter is at zero current where its internal voltage is that of its open terminal, in each
+    phase; and where all of them are at zero current, none changes the terminal of another one.
+    """
+    connected = units.connected.copy()
+    units.connected[away] = False
+    try:
+        network.change(network.circuit)
+        network.guess()
+        network.solve()
+    finally:
+        units.connected[:] = connected
+        network.change(network.circuit)
 
 
 def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> list[Trip]:

@@ -15,7 +15,10 @@ from tests.unit.plant.dynamics.circuits import (
     GFM_D,
     S_B,
     V_B,
+    Z_B,
     at_rest,
+    circuit,
+    inverter,
     loaded,
     lone,
     on_stiff_bus,
@@ -102,6 +105,48 @@ def test_a_gfl_comes_back_at_no_current() -> None:
     assert currents(plant.inverters, 0) < 1e-9
     assert plant.inverters.set_points[0] == pytest.approx([0.0, 1.0, 0.0])
     assert np.abs(plant.run(1000)[:, 0, 1]).max() < 1e-6 * S_B
+
+
+def weak_line(h: float = 0.002) -> Dynamics:
+    """Two GFL, one after the other on a line of twice j0.25 pu, with uneven loads beside them; phase C has none."""
+    y, loads = 1.0 / ((0.02 + 0.25j) * Z_B), np.array([[0.4, 0.2, 0.0], [0.1, 0.3, 0.0]]) / Z_B
+    Y = np.zeros((9, 9), complex)
+    for a, b in [(phase + 3 * k, phase + 3 * (k + 1)) for phase in range(3) for k in range(2)]:
+        Y[[a, b], [a, b]] += y
+        Y[[a, b], [b, a]] -= y
+    Y[range(3, 9), range(3, 9)] += loads.ravel()
+    network = circuit(Y, [[3, 4, 5], [6, 7, 8]], source=V_B * BALANCED)
+    dynamics = Dynamics(network, (inverter(GFL_D), inverter(GFL_D)), h)
+    dynamics.start(np.full(2, 0.2), np.zeros(2))
+    return dynamics
+
+
+def test_several_gfl_come_back_at_no_current_on_a_weak_line() -> None:
+    """The voltage at open terminals is that with none of them: no phase carries current, and both stay at rest."""
+    plant = weak_line()
+    assert plant.inverters.y_f.all()  # behind filters, which would load the line
+    plant.run(1000)
+    plant.switch_inverters((0, 1), False)
+    plant.run(10)
+    open_terminals = plant.inverters.V.copy()
+    plant.switch_inverters((0, 1), True)
+
+    units = plant.inverters
+    np.testing.assert_allclose(units.V, open_terminals, rtol=1e-9)
+    assert max(currents(units, 0), currents(units, 1)) < 1e-9
+    assert np.abs(plant.run(1000)[:, :, 1]).max() < 1e-6 * S_B
+
+
+def test_a_gfl_in_an_island_that_starts_again_begins_at_no_current() -> None:
+    """A GFM that brings the voltage back finds no load in the filter of a GFL that was connected all the time."""
+    network = pair(GFM_D, GFM_D, 0.4).network.circuit
+    plant = Dynamics(network, (inverter(GFM_D), inverter(GFL_D)), 0.002)
+    plant.start(np.array([0.4, 0.0]), np.zeros(2))
+    plant.switch_inverter(0, on=False)
+    assert plant.inverters.connected.tolist() == [False, True]
+    plant.switch_inverter(0, on=True)
+
+    assert currents(plant.inverters, 1) < 1e-9
 
 
 def test_switching_what_is_so_already_changes_nothing() -> None:
