@@ -151,6 +151,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         from plant.tables.shunts import problems_of
         from wire.schema.suggestion import suggestion
 
+        bus = str(bus)  # many buses have a number as their name
         found = {one.name: one for one in self.buses}.get(bus)
         if found is None:
             raise ValueError(f'bus "{bus}": no such bus; {suggestion(bus, [one.name for one in self.buses], "buses")}')
@@ -165,11 +166,18 @@ class Feeder(Tables, frozen=True, kw_only=True):
             m_q=m_q,
             phases=str(phases).strip() or "ABC",  # type: ignore[arg-type]  # `problems_of` refuses others
         )
-        load = sum(S.real for load in self.loads for S in load.S if S.real > 0.0)
-        if problems := problems_of(row, found, load, (*self.inverters, *self.spares)):
+        if problems := problems_of(row, found, self):
             raise ValueError("; ".join(problems))
         set_name, sets = as_set(name, kind, params, self.parameter_sets)
-        row = msgspec.structs.replace(row, parameters=set_name)
+        row = msgspec.structs.replace(
+            row,
+            name=str(name),
+            microgrid=str(microgrid),
+            P_rated=float(P_rated),
+            m_p=float(m_p),
+            m_q=float(m_q),
+            parameters=set_name,
+        )
         return msgspec.structs.replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
 
     def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:

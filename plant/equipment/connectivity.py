@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch
+from plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
 
 Node = tuple[str, str]
 """A bus and one of its phases."""
@@ -113,6 +113,42 @@ class Connectivity:
         first = source.bus if source else switch.from_bus
         reached = {bus for part in parts if any(bus == first for bus, _ in part) for bus, _ in part}
         return frozenset(bus.name for bus in self._feeder.buses if bus.name not in reached)
+
+
+def buses_without_ground(transformers: Iterable[Transformer], joins: Iterable[tuple[str, str]]) -> frozenset[str]:
+    """Return the buses behind a delta winding, from which no current can return through ground.
+
+    Parameters
+    ----------
+    transformers : Iterable[Transformer]
+        The feeder's transformers.
+    joins : Iterable[tuple[str, str]]
+        Ends of its lines, switches and regulators.
+
+    Examples
+    --------
+    >>> from plant.tables import read_feeder
+    >>> transformers = read_feeder("microgrid123").transformers
+    >>> sorted(buses_without_ground(transformers, [("610", "611"), ("611", "612"), ("1", "2")]))
+    ['610', '611', '612']
+    """
+    beside: dict[str, set[str]] = {}
+    grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]
+    for one, other in (*joins, *grounded):
+        beside.setdefault(one, set()).add(other)
+        beside.setdefault(other, set()).add(one)
+    found: set[str] = set()
+    for row in transformers:
+        if row.connection != "D-D":
+            continue
+        reached, new = {row.to_bus}, [row.to_bus]
+        while new:
+            further = beside.get(new.pop(), set()) - reached
+            reached |= further
+            new += further
+        # where there is a way around it, the winding's own bus alone is certain
+        found |= {row.to_bus} if row.from_bus in reached else reached
+    return frozenset(found)
 
 
 def by_bus(parts: Iterable[frozenset[Node]]) -> list[frozenset[Node]]:

@@ -11,6 +11,8 @@ import numpy as np
 
 from plant.equipment import NODES, PHASES, Feeder
 from plant.equipment.connectivity import Connectivity, Node, by_bus
+from plant.equipment.imported_equipment import LoadPart
+from plant.tables.feeder_columns import PART_CURRENT, power_of
 from plant.tables.read import FeederError
 
 BEYOND = 100.0
@@ -48,6 +50,17 @@ def left_out_by(names: Sequence[str], patterns: Sequence[str], problems: list[st
             problems.append(f'leave_out: "{pattern}" matches no element; write Class.name, e.g. "{example}"')
         left_out.update(by_lower[name] for name in matching)
     return left_out
+
+
+def report_powers(parts: Sequence[LoadPart], problems: list[str]) -> None:
+    """Add a problem for each load whose power only a lost unit explains."""
+    told: set[str] = set()
+    for part in parts:
+        most = power_of("a load", part.V_nom, PART_CURRENT, 1)
+        for power, unit in ((part.S.real / 1e3, "kW"), (part.S.imag / 1e3, "kvar")):
+            if part.name not in told and (text := most.objection(power, unit)):
+                told.add(part.name)
+                problems.append(f"{part.name}: {text}")
 
 
 MOST_UNFED = 0.5

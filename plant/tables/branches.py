@@ -161,8 +161,6 @@ def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tup
         if name in transformers:
             row.problem(f'transformer "{name}": there is one of this name already; names must differ')
         elif ends:
-            if it.connection == "D-D":
-                buses.mark_floating(ends[1])
             transformers[name] = Transformer(
                 name=name,
                 from_bus=ends[0].name,

@@ -17,6 +17,13 @@ _SHOWN = 24
 """So many buses that are cut off are named."""
 
 
+GROUND_NEEDED = (
+    'bus "{bus}" stands behind a delta winding without ground, and {what} needs ground; '
+    "use delta loads there, or a Yg-Yg transformer"
+)
+"""Problem of equipment between a phase and ground where no current can return through ground."""
+
+
 def is_imported(folder: Path) -> bool:
     """Return whether a feeder comes from another program: it then needs no lines of our own."""
     return (folder / "elements.csv").is_file()
@@ -91,17 +98,14 @@ class BusTable:
                 f"it joins equal nominal voltages only, use transformers.csv"
             )
 
-    def mark_floating(self, bus: Bus) -> None:
-        """Note that a bus stands behind a delta winding, where no current can return through ground."""
-        self._floating.add(bus.name)
+    def mark_floating(self, names: Iterable[str]) -> None:
+        """Note that buses stand behind a delta winding, where no current can return through ground."""
+        self._floating.update(names)
 
     def require_ground(self, row: CsvRow[Any], bus: Bus, what: str) -> bool:
         """Note a problem if something connected to ground stands behind a delta winding; tell whether all is well."""
         if bus.name in self._floating:
-            row.problem(
-                f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; '
-                f"use delta loads there, or a Yg-Yg transformer"
-            )
+            row.problem(GROUND_NEEDED.format(bus=bus.name, what=what))
         return bus.name not in self._floating
 
     def row_of(self, name: str) -> CsvRow[BusColumns]:

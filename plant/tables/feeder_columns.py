@@ -27,6 +27,8 @@ RATIO = Plausible("the ratio of a regulator", 0.8, 1.25)
 
 BRANCH_CURRENT = 2000.0
 """Largest current of one load or capacitor bank (A per phase); conductors of a distribution feeder carry less."""
+PART_CURRENT = 50e3
+"""The same of a part of a load that another program has: it may stand for a town, at any of its voltages."""
 RATED_CURRENT = 5000.0
 """Largest rated current of an inverter or transformer (A per phase)."""
 TIMES_THE_LOAD = 50.0

@@ -10,7 +10,7 @@ from plant.equipment import Bus
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.tables.buses import BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.feeder_columns import ElementColumns, LoadPartColumns
+from plant.tables.feeder_columns import PART_CURRENT, ElementColumns, LoadPartColumns, power_of
 
 Matrix = tuple[tuple[complex, ...], ...]
 
@@ -34,12 +34,19 @@ def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str
     parts: list[LoadPart] = []
     for row in CsvTable(folder, file, LoadPartColumns, problems):
         it, bus = row.columns, buses.find(row)
-        if bus is None or not buses.require_phases(row, bus, it.from_phase + it.to_phase):
+        many = [key for key in ("from_phase", "to_phase") if len(getattr(it, key)) > 1]
+        for key in many:
+            row.problem(f'{key}: "{getattr(it, key)}" must be one phase (as "A"); give each phase a row of its own')
+        if it.V_min_pu and not it.V_low_pu < it.V_min_pu:
+            row.problem(f"V_min_pu: {it.V_min_pu:g} pu must be above V_low_pu, {it.V_low_pu:g} pu")
+        if it.V_max_pu and not it.V_min_pu < it.V_max_pu:
+            row.problem(f"V_max_pu: {it.V_max_pu:g} pu must be above V_min_pu, {it.V_min_pu:g} pu")
+        for column in ("P_kW", "Q_kvar"):
+            row.require(column, power_of("a load", 1e3 * it.V_nom_kV, PART_CURRENT, 1))
+        if bus is None or many or not buses.require_phases(row, bus, it.from_phase + it.to_phase):
             continue
         if it.from_phase == it.to_phase:
             row.problem(f"both ends are phase {it.from_phase}; a load is between two phases, or a phase and ground")
-        if it.V_min_pu and not it.V_low_pu < it.V_min_pu:
-            row.problem(f"V_min_pu: {it.V_min_pu:g} pu must be above V_low_pu, {it.V_low_pu:g} pu")
         parts.append(
             LoadPart(
                 name=it.load,
@@ -61,6 +68,9 @@ def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str
 def _node(row: CsvRow[Any], text: str, buses: BusTable) -> tuple[str, str] | None:
     """Return the node that "650.A" names; None, and a problem noted, if there is none."""
     name, _, phase = text.rpartition(".")
+    if not name or len(phase) != 1:
+        row.problem(f'nodes: "{text}" is no node; write a bus and one of its phases, as "650.A"')
+        return None
     bus: Bus | None = buses.named(row, "nodes", name)
     if bus is None or not buses.require_phases(row, bus, phase):
         return None

@@ -98,7 +98,7 @@ def as_set(
         own, label = all_sets[params], params
     else:
         if isinstance(params, Mapping):
-            values = dict(params)
+            values = {str(key): value for key, value in params.items()}
         elif not isinstance(params, InverterParameters):
             raise ValueError(
                 f'inverter "{name}": params: must be the name of a set, keys with values such as {{"T_p_s": 0.02}}, '

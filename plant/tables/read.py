@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from plant.equipment import Feeder
+from plant.equipment.connectivity import buses_without_ground
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.csv_table import required_columns
@@ -107,6 +108,8 @@ def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
     switches = read_switches(folder, buses, problems)
     regulators = read_regulators(folder, buses, problems)
     transformers = read_transformers(folder, buses, problems)
+    joins = [(row.from_bus, row.to_bus) for row in (*lines, *switches, *regulators)]
+    buses.mark_floating(buses_without_ground(transformers, joins))
     sets = load_sets(folder)
     if load_set in sets:
         needed = not (folder / f"load_parts_{load_set}.csv").is_file()
@@ -122,7 +125,10 @@ def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
     load_parts = read_load_parts(folder, f"load_parts_{load_set}.csv", buses, problems)
     capacitors = read_capacitors(folder, buses, problems)
     parameter_sets = read_parameter_sets(folder, problems)
-    inverters = read_inverters(folder, buses, loads, parameter_sets, problems)
+    demand = sum(
+        S.real for S in (*(S for load in loads for S in load.S), *(part.S for part in load_parts)) if S.real > 0.0
+    )
+    inverters = read_inverters(folder, buses, demand, parameter_sets, problems)
     source = read_source(folder, buses, problems)
     f_nom = read_f_nom(folder, problems)
     found = Feeder(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import radians
 from pathlib import Path
 from typing import Any
 
-from plant.equipment import Bus, Capacitor, InverterRow, Load, Source
+from plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
+from plant.equipment.connectivity import buses_without_ground
 from plant.equipment.own_parameters import OwnParameters, foreign, with_published
-from plant.tables.buses import BusTable
+from plant.tables.buses import GROUND_NEEDED, BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import (
     BRANCH_CURRENT,
@@ -108,21 +109,20 @@ def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
 def read_inverters(
     folder: Path,
     buses: BusTable,
-    loads: tuple[Load, ...],
+    load: float,
     sets: Mapping[str, OwnParameters] | None,
     problems: list[str],
 ) -> tuple[InverterRow, ...]:
     """Read inverters.csv: nameplates, places, and the sets of parameters by name, None where they are unreadable.
 
-    A rating is held against the feeder's loads: one that is more than `TIMES_THE_LOAD` of all is in another unit.
+    A rating is held against the feeder's load (W): one that is more than `TIMES_THE_LOAD` of it is in another unit.
     """
-    total = sum(S.real for load in loads for S in load.S if S.real > 0.0) / 1e3
     inverters: dict[str, InverterRow] = {}
     at: dict[tuple[str, str], str] = {}
     for row in CsvTable(folder, "inverters.csv", InverterColumns, problems):
         it, name, bus = row.columns, row.columns.name, buses.find(row)
         if bus is not None and not math.isnan(bus.V_nom):
-            row.require("P_rated_kW", _rating(bus, it.phases, total))
+            row.require("P_rated_kW", _rating(bus, it.phases, load / 1e3))
         if name:
             _require_name(row, name)
         if it.parameters and sets is not None:
@@ -160,25 +160,38 @@ def read_inverters(
     return tuple(inverters.values())
 
 
-def problems_of(inverter: InverterRow, bus: Bus, load: float, others: Iterable[InverterRow]) -> list[str]:
-    """Return what the tables would refuse of an inverter at a bus, beside so much load (W) and other inverters."""
+def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
+    """Return what the tables would refuse of a further inverter of a feeder, at a bus of it."""
     problems: list[str] = []
-    numbers = {"P_rated_kW": inverter.P_rated / 1e3, "m_p_pu": inverter.m_p, "m_q_pu": inverter.m_q}
-    cells: dict[str | None, Any] = {key: getattr(inverter, key) for key in ("name", "kind", "bus", "microgrid")}
-    cells.update({key: repr(float(value)) for key, value in numbers.items()})
-    cells["phases"] = inverter.phases
+    numbers = {"P_rated_kW": (inverter.P_rated, 1e3), "m_p_pu": (inverter.m_p, 1.0), "m_q_pu": (inverter.m_q, 1.0)}
+    cells: dict[str | None, Any] = {
+        key: "" if (text := getattr(inverter, key)) is None else str(text)
+        for key in ("name", "kind", "bus", "microgrid", "phases")
+    }
+    cells.update({key: _cell(value, unit) for key, (value, unit) in numbers.items()})
     row = CsvRow(InverterColumns, f'inverter "{inverter.name}"', cells, problems)
-    row.require("P_rated_kW", _rating(bus, inverter.phases, load / 1e3))
+    row.require("P_rated_kW", _rating(bus, inverter.phases, sum(feeder.load_by_bus().values()) / 1e3))
+    joins = [(row.from_bus, row.to_bus) for row in (*feeder.lines, *feeder.switches, *feeder.regulators)]
+    if bus.name in buses_without_ground(feeder.transformers, joins):
+        row.problem(GROUND_NEEDED.format(bus=bus.name, what="an inverter"))
     if missing := [phase for phase in inverter.phases if phase not in bus.phases and "phases" not in row.wrong]:
         row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
-    if inverter.name:
-        _require_name(row, inverter.name)
-    for other in others:
+    if row.columns.name:
+        _require_name(row, row.columns.name)
+    for other in (*feeder.inverters, *feeder.spares):
         if inverter.name == other.name:
             row.problem("there is one of this name already; names must differ")
         if inverter.bus == other.bus and (taken := [phase for phase in inverter.phases if phase in other.phases]):
             row.problem(f'bus "{bus.name}" has inverter "{other.name}" on phase {taken[0]} already; {ONE_EACH}')
     return problems
+
+
+def _cell(value: Any, unit: float) -> str:
+    """Return a number in a table's unit, as a cell of it; anything else as it is."""
+    try:
+        return repr(float(value) / unit)
+    except (TypeError, ValueError, OverflowError):
+        return str(value)
 
 
 def _require_set(row: CsvRow[InverterColumns], sets: Mapping[str, OwnParameters]) -> None:

@@ -21,7 +21,7 @@ from plant.imports.gridlabd.glm_loads import BusLoads
 from plant.imports.gridlabd.glm_text import GlmText
 from plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
 from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.import_checks import BEYOND, left_out_by, not_a_file, refuse_if, refuse_unsolvable
+from plant.imports.import_checks import BEYOND, left_out_by, not_a_file, refuse_if, refuse_unsolvable, report_powers
 from plant.imports.import_comparison import MATCH, difference
 
 FAR = 1.3
@@ -106,6 +106,7 @@ class _GlmReader:
             load_parts=tuple(parts),
             notes=tuple(self._notes),
         )
+        report_powers(feeder.load_parts, problems)
         refuse_unsolvable(self._path, feeder, problems, UNGROUNDED, str)
         if all(self._classes[name] == "player" for name in self._left_out):
             self._compare(feeder)

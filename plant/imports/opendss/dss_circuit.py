@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 from plant.equipment import NODES, Feeder
 from plant.equipment.imported_equipment import LoadPart
-from plant.imports.import_checks import left_out_by, refuse_if
+from plant.imports.import_checks import left_out_by, refuse_if, report_powers
 from plant.imports.opendss.dss_elements import DssElements, complex_of, nodes_of, numbered_nodes
 from plant.imports.opendss.dss_engine import DssEngine
 from plant.imports.opendss.dss_generation import GENERATION, read_generation
 from plant.imports.opendss.dss_loads import read_loads
 from plant.imports.opendss.dss_script import METERS
+from plant.imports.opendss.dss_values import unusual_voltages
 from wire.schema.suggestion import suggestion
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
@@ -113,6 +114,9 @@ def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], No
         problems.append("no Vsource: a circuit has one, its substation")
     if not elements.source:
         refuse_if(path, problems)
+    report_powers(load_parts, problems)
+    V = dict(zip(nodes_of(circuit), complex_of(circuit.YNodeVarray).tolist(), strict=True))
+    notes += unusual_voltages(circuit, load_parts, V)
     feeder = Feeder(
         name=str(circuit.Name),
         load_set="main",
@@ -124,7 +128,6 @@ def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], No
         load_parts=tuple(load_parts),
         notes=tuple(notes),
     )
-    V = dict(zip(nodes_of(circuit), complex_of(circuit.YNodeVarray).tolist(), strict=True))
     return DssCircuit(feeder, problems, bool(left_out), V)
 
 

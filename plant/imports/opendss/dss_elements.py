@@ -82,12 +82,18 @@ class DssElements:
                 f"{name}: is of {vsource.Frequency:g} Hz, and the circuit is solved at {frequency:g} Hz, so that the "
                 f"engine has 0 V; write Set DefaultBaseFrequency={frequency:g} before New Circuit"
             )
+        E = 1e3 * vsource.pu * vsource.BasekV / sqrt(3.0)
+        if not E > 0.0:
+            self._problems.append(
+                f"{name}: pu and basekv must be above 0, got {vsource.pu:g} and {vsource.BasekV:g} kV"
+            )
+            return
         Y = matrix(element.Yprim)[:3, :3]
         stiff = self._add_bus(f"{bus}~{name.partition('.')[2]}", bus, "ABC")
         inner = [(stiff, letter) for letter in "ABC"]
         # conductor k leads to node nodes[k], and has the angle of the k-th phase
         self._append(name, [*inner, *nodes[:3]], np.block([[Y, -Y], [-Y, Y]]))
-        E, V_nom = 1e3 * vsource.pu * vsource.BasekV / sqrt(3.0), self._V_nom(bus)
+        V_nom = self._V_nom(bus)
         if SOURCE_VOLTAGE.objection(E / V_nom):  # the voltage base of the bus is not meant for it
             V_nom = self._own_V_nom[stiff] = E
         self.source.append(Source(bus=stiff, V_pu=E / V_nom, angle=radians(vsource.AngleDeg)))

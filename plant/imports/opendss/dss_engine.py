@@ -8,6 +8,7 @@ from typing import Any
 
 from plant.imports.import_checks import not_a_file
 from plant.imports.opendss.dss_script import HUNTING, DssScript
+from plant.imports.opendss.dss_values import impossible_values, repeated_names
 
 SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
 """Solves with controls, which set taps and capacitor steps."""
@@ -91,6 +92,8 @@ class DssEngine:
                 )
             elif message:
                 return [f"{path.name}: the engine cannot solve the circuit: {message}"]
+        if problems := [*impossible_values(self.circuit), *repeated_names(self.circuit)]:
+            return problems
         if not self.circuit.Solution.Converged:
             return [f"{path.name}: the engine's power flow does not converge; it would not in OpenDSS either"]
         for command in EXACT:  # may end at rounding instead: not every circuit allows its tolerance

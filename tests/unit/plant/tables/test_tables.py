@@ -323,3 +323,22 @@ def test_a_manifest_with_a_problem_is_told(folder: Path, text: str, told: str) -
     (folder / "feeder.toml").write_text(text, encoding="utf-8")
 
     assert problems(folder)[0].startswith(told)
+
+
+@pytest.mark.parametrize(("file", "row", "what"), [
+    ("loads_main.csv", "611,Y,P,10,5,0,0,0,0,", "a Y load"),
+    ("inverters.csv", "more,GFM,611,MG2,50,0.01,0.05,", "an inverter"),
+])  # fmt: skip
+def test_ground_is_missing_wherever_a_delta_winding_leads(folder: Path, file: str, row: str, what: str) -> None:
+    """A bus behind a line has no more ground than the winding's own: power to ground would return by nothing."""
+    for name, line in (
+        ("buses.csv", "611,ABC,0.48,passive,0,0,"),
+        ("lines.csv", "more,610,611,ABC,1,10,,"),
+        (file, row),
+    ):
+        with (folder / name).open("a") as stream:
+            stream.write(f"{line}\n")
+
+    (problem,) = problems(folder)
+
+    assert f'bus "611" stands behind a delta winding without ground, and {what} needs ground' in problem

@@ -52,6 +52,13 @@ def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
         ({"bus": "96", "phases": "C"}, 'bus "96" has no phase C; it has B'),
         ({"phases": "AB"}, 'phases "AB": must be "ABC" or "A" or "B" or "C"'),
         ({"phases": 3}, 'phases "3": must be "ABC" or "A" or "B" or "C"'),
+        (
+            {"P_rated": "much", "m_p": None},
+            'P_rated_kW must be a number, got "much"; .*m_p_pu must be a number, got "None"',
+        ),
+        ({"name": 1, "kind": 2}, 'inverter "1": kind "2": no such kind'),
+        ({"params": {1: 2}}, "1: unknown key; the keys are"),
+        ({"bus": "610", "phases": "A"}, 'bus "610" stands behind a delta winding without ground'),
         ({"name": "inv1", "bus": "160", "phases": "B"}, 'must differ; .*has inverter "inv1" on phase B already'),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from plant.imports.opendss import read_opendss
 from plant.tables.read import FeederError
-from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, write
+from tests.unit.plant.imports.opendss.opendss_solutions import LINE, SOURCE, STEP_DOWN, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
@@ -69,6 +69,23 @@ ONE_LINE = {
     "a source of another frequency": (
         "New Load.l bus1=c kv=0.48 kw=9\nSet DefaultBaseFrequency=50",
         "vsource.source: is of 60 Hz, and the circuit is solved at 50 Hz, so that the engine has 0 V",
+    ),
+    "a load without voltage": ("New Load.l bus1=c kv=0 kw=9", "load.l: kv must be above 0, got 0 kV"),
+    "a load of no number": ("New Load.l bus1=c kv=0.48 kw=NaN", "load.l: kw and kvar must be numbers, got nan kW"),
+    "a load in another unit": (
+        "New Load.l bus1=c kv=0.48 kw=1e9 kvar=0 model=2",
+        "load.l: 3.33333e+08 kW is not plausible for a load on a phase of 0.48 kV",
+    ),
+    "a winding without voltage": (
+        "New Transformer.t buses=(c d) kvs=(0.48 0) kvas=(99 99)",
+        "transformer.t: kv of winding 2 must be above 0, got 0 kV",
+    ),
+    "a bank without voltage": ("New Capacitor.k bus1=c kv=0 kvar=9", "capacitor.k: kv must be above 0, got 0 kV"),
+    "a source without voltage": ("Edit Vsource.source pu=0", "vsource.source: pu and basekv must be above 0, got 0"),
+    "a circuit without frequency": ("Set Frequency=0", "the circuit's frequency: 0 Hz is not plausible"),
+    "two elements of one name": (
+        "Set AllowDuplicates=yes\nNew Line.head bus1=b bus2=d",
+        "line.head: 2 elements have this name; names must differ",
     ),
     "a script that includes itself": ("Redirect Master.dss", "Master.dss:11: includes itself"),
     "an element defined twice": (
@@ -190,3 +207,21 @@ def test_a_folder_is_no_script(tmp_path: Path) -> None:
 
     path.write_text("module powerflow;\nobject node { name a; phases ABCN; nominal_voltage 2400; }\n")
     assert len(problems(path)) <= 4
+
+
+@pytest.mark.parametrize(("script", "bases", "note"), [
+    ("New Load.l bus1=c phases=1 kv=0.12 kw=1", "(12.47 0.48)", "load.l: has 0.2"),
+    ("", "(12.47)", "bus c: has 0.039 times its voltage base"),
+    ("", "", "bus s (and 2 more): without a voltage base"),
+])  # fmt: skip
+def test_a_voltage_that_an_element_is_hardly_meant_for_is_a_note(
+    tmp_path: Path, script: str, bases: str, note: str
+) -> None:
+    """A load far from its kv does not take its power, and per-unit values on another base mean little."""
+    path = tmp_path / "Master.dss"
+    base = f"Set VoltageBases={bases}\nCalcVoltageBases\n" if bases else ""
+    path.write_text(f"{SOURCE}{LINE}{STEP_DOWN}{script}\n{base}Solve\n")
+
+    (told,) = read_opendss(path).notes
+
+    assert told.startswith(note)
