@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from plant.tables.read import DATA, feeders
@@ -30,8 +33,23 @@ __all__ = [
     "set_status",
     "shown",
     "versions",
+    "whole_folder",
     "write_whole",
 ]
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[None]:
+    """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was."""
+    there = folder.exists()
+    try:
+        yield
+    except BaseException:  # an interruption, too
+        for path in folder.iterdir() if folder.is_dir() else ():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        if folder.is_dir() and not there:
+            folder.rmdir()
+        raise
 
 
 def feeder_folder(name: str) -> Path:

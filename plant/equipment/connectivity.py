@@ -115,25 +115,26 @@ class Connectivity:
         return frozenset(bus.name for bus in self._feeder.buses if bus.name not in reached)
 
 
-def buses_without_ground(transformers: Iterable[Transformer], joins: Iterable[tuple[str, str]]) -> frozenset[str]:
+def buses_without_ground(
+    transformers: Iterable[Transformer], lines: Iterable[Line], others: Iterable[Regulator | Switch]
+) -> frozenset[str]:
     """Return the buses behind a delta winding, from which no current can return through ground.
 
     Parameters
     ----------
-    transformers : Iterable[Transformer]
-        The feeder's transformers.
-    joins : Iterable[tuple[str, str]]
-        Ends of its lines, switches and regulators.
+    transformers, lines, others
+        The feeder's; the others are its regulators and switches.
 
     Examples
     --------
     >>> from plant.tables import read_feeder
-    >>> transformers = read_feeder("microgrid123").transformers
-    >>> sorted(buses_without_ground(transformers, [("610", "611"), ("611", "612"), ("1", "2")]))
-    ['610', '611', '612']
+    >>> feeder = read_feeder("microgrid123")
+    >>> buses_without_ground(feeder.transformers, feeder.lines, feeder.switches)
+    frozenset({'610'})
     """
     beside: dict[str, set[str]] = {}
     grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]
+    joins = [*((row.from_bus, row.to_bus) for row in lines), *((row.from_bus, row.to_bus) for row in others)]
     for one, other in (*joins, *grounded):
         beside.setdefault(one, set()).add(other)
         beside.setdefault(other, set()).add(one)

@@ -12,6 +12,9 @@ from wire.messages import PlantEvent
 RECENT = 1.0
 """Time (s) after a closing out of phase within which a collapse counts as its effect."""
 
+BEYOND = 10.0
+"""Voltage (pu) that no network has: where there is no solution, it says nothing."""
+
 SUBSTATION = "substation"
 """Subject of the event of a substation's trip."""
 
@@ -78,8 +81,10 @@ def trip_event(
         cause = f"closed out of phase, {culprit.angle:.0f} deg across {culprit.switch} at t = {culprit.t:.3f} s"
     elif load > rating and not fed:
         cause = f"overload, {load / 1e3:.0f} kW of load on inverters of {rating / 1e3:.0f} kVA"
+    elif load < 0.0:
+        cause = f"constant generation of {-load / 1e3:.0f} kW more than the load"
     else:
         cause = f"voltage collapse under {load / 1e3:.0f} kW of load"
-    lowest = f"; lowest terminal voltage {trip.V_min:.2f} pu" if trip.inverters else ""
+    lowest = f"; lowest terminal voltage {trip.V_min:.2f} pu" if trip.inverters and trip.V_min < BEYOND else ""
     text = f"{', '.join(names)} tripped, as the island has no solution: {cause}{lowest}"
     return PlantEvent(t=t, kind="trip", subject=names[0], text=text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Collection, Sequence
+from math import isfinite
 from pathlib import Path
 
 import msgspec
@@ -58,7 +59,8 @@ def report_powers(parts: Sequence[LoadPart], problems: list[str]) -> None:
     for part in parts:
         most = power_of("a load", part.V_nom, PART_CURRENT, 1)
         for power, unit in ((part.S.real / 1e3, "kW"), (part.S.imag / 1e3, "kvar")):
-            if part.name not in told and (text := most.objection(power, unit)):
+            text = most.objection(power, unit) if isfinite(power) else f"its power must be a number, got {power} {unit}"
+            if text and part.name not in told:
                 told.add(part.name)
                 problems.append(f"{part.name}: {text}")
 

@@ -108,8 +108,7 @@ def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
     switches = read_switches(folder, buses, problems)
     regulators = read_regulators(folder, buses, problems)
     transformers = read_transformers(folder, buses, problems)
-    joins = [(row.from_bus, row.to_bus) for row in (*lines, *switches, *regulators)]
-    buses.mark_floating(buses_without_ground(transformers, joins))
+    buses.mark_floating(buses_without_ground(transformers, lines, [*switches, *regulators]))
     sets = load_sets(folder)
     if load_set in sets:
         needed = not (folder / f"load_parts_{load_set}.csv").is_file()

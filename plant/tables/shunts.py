@@ -171,8 +171,7 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
     cells.update({key: _cell(value, unit) for key, (value, unit) in numbers.items()})
     row = CsvRow(InverterColumns, f'inverter "{inverter.name}"', cells, problems)
     row.require("P_rated_kW", _rating(bus, inverter.phases, sum(feeder.load_by_bus().values()) / 1e3))
-    joins = [(row.from_bus, row.to_bus) for row in (*feeder.lines, *feeder.switches, *feeder.regulators)]
-    if bus.name in buses_without_ground(feeder.transformers, joins):
+    if bus.name in buses_without_ground(feeder.transformers, feeder.lines, [*feeder.switches, *feeder.regulators]):
         row.problem(GROUND_NEEDED.format(bus=bus.name, what="an inverter"))
     if missing := [phase for phase in inverter.phases if phase not in bus.phases and "phases" not in row.wrong]:
         row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')

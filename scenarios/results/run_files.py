@@ -103,12 +103,15 @@ def refusal(folder: Path, error: OSError) -> str:
     return str(error)
 
 
-def write_whole(path: Path, text: str | Iterable[str]) -> None:
-    """Write a file, from its text or pieces of it, at once or not at all."""
+def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
+    """Write a file, from its text, pieces of it, or bytes, at once or not at all."""
     partial = path.with_name(path.name + ".partial")
     try:
-        with partial.open("w", encoding="utf-8", newline="\n") as file:
-            file.writelines([text] if isinstance(text, str) else text)
+        if isinstance(content, bytes):
+            partial.write_bytes(content)
+        else:
+            with partial.open("w", encoding="utf-8", newline="\n") as file:
+                file.writelines([content] if isinstance(content, str) else content)
         partial.replace(path)
     except OSError:
         with contextlib.suppress(OSError):

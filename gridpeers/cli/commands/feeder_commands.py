@@ -52,6 +52,7 @@ def import_(
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
+    from gridpeers.output_folders import whole_folder
     from plant.tables import feeders
     from scenarios.results.run_files import refusal, shown
 
@@ -60,7 +61,8 @@ def import_(
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             fail([f"{folder}: is there already; name a new folder with --out"], BAD_INPUT)
-        save_readable(feeder, folder)
+        with whole_folder(folder):
+            save_readable(feeder, folder)
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)
     _describe(feeder)
@@ -116,7 +118,7 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
-    from scenarios.results.run_files import refusal, shown
+    from scenarios.results.run_files import refusal, shown, write_whole
 
     try:
         table = _read(feeder, switch, leave_out).solve(open_ or ())
@@ -128,7 +130,7 @@ def solve(
         typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
     if csv is not None:
         try:
-            table.to_csv(csv, index=False)
+            write_whole(csv, table.to_csv(index=False))
         except OSError as error:
             fail([refusal(csv, error)], BAD_INPUT)
         typer.echo(f"Voltages: {shown(csv)}")
@@ -148,12 +150,16 @@ def plot(
 
     Example:  gridpeers feeder plot microgrid123 --out map.svg
     """
-    from scenarios.results.run_files import refusal, shown
+    from io import BytesIO
+
+    from scenarios.results.run_files import refusal, shown, write_whole
 
     tables = _read(feeder, switch, leave_out)
     try:
-        out = out if out.suffix else out.with_suffix(".png")  # as the figure would by itself, without telling
-        tables.plot(voltages=voltages).savefig(out, dpi=130)
+        out = out if out.suffix else out.with_suffix(".png")
+        drawn = BytesIO()
+        tables.plot(voltages=voltages).savefig(drawn, dpi=130, format=out.suffix[1:].lower())
+        write_whole(out, drawn.getvalue())
     except (ValueError, ArithmeticError) as error:
         fail([f"{feeder}: {error}"], BAD_INPUT)
     except OSError as error:
@@ -181,16 +187,13 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
 
 
 def save_readable(feeder: Feeder, folder: Path) -> None:
-    """Write a feeder's tables and read them again; end with every problem, and no tables, if a run could not."""
-    import shutil
-
+    """Write a feeder's tables and read them again; end with every problem if a run could not."""
     from plant.tables import FeederError
 
     feeder.save(folder)
     try:
         feeder.read(folder)
     except FeederError as error:
-        shutil.rmtree(folder)
         refuse(error)
 
 

@@ -34,11 +34,13 @@ def glm(
 
     Example:  gridpeers feeder glm microgrid123 --scenario islanding --out islanding.glm
     """
+    from tempfile import gettempdir
+
     from gridpeers.feeder import READERS
     from plant.dynamics import PlantError
     from plant.gridlabd.export_glm import export_glm
     from plant.tables import FeederError
-    from scenarios.results.run_files import refusal, shown
+    from scenarios.results.run_files import refusal, shown, write_whole
 
     if Path(feeder).suffix.lower() in READERS:
         fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
@@ -52,8 +54,10 @@ def glm(
         refuse(error)
     except PlantError as error:
         fail([f"{feeder}: {error}"], BAD_INPUT)
+    except OSError as error:  # of the tables that it is made from
+        fail([refusal(Path(gettempdir()), error)], BAD_INPUT)
     try:
-        file.write_text(text, encoding="utf-8")
+        write_whole(file, text)
     except OSError as error:
         fail([refusal(file, error)], BAD_INPUT)
     typer.echo(f"Model: {shown(file)}; GridLAB-D writes the voltages of its start to {file.stem}_voltages.csv")

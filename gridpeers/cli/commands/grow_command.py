@@ -64,6 +64,7 @@ def grow(
     Example:  gridpeers feeder grow microgrid123 --copies 11 --joint 450 --switch 13-152 --out hundred
     """
     from gridpeers.feeder import Feeder
+    from gridpeers.output_folders import whole_folder
     from plant.equipment.joined_copies import copy_name, joined_copies
     from plant.tables import FeederError
     from scenarios.results.run_files import refusal, shown
@@ -92,8 +93,9 @@ def grow(
     try:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             fail([f"{out}: is there already; name a new or an empty folder"], BAD_INPUT)
-        grown.save(out / grown.name)
-        (out / "islanding.toml").write_text(text, encoding="utf-8")
+        with whole_folder(out):
+            grown.save(out / grown.name)
+            (out / "islanding.toml").write_text(text, encoding="utf-8")
     except OSError as error:
         fail([refusal(out, error)], BAD_INPUT)
     typer.echo(f"{len(grown.buses)} buses, {len(grown.inverters)} inverters: {shown(out / 'islanding.toml')}")

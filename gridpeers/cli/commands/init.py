@@ -100,6 +100,7 @@ def init(
     """
     import shlex
 
+    from gridpeers.output_folders import whole_folder
     from scenarios.results.run_files import refusal, shown
 
     try:
@@ -109,10 +110,12 @@ def init(
         if feeder is None:
             if switch or leave_out or inverters:
                 fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
-            shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+            with whole_folder(folder):
+                shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
             following = "gridpeers run mine.toml --driver inprocess && pytest"
         else:
-            _propose(folder, feeder, switch or [], leave_out or [], inverters)
+            with whole_folder(folder):
+                _propose(folder, feeder, switch or [], leave_out or [], inverters)
             following = "gridpeers run islanding.toml --driver inprocess"
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from tempfile import gettempdir
 
 import pandas as pd
 import pytest
@@ -174,3 +176,27 @@ def test_copies_of_a_feeder_become_a_scenario_that_can_be_run(elsewhere: Path) -
     ):
         code, text = invoke("feeder", "grow", "microgrid123", *words, "--copies", "2", "--out", "second")
         assert (code, said in text, Path("second").exists()) == (2, True, False)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+@pytest.mark.parametrize("words", [
+    ("solve", "microgrid123", "--csv", "v.csv"),
+    ("plot", "microgrid123", "--out", "map.svg"),
+    ("glm", "standard123", "--out", "feeder.glm"),
+    ("grow", "microgrid123", "--joint", "450", "--switch", "13-152", "--copies", "2", "--out", "grown"),
+])  # fmt: skip
+def test_a_disk_that_fills_up_leaves_nothing_half_written(elsewhere: Path, words: tuple[str, ...]) -> None:
+    """A file or folder is there as a whole, or not at all; the error names it."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, hard))  # a file that grows beyond is refused by the system
+    try:
+        code, printed = invoke("feeder", *words)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    assert code == 2
+    place = gettempdir() if words[0] == "glm" else words[-1]
+    assert f"{place}: cannot be written: File too large" in printed
+    assert list(Path().iterdir()) == []

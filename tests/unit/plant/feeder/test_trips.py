@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from plant.dynamics.switching import Trip
 from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder import Plant
+from plant.feeder.trips import trip_event
 from plant.network import Network
 from plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from plant.tables import read_feeder
@@ -181,3 +184,15 @@ def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> 
     tripped = [event.text for event in trips(p.take_events())]
     assert len(tripped) == 1
     assert tripped[0].startswith("inv1, inv2, inv3 tripped, as the island has no solution")
+
+
+def test_generation_beyond_the_load_is_no_collapse_under_load() -> None:
+    """Where nothing takes what is generated, the trip says so, without a voltage that no network has."""
+    feeder = read_feeder("microgrid123")
+    loads = tuple(replace(load, S=(-load.S[0], -load.S[1], -load.S[2])) for load in feeder.loads)
+    network = Network(replace(feeder, loads=loads, source=None))
+    trip = Trip(step=0, inverters=(0,), substation=False, V_min=8e8)
+
+    text = trip_event(1.0, trip, network, frozenset(row.name for row in feeder.switches), ()).text
+
+    assert text.endswith("no solution: constant generation of 4192 kW more than the load")
