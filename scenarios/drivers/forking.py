@@ -11,8 +11,8 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
-from types import TracebackType
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType, TracebackType
 from typing import IO, Any
 
 _SET_CHILD_SUBREAPER = 36
@@ -35,6 +35,8 @@ class ForkServer:
     ----------
     preload : Sequence[str]
         Modules to import, or `module:function` to call.
+    environment : Mapping[str, str], optional
+        Variables beside, or instead of, those of this process; what is forked has them too.
 
     Raises
     ------
@@ -42,7 +44,7 @@ class ForkServer:
         If this process cannot become the parent of what the server forks.
     """
 
-    def __init__(self, preload: Sequence[str]) -> None:
+    def __init__(self, preload: Sequence[str], environment: Mapping[str, str] = MappingProxyType({})) -> None:
         libc = ctypes.CDLL(None, use_errno=True)
         if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
             raise ForkServerError(f"this process cannot be a subreaper: {os.strerror(ctypes.get_errno())}")
@@ -54,7 +56,13 @@ class ForkServer:
                 stderr=subprocess.DEVNULL,  # what cannot be imported is in the log of the process that is started anew
                 pass_fds=(served.fileno(),),
                 start_new_session=True,
+                env=os.environ | environment,
             )
+
+    @property
+    def lives(self) -> bool:
+        """Whether it has not ended."""
+        return self._server.poll() is None
 
     def fork(self, words: Sequence[str], log: IO[bytes], *, speaks: bool) -> ForkedProcess:
         """Run a module in a new process.
@@ -100,6 +108,10 @@ class ForkServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the server."""
         self._control.close()
         self._server.kill()  # it may still import; it has nothing to put in order
         self._server.wait()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -14,11 +14,8 @@ from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.fault_injector import FaultInjector
-from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
+from scenarios.drivers.warm_servers import agent_server, plant_server
 from wire.messages import PLANT
-
-PRELOAD = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.laws.consensus")
-"""Modules, and a function to call, that the fork server loads once for all agents."""
 
 
 class Supervisor:
@@ -81,33 +78,39 @@ class Supervisor:
     def start(self, *names: str) -> None:
         """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life.
 
-        Agents that share a process start with the first of them. Several processes of agents are forked from one that
-        has imported what they need.
+        Agents that share a process start with the first of them. The plant and the agents are forked from processes
+        that have imported what they need. If the plant is the first, the agents do not wait until its server is there.
         """
         firsts = [name for name in names if name == self._mates(name)[0]]
-        agents = [name for name in firsts if name != PLANT and name not in self._prefixes]
-        with ExitStack() as stack:
-            server = None
-            if len(agents) > 1 and AVAILABLE:
-                with suppress(ForkServerError):
-                    server = stack.enter_context(ForkServer((*PRELOAD, self._module(agents[0]))))
+        several = len(firsts) > 2  # else a server would take as long as the process itself
+        if firsts[:1] != [PLANT]:
             for name in firsts:
-                self._start(name, server)
+                self.children.add(self._child(name, several=several))
+            return
+        with ThreadPoolExecutor(1) as beside:
+            plant = beside.submit(self._child, PLANT, several=several)
+            try:
+                for name in firsts[1:]:
+                    self.children.add(self._child(name, several=several))
+            finally:
+                self.children.add(plant.result())
 
-    def _start(self, name: str, server: ForkServer | None) -> None:
+    def _child(self, name: str, *, several: bool) -> Child:
+        """Start the next life of a name, one of several or alone."""
         life = len(self.children.lives(name)) + 1
         log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
         if name == PLANT:
             usual = ("-m", "scenarios.emulation.emulated_plant" if self._plant.links else "plant")
             command = list(self._plant_command or usual)
-            self.children.add(Child(name, command, self._plant, log, self._on_exit, self._on_word))
-            return
+            ours = not self._plant_command and self._plant.settings.simulator == "gridpeers"
+            server = plant_server() if ours else None
+            return Child(name, command, self._plant, log, self._on_exit, self._on_word, server=server)
         configs = tuple(replace(self._agents[mate], epoch=life) for mate in self._mates(name))
         process = configs if len(configs) > 1 else configs[0]
         prefix = self._prefixes.get(name, ())
-        command = ["-m", self._module(name)]
-        server = None if prefix else server
-        self.children.add(Child(name, command, process, log, self._on_exit, prefix=prefix, server=server))
+        module = self._module(name)
+        server = None if prefix else agent_server(module, start=several)
+        return Child(name, ["-m", module], process, log, self._on_exit, prefix=prefix, server=server)
 
     def _mates(self, name: str) -> tuple[str, ...]:
         """Return the agents that share the process of one, itself included."""

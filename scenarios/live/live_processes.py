@@ -22,6 +22,7 @@ from plant.realtime.pacer import sentence
 from scenarios.drivers.children import Child
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.drivers.telemetry_client import RECORDER
+from scenarios.drivers.warm_servers import release
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.link_log import LinkLog
 from scenarios.live.live_recorder import LiveRecorder
@@ -143,6 +144,7 @@ def all_here(
     def run(recorder: LiveRecorder) -> str:
         with supervisor:
             supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
+            release()
             try:
                 while not plant_ended.wait(min(supervisor.wait, CHECK)):
                     if recorder.client.progress is not None:

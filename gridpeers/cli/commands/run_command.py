@@ -76,6 +76,10 @@ def run(
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
+    if driver == "processes":
+        from scenarios.drivers.warm_servers import prepare
+
+        prepare()
     from gridpeers.runs.choices import Pace
 
     changes = {"plant.simulator": plant, "plant.helics.broker": broker}

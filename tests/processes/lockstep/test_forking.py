@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from time import monotonic
@@ -12,6 +14,7 @@ import pytest
 
 from scenarios.drivers.children import Child
 from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
+from scenarios.drivers.warm_servers import agent_server, plant_server, release
 from tests.toy.toy_configs import agent_config
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
@@ -66,3 +69,58 @@ def test_a_server_with_threads_forks_nothing(tmp_path: Path, monkeypatch: pytest
         pytest.raises(ForkServerError, match="has 2 threads"),
     ):
         server.fork(["agents"], log, speaks=False)
+
+
+def test_a_server_stays_until_its_surroundings_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A variable that has changed since must reach what is started now, as it reaches any new process."""
+    try:
+        first = agent_server()
+        assert first is not None
+        assert agent_server() is first
+        monkeypatch.setenv("RUST_LOG", "zenoh=warn")
+        second = agent_server()
+        assert second is not None
+        assert second is not first
+        assert second.lives
+        assert not first.lives
+    finally:
+        release()
+    assert not second.lives
+    assert agent_server(start=False) is None
+
+
+def test_a_forked_plant_has_loaded_its_step_and_no_thread(tmp_path: Path) -> None:
+    """So it can be forked at all, and is ready in a tenth of the time of a new process."""
+    try:
+        server = plant_server()
+        assert server is not None
+        with (tmp_path / "log").open("wb") as log:
+            plant = server.fork(["plant", "--leash", "plant"], log, speaks=True)
+        libraries = Path(f"/proc/{plant.pid}/maps").read_text()
+        plant.stdin.close()
+        assert plant.wait() == 2  # no configuration
+        assert plant.stdout is not None
+        plant.stdout.close()
+    finally:
+        release()
+    assert "llvmlite" in libraries
+
+
+def test_servers_go_with_a_process_that_is_killed(tmp_path: Path) -> None:
+    """Nobody can end them then: they leave because nobody can ask them any more."""
+    code = """
+from scenarios.drivers.warm_servers import agent_server
+with open("log", "wb") as log:
+    agent_server().fork(["agents"], log, speaks=False)  # so the server has imported, and serves
+    print(agent_server()._server.pid, flush=True)
+    input()
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as owner:
+        assert owner.stdout is not None
+        server = int(owner.stdout.readline())
+        watched = os.pidfd_open(server)
+        owner.kill()
+    assert select.select([watched], [], [], 60.0)[0]
+    os.close(watched)

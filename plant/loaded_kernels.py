@@ -1,0 +1,32 @@
+"""Load the plant's compiled step ahead of a plant: for the process from which plants are forked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numba
+
+from plant.build import build_plant
+from plant.plant_config import PlantConfig, PlantSettings
+
+
+def load_kernels() -> None:
+    """Build and step a plant of the feeder that comes with gridpeers, unless its step would have to be compiled.
+
+    The first compilation takes up to a minute; it is for the plant's own process, which says that it compiles.
+    """
+    folder = Path(numba.config.CACHE_DIR)  # type: ignore[attr-defined]  # numba.config fills itself at import
+    if next(folder.rglob("*.nbi"), None) is None:
+        return
+    settings = PlantSettings()
+    config = PlantConfig(
+        run="none",
+        settings=settings,
+        agents=(),
+        T_c=settings.h,
+        end=None,
+        record_step=settings.h,
+        deadline=1.0,
+        listen=(),
+    )
+    build_plant(config).advance()
