@@ -59,7 +59,7 @@ class _Profile(NamedTuple):
 Clock = Literal["simulated", "wall"]
 
 _PROFILES: dict[Clock, _Profile] = {
-    "simulated": _Profile(LEASE, (20, 200, 1.5), 10_000, WAIT_BEFORE_CLOSE, may_drop=False),
+    "simulated": _Profile(LEASE, (20, 50, 1.5), 10_000, WAIT_BEFORE_CLOSE, may_drop=False),
     "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, WALL_WAIT_BEFORE_CLOSE, may_drop=True),
 }
 
