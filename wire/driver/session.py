@@ -25,6 +25,10 @@ _RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app)
 """Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
 flood of messages can stall it."""
 
+_ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
+"""All in one pool of one thread, for the client of a relay. It passes nothing on, so receiving never waits for sending;
+a message then wakes one thread of Zenoh instead of two."""
+
 LEASE = 60_000
 """Time (ms) after which a silent link counts as dead, in lock-step. It is long because it must not decide: the death of
 a process closes its links at once, and the deadlines of the lock-step detect a frozen one."""
@@ -70,9 +74,10 @@ _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
 
-def load_zenoh() -> None:
-    """Import Zenoh with the threads that a node needs; it starts none before its first session."""
-    os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
+def load_zenoh(*, one_thread: bool = False) -> None:
+    """Import Zenoh and choose its threads, which the first session starts; a ZENOH_RUNTIME of the user's own counts."""
+    if os.environ.get("ZENOH_RUNTIME") in (None, _RUNTIME, _ONE_THREAD):  # a parent's choice is not this process's
+        os.environ["ZENOH_RUNTIME"] = _ONE_THREAD if one_thread else _RUNTIME
     import zenoh  # noqa: F401
 
 
@@ -127,7 +132,7 @@ class Session:
         star: bool = False,
     ) -> None:
         try:
-            load_zenoh()
+            load_zenoh(one_thread=star and not rendezvous)
             import zenoh
         except ImportError as error:
             raise SessionError(
