@@ -60,10 +60,14 @@ else:
     OwnParameters.__doc__ = "Some parameters of an inverter of either kind; None gives nothing."
 
 
-def _published(own: GfmParameters) -> OwnParameters:
-    """Return a set of all parameters but the bounds of set-points, which no specification has."""
-    bounds = {"P_set_lim", "V_set_min", "V_set_max"}
-    return OwnParameters(**{name: getattr(own, name) for name in own.__struct_fields__ if name not in bounds})
+BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})
+"""Parameters of ours alone: neither a published model nor GridLAB-D's inverter has them."""
+
+
+def _published(own: InverterParameters) -> OwnParameters:
+    """Return a set of all parameters that a specification has."""
+    names = [name for name in own.__struct_fields__ if name not in BOUNDS_OF_SET_POINTS]
+    return OwnParameters(**{name: getattr(own, name) for name in names})
 
 
 PUBLISHED_SETS = {"regfm_a1": _published(REGFM_A1), "regfm_a1_vflag0": _published(REGFM_A1_VFLAG0)}

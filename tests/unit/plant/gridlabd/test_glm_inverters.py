@@ -5,17 +5,19 @@ from typing import Any, Literal, get_args, get_origin
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment.own_parameters import PARAMETERS_OF
+from plant.equipment.own_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
 from plant.gridlabd.glm_inverters import inverter_blocks
 from plant.gridlabd.unrepresentable import beyond_gridlabd
 from wire.schema.table_schema import Field, fields_of
 
 ROW = {"name": "inv1", "bus": "13", "P_rated_kW": "600", "m_p_pu": "0.01", "m_q_pu": "0.05"}
 
-BOUNDS = {"P_set_lim", "V_set_min", "V_set_max"}
-"""Parameters by which set-points are bounded before GridLAB-D gets them."""
-
-KEYS = [(kind, field) for kind, cls in PARAMETERS_OF.items() for field in fields_of(cls) if field.name not in BOUNDS]
+KEYS = [
+    (kind, field)
+    for kind, cls in PARAMETERS_OF.items()
+    for field in fields_of(cls)
+    if field.name not in BOUNDS_OF_SET_POINTS  # they bound set-points before GridLAB-D gets them
+]
 
 
 def another(field: Field) -> Any:

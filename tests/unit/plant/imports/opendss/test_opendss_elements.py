@@ -66,6 +66,26 @@ New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
     assert largest_difference(path) < TOLERANCE
 
 
+def test_a_line_with_a_control_that_switches_it_is_a_switch(tmp_path: Path) -> None:
+    """A line that a SwtControl can open becomes a switch, though the script does not call it one."""
+    line = "New Line.tie bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05\nNew Load.d bus1=d kv=0.48 kw=90 kvar=30"
+    path = write(tmp_path, LINE, STEP_DOWN, line, "New SwtControl.s SwitchedObj=Line.tie SwitchedTerm=1")
+
+    assert [switch.alias for switch in read_opendss(path).switches] == ["tie"]
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_a_bus_without_a_voltage_base_has_its_own_voltage(tmp_path: Path) -> None:
+    """Where a script sets no voltage bases, the voltage that a bus has is its nominal one."""
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS)
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if "VoltageBases" not in line))
+    theirs = engine_voltages(path)
+
+    for bus in read_opendss(path).buses:
+        if bus.name in "bc":
+            assert bus.V_nom == pytest.approx(max(abs(theirs[f"{bus.name}.{number}"]) for number in (1, 2, 3)))
+
+
 def test_opening_a_switch_is_opening_the_line(tmp_path: Path) -> None:
     """Opened after the import, a switch gives the voltages that the engine has with the line opened in the script."""
     ring = """New Line.tie bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1

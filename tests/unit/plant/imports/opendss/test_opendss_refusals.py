@@ -66,6 +66,10 @@ ONE_LINE = {
         "New GrowthShape.g npts=2 year=(1 9) mult=(1.02 1.01)\nNew Load.l bus1=c kv=0.48 kw=9 growth=g\nSet year=3",
         "load.l: growth=g: growth by a GrowthShape is not supported",
     ),
+    "a source that is not grounded": (
+        "Edit Vsource.source bus2=q.1.2.3\nNew Reactor.q bus1=q phases=3 r=1 x=0",
+        "vsource.source: a source has three phases between nodes 1, 2, 3 of its bus and ground",
+    ),
     "a source of another frequency": (
         "New Load.l bus1=c kv=0.48 kw=9\nSet DefaultBaseFrequency=50",
         "vsource.source: is of 60 Hz, and the circuit is solved at 50 Hz, so that the engine has 0 V",
