@@ -41,6 +41,7 @@ LIMIT = 1e-6
 """Largest difference of a phasor (pu of nominal voltage) and of the storage's power (pu of its rating)."""
 
 M_Q = 0.05
+"""Q-V droop of our GFM (pu)."""
 
 TEXT = f"""
 The microgrid feeder, islanded at {ISLANDING} with 3.4 MW of load, behind one grid-forming storage of 4 MVA

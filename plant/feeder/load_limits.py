@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from plant.dynamics.kernel.limited_load import COLUMNS, limited_admittance
 from plant.network import Network
 from wire.messages import PlantEvent
+from wire.schema.suggestion import first_of
 
 PAUSE = 0.5
 """Time (s) without a crossing after which a load's next crossing is reported: once per spell of an oscillation."""
@@ -87,10 +88,9 @@ class LoadLimits:
             return []
         within, outside = (sum(jump.S[k] for jump in jumps if jump.name in names) for k in (0, 1))
         change = (outside - within if beyond else within - outside) / (within if beyond else outside)
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
         way = "rises above" if (LIMITS[limit] > 0) == beyond else "falls below"
         text = (
-            f"voltage of {', '.join(names[:SHOWN])}{more} {way} {limit}, where the law of such a load jumps: "
+            f"voltage of {first_of(names, SHOWN)} {way} {limit}, where the law of such a load jumps: "
             f"{abs(change):.0%} {'more' if change > 0.0 else 'less'} apparent power at once"
         )
         return [PlantEvent(t=t, kind="limit", subject=names[0], text=text)]

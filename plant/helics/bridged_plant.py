@@ -65,7 +65,7 @@ class BridgedPlant:
             for topic in (*topics.sensors(prefix, name), *topics.held(prefix, name), *topics.where(prefix, name))
         ]
         asked = [topic for name in self._outside for topic in topics.set_points(prefix, name)]
-        publish = self._measured(readings) | self._told(self._events)
+        publish = self._measured(readings) | self._as_value(self._events)
         try:
             federation = self._federate.begin([*own, topics.events(prefix)], asked, publish)
             self._note_absent(federation, {topic.key for topic in asked})
@@ -103,7 +103,7 @@ class BridgedPlant:
         self._events += events
         for row, following in pairwise(rows):
             self._take(self._federate.step(self._row(row), following[0], needed=False))
-        self._outgoing = self._measured(self._plant.measure()) | self._told(events)
+        self._outgoing = self._measured(self._plant.measure()) | self._as_value(events)
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
         """Take out the rows recorded since the last call."""
@@ -152,8 +152,8 @@ class BridgedPlant:
         self._sent |= {key: value for key, value in values.items() if not isinstance(value, float)}
         return values
 
-    def _told(self, events: Iterable[PlantEvent]) -> dict[str, Value]:
-        """Return events as a value."""
+    def _as_value(self, events: Iterable[PlantEvent]) -> dict[str, Value]:
+        """Return events as the value of their topic; nothing without any."""
         text = msgspec.json.encode(tuple(events)).decode()
         return {topics.events(self._prefix).key: text} if text != "[]" else {}
 

@@ -147,15 +147,15 @@ class HelicsFederate:
         answer = self._answer(monotonic() + wait)
         if answer is not None:
             return answer
-        self._process.send({"do": "stand"})
+        self._process.send({"do": "times"})
         until = monotonic() + ASK
-        stand: list[str] = []
+        times: list[str] = []
         while (answer := self._answer(until)) is not None:
-            if "stand" in answer:
-                stand = answer["stand"]
+            if "times" in answer:
+                times = answer["times"]
                 break
         silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
-        where = f": {', '.join(stand)}" if stand else silent
+        where = f": {', '.join(times)}" if times else silent
         key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
         raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
 

@@ -9,7 +9,7 @@ what HELICS prints goes to standard error.
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}
     {"do": "step", "publish": {key: value}, "time", "needed"}  publish, go to a time (s), return the values that came
     {"do": "end", "publish": {key: value}}              publish, leave the federation, end
-    {"do": "stand"}                                     where the others are; also in the middle of a wait
+    {"do": "times"}                                     times of the others; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
 """
 
@@ -148,7 +148,7 @@ class Federate:
             self.helics.helicsFederateGlobalError(self.fed, GLOBAL_ERROR, reason)
             time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
 
-    def stand(self) -> list[str]:
+    def times(self) -> list[str]:
         """Return the other federates and the times at which they stand, for a complaint."""
         if self.fed is None:
             return []
@@ -232,16 +232,16 @@ def main() -> None:
         with contextlib.suppress(OSError):  # the parent is gone: so is this process, in a moment
             answers.write(json.dumps(content) + "\n")
 
-    def tell_stand() -> None:
+    def answer_times() -> None:
         with contextlib.suppress(Exception):
-            answer({"stand": federate.stand() if federate else []})
+            answer({"times": federate.times() if federate else []})
 
     def listen() -> None:
         """Take requests; do at once what must not wait for the present one."""
         for line in sys.stdin:
             request = json.loads(line)
-            if request["do"] == "stand":  # HELICS asks a dead federate, too, and waits long for it
-                threading.Thread(target=tell_stand, daemon=True).start()
+            if request["do"] == "times":  # HELICS asks a dead federate, too, and waits long for it
+                threading.Thread(target=answer_times, daemon=True).start()
             elif request["do"] == "abort":
                 if federate:
                     federate.abort(request["reason"])

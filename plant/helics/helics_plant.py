@@ -16,6 +16,7 @@ from plant.helics.topics import ACT, Value, number
 from plant.plant_config import PlantConfig
 from wire.bounds import NAME
 from wire.messages import PlantEvent
+from wire.schema.suggestion import first_of
 from wire.timing.clock import time_of
 
 SHOWN = 4
@@ -138,7 +139,8 @@ class HelicsPlant:
         self._check(came, t)
         self._values |= came
         if (lacking := [key for key in self._needed if key not in self._values]) and row == 0:
-            raise HelicsError(f"HELICS, t = 0 s: no value yet of {_short(lacking)}; publish all at t = 0 or before")
+            text = f"no value yet of {first_of(lacking, SHOWN)}; publish all at t = 0 or before"
+            raise HelicsError(f"HELICS, t = 0 s: {text}")
         self._rows.append((t, *(x for name in self.inverters for x in self._numbers(name))))
         if text := came.get(topics.events(self._helics.prefix).key):
             self._events += self._decoded(str(text), t)
@@ -155,7 +157,7 @@ class HelicsPlant:
         if lacking:
             others = ", ".join(federation["others"]) or "nobody else"
             raise HelicsError(
-                f"HELICS: nobody publishes {_short(lacking)} (in the federation: {others}); "
+                f"HELICS: nobody publishes {first_of(lacking, SHOWN)} (in the federation: {others}); "
                 "publish these topics, or correct plant.helics.prefix"
             )
 
@@ -173,8 +175,3 @@ class HelicsPlant:
         except msgspec.DecodeError as error:
             key = topics.events(self._helics.prefix).key
             return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {error}"),)
-
-
-def _short(keys: list[str]) -> str:
-    more = len(keys) - SHOWN
-    return ", ".join(keys[:SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -15,12 +15,16 @@ from plant.equipment.connectivity import Connectivity, Node, by_bus
 from plant.equipment.imported_equipment import LoadPart
 from plant.tables.feeder_columns import PART_CURRENT, power_of
 from plant.tables.read import FeederError
+from wire.schema.suggestion import first_of
 
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
 
 SHOWN = 5
-"""How many buses of a floating section a problem names."""
+"""How many buses of a section, or loads, a sentence names."""
+
+MOST_UNFED = 0.5
+"""Part of a feeder's load that may be without a path to the source; more of it is a mistake in the file."""
 
 
 def number_of(letter: str) -> str:
@@ -28,7 +32,7 @@ def number_of(letter: str) -> str:
     return str(NODES.index(letter) + 1)
 
 
-def not_a_file(path: Path) -> list[str]:
+def path_problems(path: Path) -> list[str]:
     """Return what is wrong with the path of a file to import, if it is none."""
     if path.is_file():
         return []
@@ -65,10 +69,6 @@ def report_powers(parts: Sequence[LoadPart], problems: list[str]) -> None:
                 problems.append(f"{part.name}: {text}")
 
 
-MOST_UNFED = 0.5
-"""Part of a feeder's load that may be without a path to the source; more of it is a mistake in the file."""
-
-
 def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], str] = number_of) -> Feeder:
     """Return a feeder without the sections and loads that nothing can feed, each of which becomes a note.
 
@@ -76,9 +76,9 @@ def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], s
     leads. Nothing flows there, so that the rest is what it was. If they have most of the load, the feeder stays as it
     is, and `refuse_unsolvable` names them.
     """
-    held, sections = _held(feeder), _unfed_sections(feeder)
+    supported, sections = _nodes_of_elements(feeder), _unfed_sections(feeder)
     gone = frozenset[Node]().union(*sections)
-    idle = _idle_parts(feeder, held)
+    idle = _idle_parts(feeder, supported)
     parts = [part for k, part in enumerate(feeder.load_parts) if k in idle or (part.bus, part.ends[0]) in gone]
     unserved = sum(part.S.real for part in parts)
     if not (gone or parts) or unserved > MOST_UNFED * sum(part.S.real for part in feeder.load_parts):
@@ -89,10 +89,9 @@ def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], s
         notes.append(f"{_named(feeder, section, name_node)}: no path to the source; left out{with_load}")
     names = list(dict.fromkeys(part.name for k, part in enumerate(feeder.load_parts) if k in idle))
     if names:
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-        notes.append(f"{', '.join(names[:SHOWN])}{more}: at a node to which nothing else leads; left out")
+        notes.append(f"{first_of(names, SHOWN)}: at a node to which nothing else leads; left out")
     kept = tuple(part for part in feeder.load_parts if part not in parts)
-    used = held | {(part.bus, letter) for part in kept for letter in part.ends}
+    used = supported | {(part.bus, letter) for part in kept for letter in part.ends}
     used |= {(bus, letter) for row in feeder.switches for bus in (row.from_bus, row.to_bus) for letter in row.phases}
     buses = [
         msgspec.structs.replace(bus, phases="".join(p for p in bus.phases if (bus.name, p) in used - gone))
@@ -111,11 +110,11 @@ def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], s
     )
 
 
-def _held(feeder: Feeder) -> set[Node]:
+def _nodes_of_elements(feeder: Feeder) -> set[Node]:
     """Return the nodes to which an element or the source leads, and not loads alone."""
     assert feeder.source is not None
-    held = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
-    return held | {(feeder.source.bus, letter) for letter in PHASES}
+    supported = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
+    return supported | {(feeder.source.bus, letter) for letter in PHASES}
 
 
 def _unfed_sections(feeder: Feeder) -> list[frozenset[Node]]:
@@ -124,12 +123,12 @@ def _unfed_sections(feeder: Feeder) -> list[frozenset[Node]]:
     through_loads = [
         ((part.bus, one), (part.bus, other)) for part in feeder.load_parts for one, other in [part.ends] if other
     ]
-    source, held = feeder.source.bus, _held(feeder)
+    source, supported = feeder.source.bus, _nodes_of_elements(feeder)
     parts = Connectivity(feeder).parts(whole=[source], tied=through_loads)
-    return by_bus(part for part in parts if (source, "A") not in part and part & held)
+    return by_bus(part for part in parts if (source, "A") not in part and part & supported)
 
 
-def _idle_parts(feeder: Feeder, held: Collection[Node]) -> set[int]:
+def _idle_parts(feeder: Feeder, supported: Collection[Node]) -> set[int]:
     """Return the places of the load parts through which no current can flow.
 
     Nodes that only loads lead to, and their loads, form groups; a group that touches one other node, or ground alone,
@@ -143,7 +142,7 @@ def _idle_parts(feeder: Feeder, held: Collection[Node]) -> set[int]:
         return node
 
     ends = [[(part.bus, letter) for letter in part.ends] for part in feeder.load_parts]
-    loose = [[node for node in pair if node[1] and node not in held] for pair in ends]
+    loose = [[node for node in pair if node[1] and node not in supported] for pair in ends]
     for nodes in loose:
         for node in nodes[1:]:
             group[root(node)] = root(nodes[0])
@@ -159,9 +158,8 @@ def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str],
     """Return the first buses of a section, and the nodes that it has of the first."""
     nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
     buses = list(dict.fromkeys(bus for bus, _ in nodes))
-    more = f" and {len(buses) - SHOWN} more" if len(buses) > SHOWN else ""
     first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
-    return f"bus{'es' if len(buses) > 1 else ''} {', '.join(buses[:SHOWN])}{more} (first {first})"
+    return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN)} (first {first})"
 
 
 def refuse_unsolvable(
@@ -190,11 +188,11 @@ def refuse_unsolvable(
 
 def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable[[str], str]) -> None:
     """Add a problem for each node that loads alone lead to, and each section without the source, switches closed."""
-    held = _held(feeder)
+    supported = _nodes_of_elements(feeder)
     alone: dict[tuple[str, str], set[str]] = {}
     for part in feeder.load_parts:
         for letter in part.ends:
-            if letter and (part.bus, letter) not in held:
+            if letter and (part.bus, letter) not in supported:
                 alone.setdefault((part.name, part.bus), set()).add(letter)
     for (name, bus), letters in alone.items():
         which = ", ".join(map(name_node, sorted(letters, key=NODES.index)))
@@ -204,7 +202,7 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
         )
     for section in _unfed_sections(feeder):
         problems.append(
-            f"{_named(feeder, section & held, name_node)}: no path to the source, even with all switches closed; "
+            f"{_named(feeder, section & supported, name_node)}: no path to the source, even with all switches closed; "
             "connect or leave out what is there"
         )
 

@@ -11,7 +11,7 @@ from plant.equipment import PHASES, Bus, Feeder
 from plant.equipment.connectivity import Connectivity, Node, by_bus
 from plant.tables.csv_table import CsvRow, CsvTable
 from plant.tables.feeder_columns import BusColumns, ImportedBusColumns
-from wire.schema.suggestion import suggestion
+from wire.schema.suggestion import first_of, suggestion
 
 _SHOWN = 24
 """So many buses that are cut off are named."""
@@ -135,8 +135,7 @@ def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> 
         there = [row.name for row in inverters if row.bus in names]
         rest = f"the substation at bus {whole[0]}" if feeder.source else "the rest"
         problems.append(
-            f"buses.csv: {len(names)} buses are not connected with {rest}: {', '.join(shown[:_SHOWN])}"
-            + (f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else "")
+            f"buses.csv: {len(names)} buses are not connected with {rest}: {first_of(shown, _SHOWN)}"
             + (f" (with {', '.join(there)})" if there else "")
             + "; "
             "a line, switch, regulator or transformer is missing, or lacks a phase"

@@ -12,6 +12,7 @@ from netem.schema.fault import LONGEST_RUN, Fault
 from netem.schema.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words
 from wire.schema.plausible import Plausible
+from wire.schema.suggestion import first_of
 from wire.schema.table_schema import Problem
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
@@ -123,5 +124,4 @@ def _listed(links: Sequence[Link]) -> str:
     both = {link for link in links if Link(link.dst, link.src) in links}
     first = [link for link in links if link not in both or links.index(link) < links.index(Link(link.dst, link.src))]
     named = [f"{link.src} {'<->' if link in both else '->'} {link.dst}" for link in first]
-    more = len(named) - MOST_NAMED
-    return ", ".join(named) if more <= 0 else f"{', '.join(named[:MOST_NAMED])} and {more} more"
+    return first_of(named, MOST_NAMED)

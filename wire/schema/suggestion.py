@@ -1,8 +1,8 @@
-"""The end of a message about an unknown name: what was probably meant, and what there is."""
+"""Names in a message: the first of many; of an unknown one, what was probably meant, and what there is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 LONGEST_LIST = 24
 """Names that are listed at the most: all keys of any table of a scenario, but not all buses of a feeder."""
@@ -44,9 +44,20 @@ def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] 
     beyond = len(names) - LONGEST_LIST
     if near and beyond > 0:
         return f'did you mean "{near}"?'
-    more = f" and {beyond} more" if beyond > 0 else ""
-    listed = f"he {what} are {', '.join(names[:LONGEST_LIST])}{more}" if names else f"here are no {what}"
-    return f'did you mean "{near}"? T{listed}' if near else f"t{listed}"
+    there = f"he {what} are {first_of(names, LONGEST_LIST)}" if names else f"here are no {what}"
+    return f'did you mean "{near}"? T{there}' if near else f"t{there}"
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """Return the first names of a list, so many at the most, and how many more there are.
+
+    Examples
+    --------
+    >>> first_of(["inv1", "inv2", "inv3"], 2), first_of(["inv1", "inv2"], 2)
+    ('inv1, inv2 and 1 more', 'inv1, inv2')
+    """
+    beyond = len(names) - most
+    return ", ".join(names[:most]) + (f" and {beyond} more" if beyond > 0 else "")
 
 
 def _nearest(wrong: str, names: list[str]) -> str:

@@ -34,8 +34,8 @@ QUANTITIES = {"f": "Hz", "P": "pu", "Q": "pu", "V": "pu", "P_set": "pu", "V_set"
 """Quantities of each inverter in a row, and their units of comparison: pu of rating and of nominal voltage."""
 
 
-class Compared(NamedTuple):
-    """Both plants in one run."""
+class PlantDifferences(NamedTuple):
+    """What differs between both plants in one run."""
 
     t: NDArray[np.float64]
     """Times (s) of the steps."""
@@ -45,7 +45,7 @@ class Compared(NamedTuple):
     """Angle (deg) across the reclosed switch in the step before it closes, in ours and in GridLAB-D."""
 
 
-def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
+def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
     """Let both plants go through a run.
 
     Parameters
@@ -87,7 +87,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> Compared:
         raise ValueError(f"rows of {t.size} and {t_theirs.size} steps are not of the same times")
     gaps = np.abs(rows - rows_theirs)
     angles = (first.angle, second.angle) if run.reclosing else None
-    return Compared(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
+    return PlantDifferences(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
 
 
 def _with_single_phase(feeder: Feeder, added: Sequence[SinglePhase]) -> Feeder:
@@ -121,7 +121,7 @@ def _started(ours: Plant, feeder: Feeder, run: ComparedRun, config: PlantConfig)
         return GridlabdPlant(ours, settings, config.T_c, config.end, sys.executable)
 
 
-class _Ran(NamedTuple):
+class _PlantRun(NamedTuple):
     """A plant at the end of a run."""
 
     rows: list[tuple[float, ...]]
@@ -156,31 +156,31 @@ def _reclosing_at_its_angle(network: Network, config: PlantConfig, reclosing: Re
     return schedule(reclosing.opens + later * h, rehearsal.tick * T_c)
 
 
-def _closed_loop(plant: PlantLike, config: PlantConfig, agents: tuple[AgentConfig, ...]) -> _Ran:
+def _closed_loop(plant: PlantLike, config: PlantConfig, agents: tuple[AgentConfig, ...]) -> _PlantRun:
     rows: list[tuple[float, ...]] = []
     outcome = run_inprocess(config, agents, lambda telemetry: rows.extend(telemetry.rows), plant=plant)
     if outcome.broke:
         raise RuntimeError(outcome.broke)
-    return _Ran(rows)
+    return _PlantRun(rows)
 
 
 def _open_loop(
     plant: Plant | GridlabdPlant, run: ComparedRun, config: PlantConfig, closing: int, inverters: Sequence[InverterRow]
-) -> _Ran:
+) -> _PlantRun:
     """Go through a run, and read the angle across the switch at the tick at which it closes."""
     assert config.end is not None
     units = {unit.name: unit for unit in inverters}
-    orders = {round(order.t / config.T_c): order for order in run.orders}
+    given = {round(each.t / config.T_c): each for each in run.set_points}
     angle = float("nan")
     for tick in range(round(config.end / config.T_c)):
-        if tick in orders:
-            order = orders[tick]
-            for name in order.inverters:
-                plant.hold(name, order.P_set * units[name].P_rated, order.V_set * units[name].V_nom)
+        if tick in given:
+            P_set, V_set = given[tick].P_set, given[tick].V_set
+            for name in given[tick].inverters:
+                plant.hold(name, P_set * units[name].P_rated, V_set * units[name].V_nom)
         if run.reclosing and tick == closing:
             angle = _angle_across(plant, run.reclosing.switch)
         plant.advance()
-    return _Ran(list(plant.take_rows()), angle)
+    return _PlantRun(list(plant.take_rows()), angle)
 
 
 def _angle_across(plant: Plant | GridlabdPlant, switch: str) -> float:

@@ -14,6 +14,7 @@ ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)
 """GridLAB-D has one rating for a GFL's reference and its apparent power (ours: 1 and 1.2 pu), and no bound of V_set."""
 
 GFL = ("inv2", "inv3", "inv5", "inv6", "inv8", "inv9")
+"""The grid-following inverters of microgrid123."""
 
 SHORT = 0.2
 """Factor on all times of a run in the tests."""
@@ -25,6 +26,7 @@ class TimedSetPoints(NamedTuple):
     t: float
     """Time (s), a multiple of T_c."""
     inverters: tuple[str, ...]
+    """Their names."""
     P_set: float
     """pu of the rating."""
     V_set: float
@@ -35,6 +37,7 @@ class Reclosing(NamedTuple):
     """A switch that opens, and closes when its sides are an angle apart."""
 
     switch: str
+    """Its name."""
     opens: float
     """Time (s) at which it opens, to the nearest control period."""
     angle: float
@@ -58,16 +61,21 @@ class ComparedRun(NamedTuple):
     """One run: the events and limits that both plants go through."""
 
     text: str
+    """What it is, in a few words."""
     scenario: str
+    """Scenario of the catalogue that it starts from."""
     case: str
+    """Its case."""
     closed_loop: bool = False
+    """Whether agents give the set-points."""
     gfl: GflParameters | None = None
     """Instead of the scenario's."""
     gfm: GfmParameters | None = None
     """Instead of the scenario's."""
     events: tuple[SwitchEvent, ...] = ()
     """Instead of the scenario's."""
-    orders: tuple[TimedSetPoints, ...] = ()
+    set_points: tuple[TimedSetPoints, ...] = ()
+    """In an open-loop run."""
     reclosing: Reclosing | None = None
     """Instead of events."""
     single_phase: tuple[SinglePhase, ...] = ()
@@ -95,7 +103,7 @@ RUNS = {
         "islanding",
         "I",
         gfl=ONE_RATING,
-        orders=(
+        set_points=(
             TimedSetPoints(1.5, ("inv2",), 1.3, 1.03),
             TimedSetPoints(2.0, ("inv2",), 0.647, 1.0),
             TimedSetPoints(2.5, GFL, 0.1, 1.0),  # the GFM are left with 1.8 pu
@@ -123,7 +131,7 @@ RUNS = {
         "I",
         gfl=replace(ONE_RATING, model="current_source"),
         single_phase=ON_ONE_PHASE,
-        orders=(
+        set_points=(
             TimedSetPoints(1.5, ("s1",), 1.3, 1.03),
             TimedSetPoints(2.5, ("s2",), -1.3, 1.0),
             TimedSetPoints(3.5, ("g1",), 1.4, 1.02),
@@ -195,7 +203,7 @@ def shortened(run: ComparedRun, config: PlantConfig, factor: float) -> tuple[Com
         limits=tuple(msgspec.structs.replace(limit, t=at(limit.t)) for limit in config.settings.limits),
     )
     run = run._replace(
-        orders=tuple(order._replace(t=at(order.t)) for order in run.orders),
+        set_points=tuple(each._replace(t=at(each.t)) for each in run.set_points),
         reclosing=run.reclosing and run.reclosing._replace(further=at(run.reclosing.further)),
     )
     return run, msgspec.structs.replace(config, settings=settings, end=at(config.end))

@@ -51,7 +51,7 @@ graph = "{graph}"
 """
 """Scenario file of a feeder of one's own."""
 
-GENTLE = """
+SLOW_VOLT_VAR = """
 [plant.gfl]
 T_vf_s = 0.2  # 0.05 as a rule: here the volt-var droop would oscillate with the network between leader and followers
 """
@@ -143,13 +143,13 @@ def _with_proposal(
     return feeder, propose(feeder, count)
 
 
-def _calm(project: tuple[ScenarioModel, Tables], rewritten: Callable[[str], tuple[ScenarioModel, Tables]]) -> None:
-    """Rewrite a project with gentle followers if its plant comes to rest with them alone; say what it does on droop."""
+def _damp(project: tuple[ScenarioModel, Tables], rewritten: Callable[[str], tuple[ScenarioModel, Tables]]) -> None:
+    """Slow the volt-var droop of a project's followers where its plant comes to rest with that alone; say so."""
     from scenarios.droop_alone import unsteady
 
     if not (found := unsteady(*project, "none")):
         return
-    if not unsteady(*rewritten(GENTLE), "none"):
+    if not unsteady(*rewritten(SLOW_VOLT_VAR), "none"):
         typer.echo(f"NOTE  on droop alone, {found}: so [plant.gfl] has a slower volt-var droop, T_vf_s = 0.2")
         return
     rewritten("")
@@ -194,7 +194,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     for part in PARTS:
         found = start_problem(*(project := written(part)))
         if not found:
-            _calm(project, partial(written, part))
+            _damp(project, partial(written, part))
             break
         problem = problem or found
     else:

@@ -9,6 +9,8 @@ SWITCHES = frozenset({"switch", "recloser", "sectionalizer"})
 """Classes that open and close: ideal switches before what they have of impedance."""
 
 LINES = frozenset({"overhead_line", "underground_line", "triplex_line", "line"})
+"""Classes of lines."""
+
 LINEAR = LINES | {"transformer", "regulator", "fuse", "series_reactor"}
 """Classes that an admittance matrix describes."""
 

@@ -24,6 +24,7 @@ EXPONENT = {"P": 0.0, "I": 1.0, "Y": 2.0}
 """Exponent of the voltage in the power of each part: constant power, current, admittance."""
 
 EDGE = {"P": 0.0, "I": 1.0, "Y": 0.0}
+"""Exponent by which the current of each part meets its limit (`LoadPart.edge`)."""
 
 V_MIN, V_LOW = 0.7, 0.5
 """Part of its usual voltage below which a load of constant power or current takes less, and below which it is an

@@ -7,7 +7,7 @@ current or impedance. What comes out is solved here, too, and must have GridLAB-
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,24 @@ import numpy as np
 
 from plant.equipment import Feeder, Source
 from plant.equipment.imported_equipment import LinearElement, LoadPart
-from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS, CONTROLS, DATA, GENERATION, LINEAR, SWITCHES, WATCHING
+from plant.imports.gridlabd.glm_classes import (
+    CHILD_OF_BUS,
+    CONTROLS,
+    DATA,
+    GENERATION,
+    LINEAR,
+    LINES,
+    SWITCHES,
+    WATCHING,
+)
 from plant.imports.gridlabd.glm_elements import SPLIT, GlmElements, letters_of
 from plant.imports.gridlabd.glm_loads import BusLoads
 from plant.imports.gridlabd.glm_text import GlmText
 from plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
 from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.import_checks import BEYOND, left_out_by, not_a_file, refuse_if, refuse_unsolvable, report_powers
+from plant.imports.import_checks import BEYOND, left_out_by, path_problems, refuse_if, refuse_unsolvable, report_powers
 from plant.imports.import_comparison import MATCH, difference
+from wire.schema.suggestion import suggestion
 
 FAR = 1.3
 """Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""
@@ -31,6 +41,7 @@ BALANCED = 1e-7
 """Largest unbalance (pu) of the substation's voltage that is rounding."""
 
 UNGROUNDED = "ground a winding"
+"""Remedy where nothing determines a voltage to ground."""
 
 
 def read_glm(
@@ -46,7 +57,7 @@ def read_glm(
         With everything that GridLAB-D refuses and everything that cannot be represented.
     """
     path = Path(path).absolute()
-    refuse_if(path, not_a_file(path))
+    refuse_if(path, path_problems(path))
     text = GlmText(path)
     refuse_if(path, text.problems)
     model = solved_model(path)
@@ -86,7 +97,8 @@ class _GlmReader:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
                 elements.add(branch, self._called(branch["name"]))
         for name in sorted(set(switches) - elements.used_switches):
-            problems.append(f'switches: there is no line "{name}"')
+            hint = suggestion(name.rpartition(".")[2], self._names_of(LINES), "lines")
+            problems.append(f'switches: there is no line "{name}"; {hint}')
         shunts, parts = self._loads()
         source = self._source(elements)
         refuse_if(self._path, problems)
@@ -112,6 +124,9 @@ class _GlmReader:
             self._compare(feeder)
         refuse_if(self._path, problems)
         return feeder
+
+    def _names_of(self, classes: Collection[str]) -> list[str]:
+        return [name for name, kind in self._classes.items() if kind in classes]
 
     def _called(self, name: str) -> str:
         return f"{self._text.at(name)}{self._classes[name]}.{name}"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from plant.imports.import_checks import not_a_file
+from plant.imports.import_checks import path_problems
 from plant.imports.opendss.dss_script import HUNTING, DssScript
 from plant.imports.opendss.dss_values import impossible_values, repeated_names
 
@@ -70,7 +70,7 @@ class DssEngine:
         scratch
             Folder that takes what the engine writes by itself (traces of controls); else the working folder.
         """
-        if problems := not_a_file(path):
+        if problems := path_problems(path):
             return problems
         if scratch is not None:
             self.execute(f'set datapath="{scratch}"')

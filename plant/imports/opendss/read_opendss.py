@@ -16,6 +16,7 @@ from plant.equipment import Feeder
 from plant.imports.import_checks import SHOWN, number_of, refuse_if, refuse_unsolvable, without_unfed
 from plant.imports.opendss.dss_circuit import ImportRequest
 from plant.imports.opendss.dss_process import reading
+from wire.schema.suggestion import first_of
 
 UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
 """Remedy where nothing determines a voltage to ground."""
@@ -63,9 +64,8 @@ def _compared(path: Path, feeder: Feeder, V: dict[tuple[str, str], complex]) -> 
         solved, told = False, f"{path.name}: the engine solves it, our {error}"
     alone = loads_without_ground(feeder)
     if alone:
-        more = f" and {len(alone) - SHOWN} more" if len(alone) > SHOWN else ""
         told = (
-            f"{', '.join(alone[:SHOWN])}{more}: constant power to ground behind a delta winding, where nothing else is "
+            f"{first_of(alone, SHOWN)}: constant power to ground behind a delta winding, where nothing else is "
             "grounded: the voltage to ground has no single solution; make it conn=delta or model=2, or ground a winding"
         )
     if alone or not solved:

@@ -29,10 +29,15 @@ def test_a_difference_is_found_where_it_is(tmp_path: Path) -> None:
     assert worst == pytest.approx(1e-3, rel=0.05)
 
 
-@pytest.mark.parametrize(("connection", "named"), [("delta", ["load.w"]), ("wye", [])])
-def test_constant_power_without_ground_is_named(tmp_path: Path, connection: str, named: list[str]) -> None:
-    """Behind a delta winding, a wye load of constant power has nothing that holds its voltage to ground."""
-    script = write(tmp_path, LINE, BEHIND.replace("CONNECTION", connection))
+@pytest.mark.parametrize(
+    ("connection", "ground", "named"), [("delta", 1.0, ["load.w"]), ("delta", 0.5, []), ("wye", 1.0, [])]
+)
+def test_constant_power_without_ground_is_named(
+    tmp_path: Path, connection: str, ground: float, named: list[str]
+) -> None:
+    """Behind a delta winding, a wye load of constant power needs a stronger ground than its own 0.77 ohm a phase."""
+    reactor = f"New Reactor.g bus1=d phases=3 r={ground} x=0"
+    script = write(tmp_path, LINE, BEHIND.replace("CONNECTION", connection), reactor)
     feeder = read_opendss(script)
 
     assert loads_without_ground(feeder) == named

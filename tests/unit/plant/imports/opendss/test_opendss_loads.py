@@ -76,6 +76,16 @@ def test_a_zip_load_drops_out_at_its_cut_off_voltage(tmp_path: Path, cut_off: fl
     assert largest_difference(path) < TOLERANCE
 
 
+def test_a_difference_from_the_engine_is_told(tmp_path: Path) -> None:
+    """Model 7 jumps at vlowpu in the engine, and not here: a note says by how much, and where."""
+    load = f"New Load.l bus1=c phases=3 kv=0.48 kw=150 kvar=60 model=7 {RANGES['far below its limit']}"
+
+    (note,) = read_opendss(write(tmp_path, LINE, STEP_DOWN, load)).notes
+
+    assert note.startswith("Master.dss: our power flow differs from the engine's by 0.0")
+    assert ", most at c." in note
+
+
 def test_the_admittance_model_of_loads_is_an_impedance(tmp_path: Path) -> None:
     """`set loadmodel=admittance` makes an impedance of every load, of whatever model, in the engine and in ours."""
     load = "New Load.l bus1=c phases=3 kv=0.48 kw=150 kvar=60 model=1"
