@@ -139,8 +139,8 @@ class HelicsPlant:
         self._check(came, t)
         self._values |= came
         if (lacking := [key for key in self._needed if key not in self._values]) and row == 0:
-            text = f"no value yet of {first_of(lacking, SHOWN)}; publish all at t = 0 or before"
-            raise HelicsError(f"HELICS, t = 0 s: {text}")
+            names = first_of(lacking, SHOWN)
+            raise HelicsError(f"HELICS, t = 0 s: no value yet of {names}; publish all at t = 0 or before")
         self._rows.append((t, *(x for name in self.inverters for x in self._numbers(name))))
         if text := came.get(topics.events(self._helics.prefix).key):
             self._events += self._decoded(str(text), t)
