@@ -31,6 +31,8 @@ LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "
 """Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
 GROUP_LOAD = 2e6
 """Load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder."""
+MOST_TRIES = 8
+"""Counts that are tried where the inverters of the first one would be too large."""
 MOST_GROUPS = 12
 """Groups that are proposed without being told how many inverters, those of most load first."""
 
@@ -68,6 +70,19 @@ class NoSwitchError(NoProposalError):
         super().__init__(f"no switch cuts half of the load off the substation; {hint}")
 
 
+class _TooLargeError(NoProposalError):
+    """An inverter would be larger than its voltage allows."""
+
+    def __init__(self, row: InverterRow, most: float, load: float, count: int) -> None:
+        self.needed = ceil(count * row.P_rated / most)
+        """Inverters that may be enough."""
+        super().__init__(
+            f"{count} inverters for the load of {load / 1e3:.0f} kW need one of {row.P_rated / 1e3:.0f} kW at bus "
+            f"{row.bus}, where {most / 1e3:.0f} kW are plausible; give more --inverters, if there are buses for "
+            "them, or another --switch"
+        )
+
+
 def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load.
 
@@ -79,13 +94,32 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     feeder : Feeder
         The feeder; its own inverters are not considered.
     count : int, optional
-        Inverters to propose; by default one group for each section. Sections of more load have more groups.
+        Inverters to propose; by default one group for each section. Sections of more load have more groups, and all
+        have more where an inverter would be larger than its voltage allows.
 
     Raises
     ------
     NoProposalError
-        If no switch cuts off half of the load, or no section beyond it has a three-phase bus for each inverter.
+        If no switch cuts off half of the load, no section beyond it has a three-phase bus for an inverter, or so many
+        inverters cannot carry the load at their voltage.
     """
+    try:
+        return _propose(feeder, count)
+    except _TooLargeError as error:
+        if count is not None:
+            raise
+        problem = error
+    for _ in range(MOST_TRIES):
+        try:
+            return _propose(feeder, problem.needed)
+        except _TooLargeError as error:
+            if error.needed <= problem.needed:  # there are no buses for more
+                break
+            problem = error
+    raise problem
+
+
+def _propose(feeder: Feeder, count: int | None) -> Proposal:
     switch, head, beyond = _islanding_switch(feeder)
     everywhere = feeder.load_by_bus()
     load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
@@ -102,8 +136,8 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     chosen = [section for section in sections if section.load >= SMALLEST][:MOST_GROUPS] or sections[:1]
     if not chosen:
         raise NoProposalError(f'beyond switch "{switch}" no bus has phases A, B and C, which an inverter needs')
-    room = [max(len(_places(feeder, section.along, 0.0, GROUP)) // GROUP, 1) for section in chosen]
-    groups = _groups([section.load for section in chosen], room, count)
+    there = [len(_places(feeder, section.along, 0.0, GROUP)) for section in chosen]
+    groups = _groups([section.load for section in chosen], there, count)
     chosen = chosen[: len(groups)]
     carried = sum(section.load for section in chosen) or 1.0
     V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
@@ -113,7 +147,6 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
         rating = RATING * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
         places = _places(feeder, section.along, LEADER * rating / len(sizes), sum(sizes))
         places = _spread(section.along, set(places), sum(sizes), load)
-        sizes = _fitting(sizes, len(places))
         for size in sizes:
             microgrid += 1
             own, places = places[:size], places[size:]
@@ -133,12 +166,9 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
                         m_q=DROOPS[1],
                     )
                 )
-    for row in inverters:
-        if row.P_rated > (most := _most_rated(row.V_nom)):
-            raise NoProposalError(
-                f"the load of {total / 1e3:.0f} kW needs an inverter of {row.P_rated / 1e3:.0f} kW at bus {row.bus}, "
-                f"where {most / 1e3:.0f} kW are plausible; give more --inverters, or another --switch"
-            )
+    large = max(inverters, key=lambda row: row.P_rated / _most_rated(row.V_nom))
+    if large.P_rated > (most := _most_rated(large.V_nom)):
+        raise _TooLargeError(large, most, total, len(inverters))
     total_rated = sum(row.P_rated for row in inverters)
     return Proposal(switch, tuple(inverters), round((1.0 - IMPORTED) * total / total_rated, 3), total)
 
@@ -171,36 +201,46 @@ def _spread(along: Sequence[str], places: Collection[str], count: int, load: Map
     return found
 
 
-def _groups(loads: Sequence[float], room: Sequence[int], count: int | None) -> list[list[int]]:
+def _groups(loads: Sequence[float], places: Sequence[int], count: int | None) -> list[list[int]]:
     """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit.
 
     Parameters
     ----------
     loads
         Load of each section (W), in falling order.
-    room
-        Groups for which each has places.
+    places
+        Inverters for which each has a bus, one or more.
     count
         Inverters, or None for as many as the load needs.
     """
     whole = ceil(count / GROUP) if count else MOST_GROUPS
     number = [1 for _ in loads[:whole]]
+
+    def most_loaded(room: Sequence[int]) -> int | None:
+        return max(
+            (k for k, most in enumerate(room) if number[k] < most), key=lambda k: loads[k] / number[k], default=None
+        )
+
     while sum(number) < whole:  # the next group goes where a group has most load
-        k = max(range(len(number)), key=lambda k: (number[k] < room[k], loads[k] / number[k]))
-        if number[k] >= room[k] or (count is None and loads[k] / number[k] <= GROUP_LOAD):
+        k = most_loaded([many // GROUP for many in places[: len(number)]])
+        if k is None or (count is None and loads[k] / number[k] <= GROUP_LOAD):
             break
         number[k] += 1
-    whole = sum(number)
-    sizes = [GROUP] * whole if count is None else [count // whole + (k < count % whole) for k in range(whole)]
-    return [[min(sizes.pop(0), GROUP) for _ in range(many)] for many in number]
-
-
-def _fitting(sizes: list[int], places: int) -> list[int]:
-    """Return sizes of groups of this sum at most, the last groups smaller or left out."""
-    fitting = list[int]()
-    for size in sizes:
-        fitting.append(min(size, places - sum(fitting)))
-    return [size for size in fitting if size > 0]
+    while count and sum(min(many, GROUP * groups) for many, groups in zip(places, number, strict=False)) < count:
+        k = most_loaded([ceil(many / GROUP) for many in places[: len(number)]])  # others have too few buses
+        if k is not None:
+            number[k] += 1
+        elif len(number) < len(loads):
+            number.append(1)
+        else:
+            break
+    sizes = [[0] * many for many in number]
+    for _ in range(count or GROUP * sum(number)):
+        open_ = [group for group, many in zip(sizes, places, strict=False) if sum(group) < many and min(group) < GROUP]
+        if open_:
+            smallest = min(open_, key=min)
+            smallest[smallest.index(min(smallest))] += 1
+    return [[size for size in group if size] for group in sizes]
 
 
 def _islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:

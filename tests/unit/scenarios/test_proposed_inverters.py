@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from plant.equipment import Bus, Feeder, Source, Switch
+from plant.equipment.imported_equipment import LoadPart
 from plant.tables import read_feeder
-from scenarios.feeder_proposal import GROUP, RATING, propose
+from scenarios.feeder_proposal import GROUP, RATING, NoProposalError, propose
 from scenarios.feeder_walk import cut_off_sums
+from tests.unit.scenarios.test_feeder_proposal import series
 
 
 @pytest.mark.parametrize("count", [None, 3, 7, 20, 50])
@@ -27,6 +31,48 @@ def test_inverters_are_as_many_as_asked_for_and_each_group_has_one_leader(count:
     assert set(groups.values()) <= {GROUP - 1, GROUP}
     leaders = Counter(row.microgrid for row in found.inverters if row.kind == "GFM")
     assert leaders == dict.fromkeys(groups, 1)
+
+
+def two_sections(buses: int) -> Feeder:
+    """Beyond one switch a line with so many buses and little load, beyond another a bus with most of it."""
+    names = ["s", "s~a", *(f"a{k}" for k in range(buses)), "b", "b1"]
+    ties = [("s", "s~a"), (names[-3], "b")]
+    lines = [(one, other) for one, other in pairwise(names) if (one, other) not in ties]
+    loads = {**dict.fromkeys(names[2:-2], 2e5), "b1": 2e6}
+    return Feeder(
+        name="two",
+        load_set="main",
+        buses=tuple(Bus(name=name, phases="ABC", V_nom=2400.0, x=0.0, y=0.0) for name in names),
+        switches=tuple(
+            Switch(name=f"{one}-{other}", alias=other, from_bus=one, to_bus=other, phases="ABC", closed=True)
+            for one, other in ties
+        ),
+        source=Source(bus="s", V_pu=1.0, angle=0.0),
+        elements=tuple(series(f"line.{other}", one, other, "ABC") for one, other in lines),
+        load_parts=tuple(
+            LoadPart(name=f"load.{bus}", bus=bus, ends=("A", ""), S=complex(P), V_nom=2400.0, exponents=(2.0, 2.0))
+            for bus, P in loads.items()
+        ),
+    )
+
+
+@pytest.mark.parametrize(("buses", "count", "sizes"), [(9, 6, [1, 3, 2]), (9, 3, [1, 2]), (4, 6, [1, 3])])
+def test_a_section_with_one_bus_leaves_its_inverters_to_the_others(buses: int, count: int, sizes: list[int]) -> None:
+    """As many inverters are found as asked for, unless there are fewer buses: with 4, one of them a switch's, 4."""
+    groups = Counter(row.microgrid for row in propose(two_sections(buses), count).inverters)
+
+    assert sorted(groups.values()) == sorted(sizes)
+
+
+def test_a_load_too_large_for_three_inverters_a_section_gets_more() -> None:
+    """Without a count there are as many as their voltage needs; a count that is too small is refused with the limit."""
+    feeder = read_feeder("standard123")
+    loads = tuple(replace(load, S=tuple(150.0 * S for S in load.S)) for load in feeder.loads)
+    usual, large = propose(feeder), propose(replace(feeder, loads=loads))
+
+    assert len(large.inverters) > len(usual.inverters)
+    with pytest.raises(NoProposalError, match=r"need one of \d+ kW at bus .* kW are plausible; give more --inverters"):
+        propose(replace(feeder, loads=loads), 6)
 
 
 def test_inverters_stand_where_the_load_is() -> None:
