@@ -3,7 +3,7 @@
 One process is the hub, as the plant is; the others are hosts of one or more agents. In each round the hub sends every
 agent a measurement; a host that has the measurements of its agents, and the states of all others of the round before,
 sends the states of its own; the hub waits for all. No codec, no law, no plant: the floor under lock-step over a
-transport (`zenoh`, `zeromq`), or the cost of HELICS with federates that compute nothing.
+transport (`zenoh`, `zenoh-star`, `zeromq`), or the cost of HELICS with federates that compute nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class MeshMember(msgspec.Struct, frozen=True, kw_only=True):
     """The configuration of one process of a mesh."""
 
     transport: str
-    """zenoh, zeromq, helics-zmq or helics-tcp."""
+    """zenoh, zenoh-star, zeromq, helics-zmq or helics-tcp."""
     name: str
     """HUB, or the name of a host."""
     hosts: dict[str, tuple[str, ...]]

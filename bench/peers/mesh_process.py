@@ -122,7 +122,7 @@ def main() -> None:
 
 
 def _transport_of(member: MeshMember) -> Transport:
-    if member.transport == "zenoh":
+    if member.transport.startswith("zenoh"):
         from bench.peers.mesh_zenoh import ZenohTransport
 
         return ZenohTransport(member)

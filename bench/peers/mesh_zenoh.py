@@ -1,4 +1,7 @@
-"""Bare Zenoh: sessions of the settings that decide the cost of ours, callbacks that only count, and nothing of ours."""
+"""Bare Zenoh: sessions of the settings that decide the cost of ours, callbacks that only count, and nothing of ours.
+
+`zenoh` has a link for each pair of processes; in `zenoh-star` the hub relays all messages, as our plant does.
+"""
 
 from __future__ import annotations
 
@@ -20,23 +23,28 @@ from wire.driver.foreign import keep_thread_state
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """As ours (docs/protocol.md): with Zenoh's defaults the floor is higher."""
 
+ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
+"""As the clients of our relay."""
+
 
 class ZenohTransport:
-    """One session of a full mesh over TCP, found by gossip."""
+    """One session over TCP: of a full mesh, found by gossip, or of a star."""
 
     def __init__(self, member: MeshMember) -> None:
-        os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
+        star = member.transport == "zenoh-star"
+        os.environ.setdefault("ZENOH_RUNTIME", ONE_THREAD if star and not member.is_hub else RUNTIME)
         address = Path(member.folder) / "address"
         if member.is_hub:
             endpoint = free_endpoint()
             listen, connect = endpoint, []
         else:
             listen, connect = "tcp/127.0.0.1:0", [_read(address)]
+        mode = "peer" if not star else "router" if member.is_hub else "client"
         config = {
-            "mode": "peer",
-            "listen": {"endpoints": [listen]},
+            "mode": mode,
+            "listen": {"endpoints": [] if mode == "client" else [listen]},
             "connect": {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False},
-            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": True}},
+            "scouting": {"delay": 0 if star else 500, "multicast": {"enabled": False}, "gossip": {"enabled": not star}},
             "transport": {
                 "unicast": {"qos": {"enabled": False}},
                 "link": {"tx": {"lease": 60_000}},

@@ -34,16 +34,18 @@ count: the load is stated. A rival whose package is missing is left out and name
 The case: the islanding experiment, case IV, nine inverters with agents on the 123-node feeder, full graph, 7 s
 simulated, T_c 20 ms, h 2 ms. A tick is one control period of the lock-step: 9 measurements, 72 states to neighbours, 9
 to the plant. All meshes have the processes and the messages of ours, in number and size, and compute nothing; those of
-HELICS ask for time once a tick, so that its federates see values one tick late, which is generous to HELICS.
+HELICS ask for time once a tick, so that its federates see values one tick late, which is generous to HELICS. The
+session of our plant relays all messages ([protocol.md](protocol.md#one-link-each)). So does the hub of bare Zenoh where
+a row says so; elsewhere bare Zenoh has a link for each pair of processes.
 """
 
 NOTES = """## Where the limit is
 
 - **Plant.** The steps are one compiled loop; the limit is the dense solve of the reduced network in each iteration, the
   build is limited by one sparse factorisation. GridLAB-D solves the whole network by Newton's method in every step.
-- **Tick.** Bare Zenoh on the same mesh is the limit of any lock-step over Zenoh: its system calls and wakes, once a
-  message and link. Agents that share a process save both; ZeroMQ over Unix sockets shows what a transport without
-  discovery, routing and TCP costs.
+- **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link. A
+  relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save the
+  rest. ZeroMQ over Unix sockets shows what a transport without discovery, routing and TCP costs.
 - **One process.** There is no transport: each message costs its way through the same nodes that processes have
   (decode, checks, the law's sum), so that the cost grows with links, not with pairs of agents.
 - **Start.** Python's imports, then discovery: each process opens a session and meets those it hears.
@@ -130,8 +132,10 @@ def comparison(parts: Parts) -> Iterator[tuple[str, ...]]:
         (f"{tick}: HELICS zmq, empty federates", "tick", ("helics-zmq.tick.9",), ("ours.tick.9",)),
         (f"{tick}: HELICS tcp, empty federates", "tick", ("helics-tcp.tick.9",), ("ours.tick.9",)),
         (f"{tick}: bare Zenoh, empty", "tick", ("zenoh.tick.9",), ("ours.tick.9",)),
+        (f"{tick}: bare Zenoh, empty, the hub relays", "tick", ("zenoh-star.tick.9",), ("ours.tick.9",)),
         (f"{tick}: ZeroMQ ipc, empty", "tick", ("zeromq.tick.9",), ("ours.tick.9",)),
         ("a tick, three agents a process: bare Zenoh, empty", "tick", ("zenoh.tick.3",), ("ours.tick.3",)),
+        ("- the hub relays", "tick", ("zenoh-star.tick.3",), ("ours.tick.3",)),
     ]
     for text, part, theirs, ours in rows:
         them, us = value(parts, part, *theirs), value(parts, part, *ours)

@@ -87,8 +87,10 @@ def tick(extent: Extent) -> list[Measure]:
     return [
         Measure("ours, a process for each agent", ours.with_processes),
         Measure("bare Zenoh", partial(mesh, "zenoh", 0)),
+        Measure("bare Zenoh, the hub relays", partial(mesh, "zenoh-star", 0)),
         Measure("ours, three agents a process", partial(ours.with_processes, 3)),
         Measure("bare Zenoh, three agents a process", partial(mesh, "zenoh", 3)),
+        Measure("bare Zenoh, three agents a process, the hub relays", partial(mesh, "zenoh-star", 3)),
         Measure("ZeroMQ ipc", partial(mesh, "zeromq", 0), "pyzmq"),
         Measure("HELICS zmq", partial(mesh, "helics-zmq", 0), "helics"),
         Measure("HELICS tcp", partial(mesh, "helics-tcp", 0), "helics"),
