@@ -12,6 +12,7 @@ from plant.plant_config import PlantSettings
 from plant.tables import read_feeder
 from plant.tables.write import write_feeder
 from tests.unit.plant.imports.gridlabd.glm_models import (
+    HEAD,
     LOADS,
     SWITCHES,
     TOLERANCE,
@@ -65,6 +66,25 @@ def test_tables_of_an_import_are_read_again(tmp_path: Path) -> None:
     assert abs(ours - theirs).max() < 1e-6
 
 
+@pytest.mark.parametrize(
+    ("phases", "balanced"),
+    [
+        (("6321.985447626403+3650j", "0-7300j", "-6321.985447626403+3650j"), True),
+        (("7300+100j", "-3600-6200j", "-3650+6400j"), False),
+    ],
+    ids=["turned", "unbalanced"],
+)
+def test_the_substation_has_the_models_voltages(tmp_path: Path, phases: tuple[str, str, str], balanced: bool) -> None:
+    """A substation that is turned, or whose phases differ, feeds as in GridLAB-D; of unequal phases a note tells."""
+    first = HEAD.index("  voltage_A")
+    last = HEAD.index("\n", first)
+    voltages = " ".join(f"voltage_{letter} {V};" for letter, V in zip("ABC", phases, strict=True))
+    path = write(tmp_path, SWITCHES.replace(HEAD[first:last], f"  {voltages} }}"))
+
+    assert largest_difference(path)[0] < TOLERANCE
+    assert any("its voltages are unbalanced" in note for note in read_glm(path).notes) != balanced
+
+
 def test_constant_power_ends_where_the_voltage_collapses(tmp_path: Path) -> None:
     """Loads of constant power and current have a limit below their usual voltage; impedances need none."""
     parts = read_glm(write(tmp_path, LOADS)).load_parts
@@ -73,6 +93,7 @@ def test_constant_power_ends_where_the_voltage_collapses(tmp_path: Path) -> None
     for part in parts:
         assert part.V_min <= V_MIN
         assert (part.V_min > 0.6) == (part.exponents != (2.0, 2.0))
+        assert part.edge == part.exponents[0] or not part.V_min  # its current does not jump at the limit
 
 
 def test_switches_are_switches(tmp_path: Path) -> None:

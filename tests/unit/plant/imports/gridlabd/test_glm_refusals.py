@@ -120,6 +120,35 @@ def test_all_that_is_not_supported_comes_at_once(tmp_path: Path) -> None:
     assert all(part.name != "load.delta" for part in feeder.load_parts)
 
 
+PLAYER = (
+    "module tape;\n" + HEAD + LOAD + "object player { name p1; parent l1; property constant_power_A; file p.csv; }\n"
+)
+
+
+@pytest.mark.parametrize(("model", "leave_out"), [(HEAD + LOAD, []), (PLAYER, ["player.*"])], ids=["all", "no player"])
+def test_voltages_that_are_not_gridlabds_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str, leave_out: list[str]
+) -> None:
+    """A model is refused where our power flow differs by more than the limit, also without its players."""
+    (tmp_path / "p.csv").write_text("2000-01-01 00:00:00,9e3+1e3j\n")
+    monkeypatch.setattr("plant.imports.gridlabd.read_glm.MATCH", 0.0)
+
+    (problem,) = problems(write(tmp_path, model), leave_out=leave_out)
+
+    assert problem.startswith("feeder.glm: our power flow differs from GridLAB-D's by ")
+
+
+def test_a_load_to_which_gridlabd_adds_what_is_left_out_is_told(tmp_path: Path) -> None:
+    """Of a load with an inverter that is left out nobody can tell what is its own: a note says that it is gone."""
+    inverter = "object inverter_dyn { name i1; parent l1; control_mode GRID_FORMING; rated_power 1e5; Pref 1e4; }\n"
+    other = "object load { name l2; phases ABCN; parent b; nominal_voltage 7200; constant_power_B 2e4; }\n"
+
+    feeder = read_glm(write(tmp_path, "module generators;\n" + HEAD + LOAD + other + inverter), leave_out=["inv*.*"])
+
+    assert [part.name for part in feeder.load_parts] == ["load.l2"]
+    assert any(note.startswith("load.l1: what it takes itself is not taken over") for note in feeder.notes)
+
+
 def test_what_gridlabd_would_write_is_not_written(tmp_path: Path) -> None:
     """Recorders and dumps of a model leave nothing in its folder, and assertions do not end it."""
     write(

@@ -105,6 +105,7 @@ CONNECTIONS = {
     "two phases, wye": "bus1=c.2.3 phases=2 conn=wye kv=0.48",
     "two phases, open delta": "bus1=c.1.2.3 phases=2 conn=delta kv=0.48",
     "one phase to ground": "bus1=c.2 phases=1 conn=wye kv=0.277",
+    "from ground to one phase": "bus1=c.0.2 phases=1 conn=wye kv=0.277",
     "between two phases": "bus1=c.3.1 phases=1 conn=delta kv=0.48",
     "between two phases, called wye": "bus1=c.1.2 phases=1 conn=wye kv=0.48",
     "phases in another order": "bus1=c.3.1.2 phases=3 conn=wye kv=0.48",

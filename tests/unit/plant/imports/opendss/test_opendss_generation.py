@@ -15,6 +15,7 @@ UNEVEN = "New Load.uneven bus1=c.1.2 phases=1 kv=0.48 kw=60 kvar=10 vminpu=0.5"
 SCRIPTS = {
     "generator": "New Generator.g bus1=c kv=0.48 kw=50 kvar=10",
     "one phase": "New Generator.g bus1=c.1 phases=1 kv=0.277 kw=20 pf=0.9",
+    "two phases": "New Generator.g bus1=c.2.3 phases=2 kv=0.48 kw=30 pf=0.9",
     "delta": "New Generator.g bus1=c conn=delta kv=0.48 kw=50 pf=-0.9",
     "below its limits": "New Generator.g bus1=c kv=0.48 kw=50 pf=-0.9 vminpu=1.1 vmaxpu=1.2",
     "partly above its limits": "New Generator.g bus1=c kv=0.48 kw=50 vminpu=0.7 vmaxpu=0.99",

@@ -93,6 +93,13 @@ def test_the_admittance_model_of_loads_is_an_impedance(tmp_path: Path) -> None:
     assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load, "Set LoadModel=Admittance")) < TOLERANCE
 
 
+def test_a_load_may_take_reactive_power_alone(tmp_path: Path) -> None:
+    """A load without active power is a load: the engine's voltages show its reactive power."""
+    load = "New Load.q bus1=c phases=3 kv=0.48 kw=0 kvar=60"
+
+    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, load)) < TOLERANCE
+
+
 def test_loads_may_generate(tmp_path: Path) -> None:
     """A load of negative power feeds in, in the engine and in ours."""
     loads = (
