@@ -318,7 +318,16 @@ class Agent:
         else:
             here = [heard[name] for name in neighbours if self.shares_island(name)]
         if ages is None and self._weights.all_count:
-            return [neighbour_of(known[state.sender], state, t - state.t, 1.0) for state in here]
+            return [
+                shown[4]
+                if (shown := _converted.get(state.sender)) is not None
+                and shown[0] is state
+                and shown[2] == t - state.t
+                and shown[3] == 1.0
+                and shown[1] is known[state.sender]
+                else neighbour_of(known[state.sender], state, t - state.t, 1.0)
+                for state in here
+            ]
         aged = {state.sender: t - state.t if ages is None else ages[state.sender] for state in here}
         weights = self._weights.at_tick(aged)
         return [neighbour_of(known[name], heard[name], aged[name], weight) for name, weight in weights.items()]

@@ -30,7 +30,7 @@ from agents.graphs import GraphError
 from agents.known_agents import KnownAgents
 from agents.laws.law import Law
 from agents.topology import in_neighbours, is_pairwise
-from wire.codec import RejectedError, encode
+from wire.codec import RejectedError, decode, encode
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.node import Route
@@ -95,6 +95,8 @@ class LockstepAgent(AgentNode):
         """Number of the next tick; None before the first measurement."""
         self._grant: Measurement | None = None
         """The measurement that grants it."""
+        self._states_on: dict[str, str] = {}
+        """Sender of the states on each key that the agent listens to."""
         self._early: dict[str, tuple[State, bytes]] = {}
         """States of this tick that arrived before it was done, and their bytes."""
         self._neighbours: tuple[str, ...] = ()
@@ -184,6 +186,32 @@ class LockstepAgent(AgentNode):
             self._barrier.came(name)
             self._compute(now)
 
+    # ---------------------------------------------------------------- messages
+
+    def received(self, key: str, payload: bytes, now: float) -> None:
+        """Take a message; a state before the next measurement is here takes a shorter way, with the same checks.
+
+        Of n agents that hear each other, each takes n - 1 states a tick, and in one process all of them so.
+        """
+        name = self._states_on.get(key)
+        if name is not None and self._grant is None and self._links is None and not self._ending:
+            try:
+                message = decode(payload)
+            except RejectedError:
+                message = None
+            if (
+                type(message) is State
+                and message.sender == name
+                and message.seq + 1 == self._tick
+                and not (message.idle or message.quiet)
+                and self.admission.passes(message)  # the epoch too
+            ):
+                self._barrier.came(name)
+                self._agent.hear(message)
+                self._last_heard[name] = message.seq, now
+                return
+        super().received(key, payload, now)
+
     # ---------------------------------------------------------------- messages of the plant
 
     def _used(self, message: AnyMessage, now: float) -> None:
@@ -251,6 +279,7 @@ class LockstepAgent(AgentNode):
         self.admission.bind(name, self._known.nameplate(name).epoch)
         self._proofs[name, instance] = False
         self._listen_to(name)
+        self._states_on[self.keys.state(name)] = name
         self._ask(name, instance)
 
     def _meet_neighbours(self) -> dict[str, str]:

@@ -87,20 +87,24 @@ def csv_line(row: Row) -> bytes:
     >>> csv_line((0.1, -0.0, 2.5e-07, 1e22, float("nan")))
     b'0.1,-0.0,2.5e-07,1e+22,nan\n'
     """
-    text = _encoder.encode(row)[1:-1]
+    text = _encoder.encode(row)[:-1]
     if b"n" in text:  # the null of NaN and of an infinite number
         return (",".join(map(repr, row)) + "\n").encode("ascii")
-    for mark in (b"e", b"0.0000"):
+    for mark in _UNLIKE_REPR:
         if mark in text:
             text = b"".join(_with_texts_of_repr(text, mark))
-    return text + b"\n"
+    return text[1:] + b"\n"
+
+
+_UNLIKE_REPR = (b"e", b"[0.0000", b",0.0000", b"-0.0000")
+"""Marks of numbers that JSON writes otherwise than Python; 60.00001, a frequent frequency, has none."""
 
 
 def _with_texts_of_repr(text: bytes, mark: bytes) -> Iterator[bytes]:
-    """Yield a line in pieces; the numbers whose texts contain the mark are as `repr` writes them."""
+    """Yield a line, which begins with a bracket, in pieces; numbers with the mark are as `repr` writes them."""
     done, at = 0, text.find(mark)
     while at >= 0:
-        begin, end = text.rfind(b",", done, at) + 1 or done, text.find(b",", at)
+        begin, end = text.rfind(b",", done, at + 1) + 1 or done or 1, text.find(b",", at + 1)
         end = len(text) if end < 0 else end
         yield text[done:begin]
         yield repr(float(text[begin:end])).encode("ascii")
