@@ -23,9 +23,30 @@ def test_own_tables_survive_writing(name: str, tmp_path: Path) -> None:
         assert len(getattr(again, field)) == len(getattr(feeder, field)), field
     assert [bus.name for bus in again.buses] == [bus.name for bus in feeder.buses]
     assert (again.inverters, again.spares, again.source) == (feeder.inverters, feeder.spares, feeder.source)
+    for transformer, read in zip(feeder.transformers, again.transformers, strict=True):
+        assert read.z == pytest.approx(transformer.z)
     one, other = (Network(each) for each in (feeder, again))
     V, W = (solve_power_flow(network, network.closed0).V for network in (one, other))
     np.testing.assert_allclose(W, V, rtol=1e-11)
+
+
+def test_limits_of_imported_loads_and_the_substations_angle_survive_writing(tmp_path: Path) -> None:
+    """Every field of a load's part is read as it was written, and the angle in radians."""
+    feeder = Feeder.read("ieee34")
+    first, *others = feeder.load_parts
+    limits = {"V_low": 0.5, "V_min": 0.8, "V_max": 1.1, "edge": 1.0, "V_off": 0.7}
+    part = msgspec.structs.replace(first, S=3e3 + 1e3j, exponents=(0.8, 3.0), **limits)
+    assert feeder.source is not None
+    source = msgspec.structs.replace(feeder.source, angle=0.5)
+    feeder = msgspec.structs.replace(feeder, load_parts=(part, *others), source=source)
+
+    again = Feeder.read(feeder.save(tmp_path / "mine"))
+
+    assert again.source is not None
+    assert again.source.angle == pytest.approx(0.5)
+    for name in part.__struct_fields__:
+        written, read = getattr(part, name), getattr(again.load_parts[0], name)
+        assert read == (written if name in ("name", "bus", "ends") else pytest.approx(written))
 
 
 def test_an_inverter_added_to_a_feeder_of_ours_is_saved(tmp_path: Path) -> None:
