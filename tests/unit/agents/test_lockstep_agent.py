@@ -8,11 +8,13 @@ from itertools import permutations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.agent_config import Control, GraphRule
 from tests.toy.toy_configs import agent_config
-from tests.unit.agents.lockstep_lab import Lab, nameplate, ticking
+from tests.unit.agents.lockstep_lab import KEYS, Lab, nameplate, ticking
+from wire.messages import State
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 
@@ -279,6 +281,30 @@ def test_a_state_of_a_tick_that_is_over_is_refused() -> None:
     lab.state("inv2", 3)
 
     assert lab.node.rejects.counts == {"stale": 1}
+
+
+@pytest.mark.parametrize("granted", [False, True])
+def test_a_state_is_checked_alike_before_and_after_the_measurement(granted: bool) -> None:
+    """The shorter way of a state that comes before has the checks of the usual one: sender, epoch, number, idle."""
+    lab = ticking("inv2", "inv3", tick=5)
+    if granted:
+        lab.measure(5)
+    right = State(sender="inv2", epoch=1, seq=4, t=0.08, P_set=5e4, V_set=277.0, Q=0.0)
+    lab.hear(KEYS.state("inv2"), replace(right, sender="inv3"))
+    lab.hear(KEYS.state("inv2"), replace(right, epoch=2))
+    assert lab.node.rejects.counts == {"foreign": 1, "ghost": 1}
+
+    lab.hear(KEYS.state("inv2"), right)
+    lab.hear(KEYS.state("inv2"), replace(right, P_set=9e4))  # its number again
+    lab.hear(KEYS.state("inv3"), replace(right, sender="inv3", P_set=9e4, idle=True))
+    if not granted:
+        lab.measure(5)
+    (state,) = lab.decided
+
+    alone = ticking("inv2", tick=5)
+    alone.state("inv2", 4)
+    alone.measure(5)
+    assert state == alone.decided[0]
 
 
 def test_a_state_of_a_later_tick_is_left_alone() -> None:
