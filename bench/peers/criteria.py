@@ -85,7 +85,12 @@ CRITERIA = (
         at_least=True,
     ),
     Criterion("tick, three agents a process", lambda parts: 1e3 * value(parts, "tick", "ours.tick.3"), 1.2, " ms"),
-    Criterion("one case with processes, start to end", lambda parts: value(parts, "tick", "ours.case.9"), 1.5, " s"),
+    Criterion(
+        "one case with processes but the first, start to end",
+        lambda parts: value(parts, "tick", "ours.case.9"),
+        1.5,
+        " s",
+    ),
     Criterion("start: until the first row", lambda parts: value(parts, "tick", "ours.first_row.9"), 0.6, " s"),
     Criterion("gridpeers --help", lambda parts: value(parts, "case", "ours.help"), 0.15, " s"),
     Criterion("cost of a link, ring, 9 to 300 agents, growth", lambda parts: spread(parts, "ring", 9), 25.0, " %"),

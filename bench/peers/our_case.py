@@ -27,6 +27,7 @@ from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
+from scenarios.drivers.warm_servers import release
 from scenarios.results.record import Recorder
 from scenarios.schema.configs import configs
 from wire.actions import Publish
@@ -87,8 +88,18 @@ class OurCase:
         _check(outcome.broke)
         return {"ours.case.inprocess": took}
 
+    def first_with_processes(self) -> dict[str, float]:
+        """Measure the first case of a process (s): it waits for the servers that fork plant and agents."""
+        release()
+        first = self.with_processes()
+        kind = len(self.agents)
+        return {f"ours.first_case.{kind}": first[f"ours.case.{kind}"]}
+
     def with_processes(self, shared: int = 0) -> dict[str, float]:
-        """Measure one case with processes (s): the whole, until its first row, and each tick."""
+        """Measure one case with processes (s): the whole, until its first row, and each tick.
+
+        Plant and agents are forked from servers that a former case has started (`scenarios.drivers.warm_servers`).
+        """
         kind = f"{shared or len(self.agents)}"
         with tempfile.TemporaryDirectory() as name:
             folder, began = Path(name), perf_counter()

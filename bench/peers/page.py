@@ -143,7 +143,8 @@ def comparison(parts: Parts) -> Iterator[tuple[str, ...]]:
             yield text, _time(them), _time(us), f"{them / us:.3g}" if them == them else ""
     alone = [
         ("one case in process, warm, processor time", "case", "ours.case.inprocess"),
-        ("one case with processes, start to end", "tick", "ours.case.9"),
+        ("the first case with processes, start to end", "tick", "ours.first_case.9"),
+        ("each further case of a command, start to end", "tick", "ours.case.9"),
         ("- of it until the first row", "tick", "ours.first_row.9"),
         ("one case, three agents a process, start to end", "tick", "ours.case.3"),
         ("`gridpeers --help`", "case", "ours.help"),

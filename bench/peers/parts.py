@@ -85,6 +85,7 @@ def tick(extent: Extent) -> list[Measure]:
         return {f"{transport}.tick.{processes or len(agents)}": seconds}
 
     return [
+        Measure("ours, first case of a process", ours.first_with_processes, rounds=3),
         Measure("ours, a process for each agent", ours.with_processes),
         Measure("bare Zenoh", partial(mesh, "zenoh", 0)),
         Measure("bare Zenoh, the hub relays", partial(mesh, "zenoh-star", 0)),
