@@ -22,6 +22,11 @@ AVAILABLE = sys.platform == "linux"
 """Whether this system has what forking needs; elsewhere every process is started anew."""
 
 
+PATIENCE = 5.0
+"""Longest wait (s) for a new process: the plant's server imports for 1 s, but where its step is cached for another
+processor it would compile for a minute, without a word and deaf to Ctrl-C."""
+
+
 class ForkServerError(RuntimeError):
     """A fork server that cannot fork; start the process anew."""
 
@@ -49,6 +54,7 @@ class ForkServer:
         if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
             raise ForkServerError(f"this process cannot be a subreaper: {os.strerror(ctypes.get_errno())}")
         self._control, served = socket.socketpair()
+        self._control.settimeout(PATIENCE)
         with served:
             self._server = subprocess.Popen(
                 [sys.executable, "-P", "-m", "wire.driver.fork_server", str(served.fileno()), *preload],
@@ -88,6 +94,7 @@ class ForkServer:
             socket.send_fds(self._control, [json.dumps(list(words)).encode()], [reading, output, log.fileno()])
             answer = self._control.recv(4096)
         except OSError as error:
+            self.close()  # what it forks now, nobody would know of
             answer = json.dumps({"error": str(error)}).encode()
         finally:
             os.close(reading)

@@ -71,6 +71,21 @@ def test_a_server_with_threads_forks_nothing(tmp_path: Path, monkeypatch: pytest
         server.fork(["agents"], log, speaks=False)
 
 
+def test_a_server_that_imports_for_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for a minute without a word, and it forks nothing afterwards that nobody knows of."""
+    (tmp_path / "slow_module.py").write_text("import time\ntime.sleep(60)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr("scenarios.drivers.forking.PATIENCE", 0.1)
+
+    with (
+        (tmp_path / "log").open("wb") as log,
+        ForkServer(("slow_module",)) as server,
+        pytest.raises(ForkServerError, match="timed out"),
+    ):
+        server.fork(["agents"], log, speaks=False)
+    assert not server.lives
+
+
 def test_a_server_stays_until_its_surroundings_change(monkeypatch: pytest.MonkeyPatch) -> None:
     """A variable that has changed since must reach what is started now, as it reaches any new process."""
     try:
