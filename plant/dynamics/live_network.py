@@ -7,9 +7,12 @@ import numpy as np
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
 from plant.dynamics.inverters import Inverters
+from plant.dynamics.kernel.controller_pass import Units
 from plant.dynamics.kernel.solve import solve_network
+from plant.dynamics.reduction.island_parts import IslandParts, is_large
 from plant.dynamics.reduction.reduce_network import Reduction, reduce_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from plant.dynamics.reduction.sparse_reduction import SparseReduction
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
@@ -58,6 +61,7 @@ class LiveNetwork:
         self.source_voltage = self.reduction.circuit.source_voltage
         """Phasors of the connected ideal sources (V)."""
         self._excess = 0
+        self._parts: IslandParts | None = None
 
     def reduced(self, circuit: Circuit) -> Reduction:
         """Factor a circuit, once; call it ahead of a scheduled event to save this work in the event's step."""
@@ -142,6 +146,17 @@ class LiveNetwork:
             if self._excess > WORTH:
                 self._linearise(self._branch_voltages())
 
+    def parts(self, units: Units) -> IslandParts | None:
+        """Return the islands in parts; None where the network is too small, or all is one island."""
+        if self._parts is None and isinstance(self.reduction, SparseReduction) and is_large(self.net):
+            self._parts = IslandParts(self.net, self.reduction.node_island, units)
+        return self._parts
+
+    def join_parts(self) -> None:
+        """Go on with all islands at once: a part has failed, and what to do next is decided for all."""
+        self._parts = None
+        self.net.sparse.increments[:] = 0.0
+
     def set_source(self, source_voltage: Complex) -> None:
         """Move the ideal sources to other phasors (V), topology unchanged."""
         self.source_voltage = source_voltage
@@ -175,6 +190,7 @@ class LiveNetwork:
         self.net = self.reduction.linearise(V_b, self.source_voltage, self._inverters.theta())
         self.x = np.concatenate([V_b.real, V_b.imag])
         self._excess = 0
+        self._parts = None
 
     def _branch_voltages(self) -> Complex:
         """Return the present voltages of the live branches (V) in the common frame."""

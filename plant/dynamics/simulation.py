@@ -14,9 +14,10 @@ from plant.dynamics.initial import OperatingPoint, equilibrium, set_equilibrium
 from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.controller_pass import READING, Units
 from plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
-from plant.dynamics.kernel.step import FAILURES, run_steps
+from plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
+from plant.dynamics.reduction.island_parts import is_large
 from plant.dynamics.reduction.reduced import Complex, Real
 from plant.dynamics.unsettled_island import unsettled_island
 from plant.plant_config import Method
@@ -177,6 +178,13 @@ class Dynamics:
     def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
         if self._method == "first-order":
+            if steps == 0 and is_large(network.net):
+                run_steps_unlocked(0, 0, self.h, tolerance, network.net, arrays, network.x, out)
+            if begin == 0 and (parts := network.parts(arrays)):
+                iterations = parts.advance(steps, self.h, tolerance, arrays, network.x, out)
+                if iterations >= 0:
+                    return iterations
+                network.join_parts()
             return run_steps(begin, steps, self.h, tolerance, network.net, arrays, network.x, out)
         return run_second_order_steps(
             begin,

@@ -126,21 +126,21 @@ def factorise_blocks(f: BlockFactors) -> bool:
 @compiled
 def solve_blocks(f: BlockFactors, x: Real) -> None:
     """Solve in place: right-hand side in, solution out, [Re, Im] of each node."""
-    # without a sign an index needs no test whether it counts from the end: a quarter of the time
+    # indices without a sign need no test whether they count from the end; a pair of new values before either is written
+    # is one vector operation, because then no write can change what is still to be read: together a third of the time
     start, later, D, L, U = f.start.view(np.uint64), f.later.view(np.uint64), f.D, f.L, f.U
     one, two = np.uint64(1), np.uint64(2)
-    n = D.shape[0]
+    n = np.uint64(D.shape[0])
     for k in range(n):
-        re, im = x[2 * k], x[2 * k + 1]
-        for s in range(start[k], start[k + 1]):
+        re, im = x[two * k], x[two * k + one]
+        for s in range(start[k], start[k + one]):
             i = two * later[s]
-            x[i] -= L[s, 0] * re + L[s, 1] * im
-            x[i + one] -= L[s, 2] * re + L[s, 3] * im
-    for k in range(n - 1, -1, -1):
-        re, im = x[2 * k], x[2 * k + 1]
-        for s in range(start[k], start[k + 1]):
+            x[i], x[i + one] = x[i] - (L[s, 0] * re + L[s, 1] * im), x[i + one] - (L[s, 2] * re + L[s, 3] * im)
+    row = n
+    while row > 0:
+        row -= one
+        re, im = x[two * row], x[two * row + one]
+        for s in range(start[row], start[row + one]):
             i = two * later[s]
-            re -= U[s, 0] * x[i] + U[s, 1] * x[i + one]
-            im -= U[s, 2] * x[i] + U[s, 3] * x[i + one]
-        x[2 * k] = D[k, 0] * re + D[k, 1] * im
-        x[2 * k + 1] = D[k, 2] * re + D[k, 3] * im
+            re, im = re - (U[s, 0] * x[i] + U[s, 1] * x[i + one]), im - (U[s, 2] * x[i] + U[s, 3] * x[i + one])
+        x[two * row], x[two * row + one] = D[row, 0] * re + D[row, 1] * im, D[row, 2] * re + D[row, 3] * im

@@ -44,3 +44,8 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     No fast-math: sums keep their order, so the same inputs give the same bytes in every process.
     """
     return cast("Callable[_P, _R]", cast(Any, numba.njit)(cache=True, error_model="numpy")(function))
+
+
+def unlocked(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile as `compiled` does a function that other threads may run beside."""
+    return cast("Callable[_P, _R]", cast(Any, numba.njit)(cache=True, error_model="numpy", nogil=True)(function))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
+from plant.dynamics.kernel.compiled import compiled, unlocked
 from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from plant.dynamics.kernel.current_limit import limit_currents, solve_on
 from plant.dynamics.kernel.solve import solve_network
@@ -85,3 +85,18 @@ def run_steps(
                 if units.online[i] and not np.isfinite(out[step, i, 0]):
                     return -1 - (FAILURES * step + 2)
     return total
+
+
+@unlocked
+def run_steps_unlocked(
+    begin: int,
+    steps: int,
+    h: float,
+    tolerance: float,
+    net: Any,
+    units: Any,
+    x: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> int:
+    """Call `run_steps` without Python's lock: to hand it back and forth costs small networks time."""
+    return run_steps(begin, steps, h, tolerance, net, units, x, out)

@@ -39,7 +39,7 @@ class SparseReduction(SwitchState):
         joined = (self._at >= 0) & self.online[:, None]
         np.add.at(self._filters, self._at[joined], np.broadcast_to(np.asarray(y_f)[:, None], joined.shape)[joined])
         self._Y = (kept.Y + sp.diags_array(self._filters)).tocsc()
-        self._label = self.label[kept.nodes]
+        self.node_island = self.label[kept.nodes]
         self._lu: SuperLU | None = None
 
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
@@ -91,7 +91,7 @@ class SparseReduction(SwitchState):
         right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
         beginning = self._node_guess(guess, from_sources, right)
         for k in np.flatnonzero(self.live).tolist():
-            nodes, own = np.flatnonzero(self._label == k), np.flatnonzero(self.branch_island == k)
+            nodes, own = np.flatnonzero(self.node_island == k), np.flatnonzero(self.branch_island == k)
             island = SparseIsland(
                 self._Y[nodes][:, nodes].tocsc(),
                 C[nodes][:, own].tocsc(),

@@ -1,0 +1,96 @@
+"""The islands of a large network, advanced in parts on several threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from plant.dynamics import Circuit, Dynamics
+from plant.dynamics.load_law import LoadLaw
+from plant.dynamics.reduction import island_parts, on_all_cores, reduce_network
+from plant.dynamics.reduction.reduced import Real
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
+
+ISLANDS = 5
+
+
+def islands(load: float = 0.3) -> Dynamics:
+    """Five islands, each of a GFM, a GFL and constant power, at rest; the load (pu) of the third then changes."""
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    line = np.kron(np.eye(ISLANDS), np.kron(20.0 * pair / Z_B, np.eye(3)))
+    n = 6 * ISLANDS
+    circuit = Circuit(
+        Y=sp.csc_array(line + 0.01 * np.eye(n) / Z_B),
+        sources=np.arange(0),
+        source_voltage=np.zeros(0, complex),
+        terminals=np.arange(n).reshape(2 * ISLANDS, 3),
+        C=sp.csc_array(np.eye(n)),
+        loads=LoadLaw(S=np.full(n, 0.3 * S_B / 3.0 + 0j), I0=np.zeros(n, complex)),
+        V_branch=V_B * np.tile(BALANCED, 2 * ISLANDS),
+    )
+    dynamics = Dynamics(circuit, (inverter(GFM_D), inverter(GFL_D)) * ISLANDS, 0.002)
+    dynamics.start(np.full(2 * ISLANDS, 0.3), np.zeros(2 * ISLANDS))
+    net = dynamics.network.net
+    net.S[net.branch_island == net.inverter_island[4]] *= load / 0.3
+    return dynamics
+
+
+def readings(dynamics: Dynamics) -> Real:
+    """Let each inverter go to a power of its own, and return 200 steps."""
+    rows = []
+    for k in range(4):
+        dynamics.inverters.set_points[:, 0] = 0.2 + 0.01 * np.arange(2 * ISLANDS) * (k + 1)
+        rows.append(dynamics.run(50))
+    return np.concatenate(rows)
+
+
+@pytest.fixture(autouse=True)
+def _sparse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reduce_network, "MOST_DENSE", 0)
+
+
+@pytest.mark.parametrize("PART", [6, 10])
+def test_parts_give_what_all_islands_give_at_once(monkeypatch: pytest.MonkeyPatch, PART: int) -> None:
+    """In parts of one island or two the readings are those of all at once, within the tolerance of a solution."""
+    at_once = readings(islands())
+    monkeypatch.setattr(island_parts, "PART", PART)
+    dynamics = islands()
+
+    parts = dynamics.network.parts(dynamics.arrays())
+    assert parts is not None
+    assert len(parts) == {6: ISLANDS, 10: 2}[PART]
+    assert np.ptp(at_once[-1, :, 1]) > 0.01 * S_B
+    assert readings(dynamics) == pytest.approx(at_once, rel=1e-9, abs=1e-9 * S_B)
+
+
+def test_the_number_of_cores_does_not_move_a_byte(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One thread and three give the same readings, byte by byte."""
+    monkeypatch.setattr(island_parts, "PART", 6)
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(on_all_cores, "_cores", lambda cores=cores: cores)
+        found.append(readings(islands()).tobytes())
+
+    assert found[0] == found[1]
+
+
+def test_an_island_without_solution_ends_as_it_does_among_all_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The island with more load than it can carry is de-energised, at the same step, and the others continue."""
+    at_once = islands(load=9.0)
+    expected = readings(at_once)
+    monkeypatch.setattr(island_parts, "PART", 6)
+    parts = islands(load=9.0)
+
+    assert readings(parts) == pytest.approx(expected, rel=1e-9, abs=1e-9 * S_B)
+    assert [trip[:3] for trip in parts.take_trips()] == [trip[:3] for trip in at_once.take_trips()]
+    assert parts.network.reduction.online.tolist() == [i not in (4, 5) for i in range(2 * ISLANDS)]
+
+
+def test_an_error_on_another_core_is_raised_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work that fails on any thread fails for the caller, with the first item's error."""
+    monkeypatch.setattr(on_all_cores, "_cores", lambda: 3)
+
+    with pytest.raises(ZeroDivisionError):
+        on_all_cores.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])
+    assert on_all_cores.each_on_a_core(lambda x: 6 // x, [3, 2, 1]) == [2, 3, 6]
