@@ -17,7 +17,10 @@ from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
 _OF_AGENTS = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.laws.consensus")
 """Modules, and a function to call, that the fork server loads once for all agents."""
 
-_OF_PLANTS = ("wire.driver.session:load_zenoh", "plant.plant_process", "plant.loaded_kernels:load_kernels")
+_OF_PLANTS = (
+    *("wire.driver.session:load_zenoh", "plant.plant_process"),
+    *("numba", "plant.build", "plant.loaded_kernels:load_kernels"),
+)
 """The same for plants. Agents have another server, because they load neither numpy nor numba."""
 
 _ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
