@@ -39,3 +39,16 @@ class TransientFolder:
             self._remover.wait()
             os.close(self.user)
             shutil.rmtree(self.path, ignore_errors=True)
+
+
+def no_room(what: str, reason: str) -> str:
+    """Return words for something that a process cannot write into a temporary folder.
+
+    Examples
+    --------
+    >>> no_room("the answer", "[Errno 28] No space left on device").replace(tempfile.gettempdir(), "/tmp")
+    'the answer cannot be written in /tmp ([Errno 28] No space left on device); make room there, raise the limit of \
+file sizes (ulimit -f), or set TMPDIR to another folder'
+    """
+    remedy = "make room there, raise the limit of file sizes (ulimit -f), or set TMPDIR to another folder"
+    return f"{what} cannot be written in {tempfile.gettempdir()} ({reason}); {remedy}"

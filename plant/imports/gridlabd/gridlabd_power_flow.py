@@ -214,7 +214,7 @@ def _put(takes: dict[str, list[list[float]]], keys: tuple[str, ...], pairs: list
 
 
 def main() -> None:
-    """Solve the model and write the result."""
+    """Solve the model and write the result; where that fails, the last line on standard output says why."""
     model, result = sys.argv[1], Path(sys.argv[2])
     end_with(int(sys.argv[3]))
     try:
@@ -223,9 +223,14 @@ def main() -> None:
         answer = {"not_importable": str(error)}
     except Exception as error:
         answer = {"error": f"{type(error).__name__}: {error}"}
-    result.write_text(json.dumps(answer), encoding="utf-8")
+    status = 0
+    try:
+        result.write_text(json.dumps(answer), encoding="utf-8")
+    except OSError as error:
+        print(f"\n{error}")
+        status = os.EX_CANTCREAT
     sys.stdout.flush()
-    os._exit(0)  # GridLAB-D's own end is slow, and may fail
+    os._exit(status)  # GridLAB-D's own end is slow, and may fail
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import Any
 
 from plant.request_process import program
 from plant.tables.read import FeederError
-from plant.transient_folder import TransientFolder
+from plant.transient_folder import TransientFolder, no_room
 from plant.wheels import damaged
 from wire.printable import printable
 
@@ -68,6 +68,9 @@ def solved_model(path: Path) -> dict[str, Any]:
         except subprocess.TimeoutExpired:
             raise FeederError(path.name, (f"GridLAB-D did not end within {LONGEST:g} s; simplify the model",)) from None
         printed = done.stdout.decode("utf-8", errors="replace")
+        if done.returncode == os.EX_CANTCREAT:
+            problem = no_room("what GridLAB-D has solved", printable(printed.splitlines()[-1]))
+            raise FeederError(path.name, (f"{path.name}: {problem}",))
         if not result.is_file():
             ended = (
                 f"GridLAB-D's process ended with code {done.returncode} and said nothing; run the model in GridLAB-D"

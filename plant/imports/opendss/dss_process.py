@@ -17,7 +17,7 @@ from typing import Any
 from plant.imports.opendss.dss_circuit import DssCircuit, ImportRequest
 from plant.request_process import ProcessEndedError, RequestProcess, program
 from plant.tables.read import FeederError
-from plant.transient_folder import TransientFolder
+from plant.transient_folder import TransientFolder, no_room
 from plant.wheels import damaged
 from wire.printable import printable
 
@@ -77,6 +77,9 @@ class DssProcess:
             raise FeederError(path.name, (problem,))
         if "not_importable" in answer:
             raise FeederError("OpenDSS", (damaged("dss", answer["not_importable"], USER),))
+        if "unwritten" in answer:
+            problem = no_room("what the OpenDSS engine reads", answer["unwritten"])
+            raise FeederError(path.name, (f"{path.name}: {problem}",))
         if "ended" in answer:
             raise FeederError(path.name, (crashed(path, answer["ended"], answer["at"]),))
         result = Path(answer["result"])

@@ -7,6 +7,7 @@ a line on standard input; each is answered by one on standard output, when its p
 
     {"result": file}                       pickled: a `DssCircuit`, the problems of a `FeederError`, or a traceback
     {"ended": status, "at": text}          by a signal if status < 0, and what the engine was about to do
+    {"unwritten": reason}                  the disk is full, say: there is no room for a result
     {"not_importable": reason}             the package dss is there and cannot be imported
 
 The process, with what it has forked, ends when standard input does.
@@ -63,7 +64,10 @@ def _load_engine() -> str:
 
 def _answer(request: dict[str, Any], place: mmap.mmap) -> dict[str, Any]:
     place[:] = bytes(PLACE_SIZE)
-    folder = Path(tempfile.mkdtemp(dir=Path.cwd()))
+    try:
+        folder = Path(tempfile.mkdtemp(dir=Path.cwd()))
+    except OSError as error:
+        return {"unwritten": str(error)}
     result = folder.with_suffix(".pickle")
     reading, writing = os.pipe()
     pid = os.fork()
@@ -77,8 +81,12 @@ def _answer(request: dict[str, Any], place: mmap.mmap) -> dict[str, Any]:
     status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     os.close(reading)
     shutil.rmtree(folder, ignore_errors=True)
+    at = place[:].rstrip(b"\0").decode(errors="replace")
+    if status == os.EX_CANTCREAT:
+        result.unlink(missing_ok=True)
+        return {"unwritten": at}
     if status:
-        return {"ended": status, "at": place[:].rstrip(b"\0").decode(errors="replace")}
+        return {"ended": status, "at": at}
     return {"result": str(result)}
 
 
@@ -102,7 +110,11 @@ def _read(request: dict[str, Any], folder: Path, result: Path, place: mmap.mmap)
         found = error.problems
     except BaseException:
         found = traceback.format_exc()
-    result.write_bytes(pickle.dumps(found, pickle.HIGHEST_PROTOCOL))
+    try:
+        result.write_bytes(pickle.dumps(found, pickle.HIGHEST_PROTOCOL))
+    except OSError as error:
+        tell(str(error))  # in the place of what the engine was about to do
+        os._exit(os.EX_CANTCREAT)
     os._exit(0)  # without what the parent has registered for its end
 
 
