@@ -142,10 +142,12 @@ def gridlabd_package() -> ModuleType:
     Raises
     ------
     NotImportableError
-        If it cannot be imported.
+        If it cannot be imported, or is another package of that name.
     """
     try:
-        return importlib.import_module("gridlabd")
+        package = importlib.import_module("gridlabd")
+        _ = package.DirectGridLabD, package.GLDErrorCode, package.__version__
+        return package
     except Exception as error:  # a damaged package may raise anything
         raise NotImportableError(error) from error
 

@@ -56,16 +56,24 @@ def test_a_killed_import_leaves_no_process_and_no_folder(model: Path) -> None:
     assert not Path(scratch).exists()
 
 
-def test_a_damaged_wheel_is_one_line(model: Path) -> None:
-    """A package that is there and does not load is not missing: the line says why, and how to mend it."""
-    (model.parent / "gridlabd.py").write_text("raise OSError('libgld.so: cannot open')\n")
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        ("raise OSError('libgld.so: cannot open')", "OSError: libgld.so: cannot open"),
+        ("", "AttributeError: module 'gridlabd' has no attribute 'DirectGridLabD'"),
+    ],
+    ids=["does not load", "another package"],
+)
+def test_a_damaged_wheel_is_one_line(model: Path, damage: str, reason: str) -> None:
+    """A package that is there and is of no use is not missing: the line says why, and how to mend it."""
+    (model.parent / "gridlabd.py").write_text(damage + "\n")
 
     with pytest.raises(FeederError) as refused:
         read_glm(model)
 
     assert refused.value.problems == (
-        "gridlabd is installed, but cannot be imported (OSError: libgld.so: cannot open); the import of .glm files "
-        "needs it: pip install --force-reinstall gridlabd",
+        f"gridlabd is installed, but cannot be imported ({reason}); the import of .glm files needs it: "
+        "pip install --force-reinstall gridlabd",
     )
 
 
