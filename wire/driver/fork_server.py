@@ -57,6 +57,8 @@ def main() -> None:
         return
     control.close()
     _become(job)
+    if not hasattr(sys.modules.get(job.words[0]), "__path__"):
+        sys.modules.pop(job.words[0], None)  # runpy warns of a module that it runs and that is there already
     runpy.run_module(job.words[0], run_name="__main__", alter_sys=True)
 
 

@@ -45,6 +45,21 @@ def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path) -> None:
     killed.stdin.close()
 
 
+def test_a_forked_agent_behind_emulated_links_warns_of_nothing(tmp_path: Path) -> None:
+    """Its log begins with its own words, though the server has imported the module that it runs."""
+    module = "scenarios.emulation.emulated_agent"
+    with (tmp_path / "log").open("wb") as log, ForkServer((module,)) as server:
+        agent = server.fork([module], log, speaks=False)
+        assert agent.stdin is not None
+        agent.stdin.write(b'{"run": 1}\n')
+        agent.stdin.close()
+
+        assert agent.wait() == 2
+    text = (tmp_path / "log").read_text()
+    assert "Expected `str`, got `int` - at `$.run`" in text
+    assert "Warning" not in text
+
+
 def test_a_process_that_cannot_be_forked_is_started_anew(tmp_path: Path) -> None:
     """A server that is gone costs time and nothing else."""
     config = agent_config("inv1")
