@@ -146,12 +146,18 @@ VOLTAGE = Bounds(least=0.01, shown=0.98)
 
 
 def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
-    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest."""
-    values = np.concatenate([*curves])
-    values = values[np.isfinite(values)]
-    if not values.size:
+    """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
+
+    Where a curve settles is in the frame always.
+    """
+    finite = [curve[np.isfinite(curve)] for curve in curves]
+    finite = [curve for curve in finite if curve.size]
+    if not finite:
         return
+    values = np.concatenate(finite)
+    settled = max(float(np.median(curve[-max(curve.size // 10, 1) :])) for curve in finite)
     top = min(max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), bounds.most)
+    top = max(top, settled * 1.15)
     peak = float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from plant.tables import read_feeder
@@ -14,7 +15,7 @@ from scenarios.results.island_membership import IslandInterval
 from scenarios.results.plots.drawing import Drawing, Mark
 from scenarios.results.plots.marks import GAP, LETTER, placed
 from scenarios.results.plots.run_figures import draw, draw_all
-from scenarios.results.plots.style import CASE_STYLES, Format, case_style, save
+from scenarios.results.plots.style import CASE_STYLES, SHARING, Format, case_style, from_zero, save
 from scenarios.schema import catalogue, load_scenario
 
 
@@ -213,3 +214,25 @@ def test_the_lowest_panel_of_every_column_has_its_times() -> None:
 
     assert [axes.get_xlabel() for axes in panels if axes.get_visible()] == ["", "time (s)", "time (s)"]
     assert [axes.xaxis.get_tick_params()["labelbottom"] for axes in panels if axes.get_visible()] == [False, True, True]
+
+
+def test_where_a_curve_settles_is_in_the_frame() -> None:
+    """A sharing index that settles at 7 is seen to settle there; the spikes of others do not flatten it."""
+    spike, settled = np.full(1000, 0.1), np.full(1000, 7.0)
+    spike[:3] = 14.0
+    axes = Figure().add_subplot()
+
+    from_zero(axes, [spike, settled], SHARING)
+
+    assert 7.0 < axes.get_ylim()[1] < 14.0
+
+
+def test_a_short_spike_leaves_the_frame() -> None:
+    """Three values of a thousand do not set the end of the axis."""
+    curve = np.full(1000, 0.1)
+    curve[:3] = 14.0
+    axes = Figure().add_subplot()
+
+    from_zero(axes, [curve], SHARING)
+
+    assert axes.get_ylim()[1] < 1.0
