@@ -24,7 +24,7 @@ it in one run and writes this page, its figures and [performance.json](performan
 
 ```sh
 pip install -e '.[bench]'
-python -m bench.peers --write docs     # some five minutes; or some parts: {names}
+python -m bench.peers --write docs     # a quarter of an hour; or some parts: {names}
 ```
 
 Rivals take turns, round by round, and a number is the median of the rounds. Ratios hold from machine to machine better
