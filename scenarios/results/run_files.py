@@ -113,9 +113,11 @@ def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
             with partial.open("w", encoding="utf-8", newline="\n") as file:
                 file.writelines([content] if isinstance(content, str) else content)
         partial.replace(path)
-    except OSError:
+    except OSError as error:
         with contextlib.suppress(OSError):
             partial.unlink()
+        if error.filename == str(partial):
+            error.filename = str(path)  # the file that the user asked for
         raise
 
 
