@@ -148,7 +148,7 @@ VOLTAGE = Bounds(least=0.01, shown=0.98)
 def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     """Start the axis at 0, and let spikes of a few ms at a switching leave the frame instead of flattening the rest.
 
-    Where a curve settles is in the frame always.
+    A curve that settles beyond the frame is told.
     """
     finite = [curve[np.isfinite(curve)] for curve in curves]
     finite = [curve for curve in finite if curve.size]
@@ -157,12 +157,11 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
     values = np.concatenate(finite)
     settled = max(float(np.median(curve[-max(curve.size // 10, 1) :])) for curve in finite)
     top = min(max(float(np.quantile(values, bounds.shown)) * 1.15, bounds.least), bounds.most)
-    top = max(top, settled * 1.15)
     peak = float(values.max())
     axes.set_ylim(0.0, top)
     if peak > top:
         axes.annotate(
-            f"spikes reach {peak:.2g}",
+            f"one rests at {settled:.2g}" if settled > top else f"spikes reach {peak:.2g}",
             (0.995, 0.985),
             xycoords="axes fraction",
             ha="right",

@@ -216,15 +216,15 @@ def test_the_lowest_panel_of_every_column_has_its_times() -> None:
     assert [axes.xaxis.get_tick_params()["labelbottom"] for axes in panels if axes.get_visible()] == [False, True, True]
 
 
-def test_where_a_curve_settles_is_in_the_frame() -> None:
-    """A sharing index that settles at 7 is seen to settle there; the spikes of others do not flatten it."""
+def test_a_curve_that_settles_beyond_the_frame_is_told() -> None:
+    """A sharing index that rests at 7 is not called a spike."""
     spike, settled = np.full(1000, 0.1), np.full(1000, 7.0)
     spike[:3] = 14.0
     axes = Figure().add_subplot()
 
     from_zero(axes, [spike, settled], SHARING)
 
-    assert 7.0 < axes.get_ylim()[1] < 14.0
+    assert [text.get_text() for text in axes.texts] == ["one rests at 7"]
 
 
 def test_a_short_spike_leaves_the_frame() -> None:
