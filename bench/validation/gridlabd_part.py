@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from cycler import cycler
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -80,7 +82,10 @@ def _draw(results: Sequence[CaseResult]) -> Figure:
     """Draw the largest difference over all inverters, over time."""
     figure = Figure(figsize=(8.0, 4.6), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True).ravel()
+    # More cases than colours: those of the second round are dashed.
+    styles = cycler(linestyle=["-", "--"]) * cycler(color=rcParams["axes.prop_cycle"].by_key()["color"])
     for axes, quantity in zip(panels, PHYSICAL, strict=True):
+        axes.set_prop_cycle(styles)
         for result in results:
             n = len(result.curves["t"]) // WINDOW * WINDOW
             t, gap = (result.curves[name][-n:].reshape(-1, WINDOW) for name in ("t", quantity))
@@ -89,7 +94,7 @@ def _draw(results: Sequence[CaseResult]) -> Figure:
         axes.set_ylabel(f"{quantity} ({QUANTITIES[quantity]})")
     for axes in panels[2:]:
         axes.set_xlabel("t (s)")
-    figure.suptitle("Largest difference over the inverters; dotted: the limit")
+    figure.suptitle("Largest difference over the inverters; dotted: the limit, but for current-limit (2e-5)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper")
     return figure
 
