@@ -18,11 +18,12 @@ from typing import Annotated
 import gridpeers as gp
 
 class Mine(gp.Law):
-    """Go to the neighbours' mean set-point."""
+    """Go to the neighbours' mean set-point, and against the own frequency error."""
     gain: Annotated[float, gp.Unit("1/s"), gp.Range(0, 100)] = 5.0
     def step(self, own, neighbours, T):
         mean = sum(n.P_set for n in neighbours) / len(neighbours) if neighbours else own.P_set
-        return gp.SetPoints(P_set=own.P_set + min(1, self.gain * T) * (mean - own.P_set), V_set=own.V_set)
+        change = min(1, self.gain * T) * (mean - own.P_set) - own.e  # in the catalogue all start from the mean
+        return gp.SetPoints(P_set=own.P_set + change, V_set=own.V_set)
 '''
 
 STUDY = """
