@@ -8,7 +8,9 @@ steps many islands on all cores, time by the clock: below 1 is faster than real 
 The copies are tied to each other and make one island, or with `--apart 1` an island each.
 
     .venv/bin/python -m bench.scale [--agents 9,27,99,306,999] [--T_c 0.1] [--end 4] [--rounds 3] [--apart 0]
-                                    [--json scale.json] [--figure scale.svg]
+                                    [--graphs ring,clustered,full] [--json scale.json]
+
+The part `scale` of `bench.peers` runs it on a ring, for the table and the figure of docs/performance.md.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter, process_time
@@ -84,7 +86,7 @@ class PlantClock:
         return call
 
 
-def write_scenario(folder: Path, agents: int, T_c: float, end: float, *, apart: bool) -> Path:
+def write_scenario(folder: Path, agents: int, T_c: float, end: float, graphs: Sequence[str], *, apart: bool) -> Path:
     """Write a feeder of joined copies and its scenario; return the scenario's path."""
     copies = agents // ISLAND
     joined_copies(Feeder.read("microgrid123"), copies, JOINT).save(folder / "grown")
@@ -92,14 +94,14 @@ def write_scenario(folder: Path, agents: int, T_c: float, end: float, *, apart: 
     switches += [f"tie_{k}" for k in range(2, copies + 1) if apart]
     text = SCENARIO.format(T_c=T_c, end=end, islanding=1.0, switches=json.dumps(switches))
     path = folder / "scale.toml"
-    path.write_text(text + "".join(CASE.format(graph=graph) for graph in graphs_of(agents)), encoding="utf-8")
+    path.write_text(text + "".join(CASE.format(graph=graph) for graph in graphs), encoding="utf-8")
     return path
 
 
-def graphs_of(agents: int) -> tuple[str, ...]:
-    """Return the graphs to run with so many agents."""
+def graphs_of(agents: int, wanted: str) -> tuple[str, ...]:
+    """Return the graphs to run with so many agents, of those that are wanted; with none of them left, the ring."""
     most = {"full": MOST_FULL, "clustered": MOST_CLUSTERED}
-    return tuple(graph for graph in GRAPHS if agents <= most.get(graph, agents))
+    return tuple(graph for graph in wanted.split(",") if agents <= most.get(graph, agents)) or GRAPHS[:1]
 
 
 def megabytes() -> float:
@@ -107,15 +109,17 @@ def megabytes() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
 
 
-def measure(agents: int, T_c: float, end: float, rounds: int, *, apart: bool) -> Iterator[dict[str, float | str]]:
+def measure(
+    agents: int, T_c: float, end: float, rounds: int, graphs: Sequence[str], *, apart: bool
+) -> Iterator[dict[str, float | str]]:
     """Yield one row for each graph; the plant's code is compiled, or loaded, before the first."""
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
-        path = write_scenario(folder, agents, T_c, end, apart=apart)
+        path = write_scenario(folder, agents, T_c, end, graphs, apart=apart)
         began = process_time()
         scenario, feeder = load_scenario(str(path))
         read = process_time() - began
-        plant, agent_configs = configs(scenario, feeder, "ring")
+        plant, agent_configs = configs(scenario, feeder, graphs[0])
         built = build_plant(plant)
         if agents <= MOST_FULL:  # the first run of a process is slower, which shows in few agents
             _run(plant, agent_configs, built, folder / "first")
@@ -179,32 +183,16 @@ def _run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> dict[st
     return {"meet": at - began, "plant_s": plant_s, "agents_s": ended - at - plant_s, "clock_s": then - since}
 
 
-def draw(rows: list[dict[str, Any]], file: Path) -> None:
-    """Draw cost per simulated second and cost per message against the number of agents."""
-    import matplotlib.pyplot as plt
-
-    figure, (whole, link) = plt.subplots(1, 2, figsize=(9.0, 3.6), layout="constrained")
-    for graph in GRAPHS:
-        own = [row for row in rows if row["graph"] == graph]
-        n = [row["agents"] for row in own]
-        (line,) = whole.plot(n, [row["agents_per_s"] for row in own], "o-", label=f"agents, {graph}")
-        link.plot(n, [row["us_per_message"] for row in own], "o-", color=line.get_color(), label=graph)
-    alone = [row for row in rows if row["graph"] == "ring"]
-    whole.plot([row["agents"] for row in alone], [row["plant_per_s"] for row in alone], "k--", label="plant")
-    whole.axhline(1.0, color="grey", lw=0.8)
-    whole.set(xscale="log", yscale="log", xlabel="agents", ylabel="processor time per simulated second (s/s)")
-    link.set(xscale="log", xlabel="agents", ylabel="processor time per message (us), without plant", ylim=(0, None))
-    for axes in (whole, link):
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.3)
-    figure.savefig(file)
-
-
 def main() -> None:
-    """Measure each number of agents in a process of its own, print a table, write JSON and the figure."""
-    given = options(__doc__, agents="9,27,99,306,999", T_c=0.1, end=4, rounds=3, apart=0, json="", figure="", only=0)
+    """Measure each number of agents in a process of its own, print a table, write JSON."""
+    numbers: dict[str, float | str] = {"agents": "9,27,99,306,999", "T_c": 0.1, "end": 4, "rounds": 3, "apart": 0}
+    given = options(__doc__, **numbers, graphs=",".join(GRAPHS), json="", only=0)
+    if unknown := [graph for graph in given.graphs.split(",") if graph not in GRAPHS]:
+        sys.exit(f'graph "{unknown[0]}": there is no such graph; choose from {", ".join(GRAPHS)}')
     if given.only:  # the child: one number of agents, so that memory is its own
-        print(json.dumps(list(measure(given.only, given.T_c, float(given.end), given.rounds, apart=bool(given.apart)))))
+        graphs = graphs_of(given.only, given.graphs)
+        found = measure(given.only, given.T_c, float(given.end), given.rounds, graphs, apart=bool(given.apart))
+        print(json.dumps(list(found)))
         return
     print(machine())
     rows: list[dict[str, Any]] = []
@@ -212,7 +200,7 @@ def main() -> None:
         say(f"{agents} agents")
         end = max(given.end, round(AGENT_SECONDS / agents))
         words = ["--only", str(agents), "--T_c", str(given.T_c), "--end", str(end)]
-        words += ["--rounds", str(given.rounds), "--apart", str(given.apart)]
+        words += ["--rounds", str(given.rounds), "--apart", str(given.apart), "--graphs", given.graphs]
         child = subprocess.run([sys.executable, "-m", "bench.scale", *words], stdout=subprocess.PIPE, check=True)
         rows += json.loads(child.stdout)
     names = [name for name in rows[0] if name not in ("graph", "load", "T_c_s")]
@@ -222,8 +210,6 @@ def main() -> None:
         print(f"{row['graph']:9}" + "".join(f"  {row[name]:>{len(name)}.5g}" for name in names))
     if given.json:
         Path(given.json).write_text(json.dumps({"machine": machine(), "rows": rows}, indent=1) + "\n", encoding="utf-8")
-    if given.figure:
-        draw(rows, Path(given.figure))
 
 
 if __name__ == "__main__":

@@ -1,29 +1,19 @@
-"""Measurements of one run of the bench: rounds in which all take turns, the machine's load, versions, and medians."""
+"""Measurements of one part of the bench: rounds in which all take turns, the machine's load, versions, and medians."""
 
 from __future__ import annotations
 
-import os
-import resource
-import subprocess
-import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import metadata
-from pathlib import Path
+from math import isfinite
 from statistics import median
+from time import monotonic
 from typing import NamedTuple
 
 import msgspec
 
-from bench.harness import machine, say
-
-REPOSITORY = Path(__file__).parents[2]
-
-PACKAGES = ("eclipse-zenoh", "helics", "gridlabd", "pyzmq", "numpy", "scipy", "numba", "msgspec")
-
-
-class MissingRivalError(RuntimeError):
-    """A rival's package is not installed."""
+from bench.harness import machine
+from bench.peers import machine_use
+from bench.peers.failure import reason
 
 
 class Measure(NamedTuple):
@@ -37,6 +27,12 @@ class Measure(NamedTuple):
     """Distribution of the rival; without it the measure is left out and named."""
     rounds: int | None = None
     """Rounds in which it takes part; all when left out."""
+    values: tuple[str, ...] = ()
+    """Names of the values that it gives, as far as rows of the page show them; they tell the reason if it fails."""
+
+    def rounds_of(self, rounds: int) -> int:
+        """Return in how many of so many rounds it takes part."""
+        return rounds if self.rounds is None else min(rounds, self.rounds)
 
 
 class PartRun(msgspec.Struct, kw_only=True):
@@ -58,77 +54,84 @@ class PartRun(msgspec.Struct, kw_only=True):
     """Values of each round, by name."""
     left_out: dict[str, str] = {}
     """Measures that could not be done, and the reason."""
+    missing: dict[str, str] = {}
+    """Values that a row would show and that are not there, and the reason."""
+    took: dict[str, float] = {}
+    """Median duration (s) of each measure: the usual time for the next run."""
+    failed: bool = False
+    """Whether a measure failed, not only for want of a rival's package."""
 
     def median(self, name: str) -> float:
         """Return the median of a value over the rounds; nan if it was not measured."""
         return median(self.values[name]) if self.values.get(name) else float("nan")
 
+    @property
+    def load(self) -> str:
+        """The load before and at most during it, and what other programs took."""
+        most = max(self.loads[1:], default=self.loads[0])
+        return f"{self.loads[0]:.1f} to {most:.1f}, others {100.0 * self.others:.0f} %"
 
-def measure_in_turns(measures: Sequence[Measure], rounds: int) -> PartRun:
-    """Measure all, round by round, each round in another order; a measure that fails is left out from then on."""
+    def leave_out(self, measure: Measure, why: str, *, failed: bool = True) -> None:
+        """Note that a measure could not be done."""
+        self.left_out[measure.name] = why
+        self.missing |= {name: f"{measure.name}: {why}" for name in measure.values if name not in self.values}
+        self.failed = self.failed or failed
+
+
+Tell = Callable[[str, Measure], None]
+"""Takes what is measured now, in words, and the measure."""
+
+
+def measure_in_turns(
+    measures: Callable[[], Sequence[Measure]], rounds: int, tell: Tell = lambda text, measure: None
+) -> PartRun:
+    """Measure all, round by round, each round in another order.
+
+    What fails is left out from then on, with its reason; the others go on.
+
+    Parameters
+    ----------
+    measures
+        Makes the measures; what they share may take a while to make, or fail, too.
+    rounds
+        How often each is measured, unless it says otherwise.
+    tell
+        Is called before each measurement.
+    """
     part = PartRun(
         began=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        commit=_commit(),
+        commit=machine_use.commit(),
         machine=machine(),
-        versions=_versions(),
-        loads=[round(os.getloadavg()[0], 2)],
+        versions=machine_use.versions(),
+        loads=[machine_use.load()],
     )
-    began, busy, own = time.monotonic(), _machine_time(), _own_time()
-    for measure in measures:
-        if measure.needs and not _version(measure.needs):
-            part.left_out[measure.name] = f"{measure.needs} is not installed: pip install 'gridpeers[bench]'"
+    use = machine_use.MachineUse()
+    took: dict[str, list[float]] = {}
+    try:
+        found = list(measures())
+    except Exception as error:  # whatever it is, the other parts are measured
+        part.left_out["all of it"], part.failed = reason(error), True
+        return part
+    for measure in found:
+        if measure.needs and not machine_use.version(measure.needs):
+            why = f"{measure.needs} is not installed: pip install 'gridpeers[bench]'"
+            part.leave_out(measure, why, failed=False)
     for i in range(rounds):
-        k = i % max(len(measures), 1)
-        for measure in (*measures[k:], *measures[:k]):
-            if measure.name in part.left_out or (measure.rounds is not None and i >= measure.rounds):
+        k = i % max(len(found), 1)
+        for measure in (*found[k:], *found[:k]):
+            if measure.name in part.left_out or i >= measure.rounds_of(rounds):
                 continue
-            say(f"round {i + 1} of {rounds}: {measure.name}")
+            tell(f"round {i + 1} of {rounds}: {measure.name}", measure)
+            began = monotonic()
             try:
                 for name, value in measure.run().items():
+                    if not isfinite(value):
+                        raise RuntimeError(f"{name}: a finite number was to be measured, not {value}")
                     part.values.setdefault(name, []).append(value)
-            except (RuntimeError, OSError, TimeoutError) as error:
-                part.left_out[measure.name] = f"{type(error).__name__}: {str(error)[-300:]}"
-        part.loads.append(round(os.getloadavg()[0], 2))
-    part.seconds = round(time.monotonic() - began, 1)
-    whole = part.seconds * (os.cpu_count() or 1)
-    part.others = round(max(0.0, (_machine_time() - busy) - (_own_time() - own)) / whole, 3) if whole else 0.0
+            except Exception as error:  # the same: a rival may raise anything
+                part.leave_out(measure, reason(error))
+            took.setdefault(measure.name, []).append(monotonic() - began)
+        part.loads.append(machine_use.load())
+    part.took = {name: round(median(seconds), 2) for name, seconds in took.items()}
+    part.seconds, part.others = round(use.seconds, 1), round(use.others, 3)
     return part
-
-
-def _machine_time() -> float:
-    """Return the processor time (s) that all programs of the machine have taken so far; 0 where /proc is not."""
-    try:
-        fields = Path("/proc/stat").read_text().splitlines()[0].split()[1:]
-    except OSError:
-        return 0.0
-    user, nice, system, _idle, _iowait, irq, softirq, steal, *_ = map(int, fields)
-    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
-
-
-def _own_time() -> float:
-    """Return the processor time (s) of this process and its ended children so far."""
-    uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(use.ru_utime + use.ru_stime for use in uses)
-
-
-def _commit() -> str:
-    def git(*words: str) -> str:
-        return subprocess.run(
-            ["git", *words], cwd=REPOSITORY, capture_output=True, text=True, check=True
-        ).stdout.strip()
-
-    try:
-        return git("rev-parse", "--short=10", "HEAD") + ("+" if git("status", "--porcelain") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-
-
-def _versions() -> dict[str, str]:
-    return {name: version for name in PACKAGES if (version := _version(name))}
-
-
-def _version(distribution: str) -> str:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return ""

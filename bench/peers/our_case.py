@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import tempfile
 from collections import defaultdict
@@ -27,7 +26,6 @@ from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
-from scenarios.drivers.warm_servers import release
 from scenarios.results.record import Recorder
 from scenarios.schema.configs import configs
 from wire.actions import Publish
@@ -87,13 +85,6 @@ class OurCase:
             took = process_time() - began
         _check(outcome.broke)
         return {"ours.case.inprocess": took}
-
-    def first_with_processes(self) -> dict[str, float]:
-        """Measure the first case of a process (s): it waits for the servers that fork plant and agents."""
-        release()
-        first = self.with_processes()
-        kind = len(self.agents)
-        return {f"ours.first_case.{kind}": first[f"ours.case.{kind}"]}
 
     def with_processes(self, shared: int = 0) -> dict[str, float]:
         """Measure one case with processes (s): the whole, until its first row, and each tick.
@@ -194,14 +185,6 @@ def shares(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> dict[str, flo
         _check(outcome.broke)
     whole, ticks = spent.pop("all"), spent.pop(TICKS)
     return dict(spent) | {REST_OF_CASE: whole - sum(spent.values()), TICKS: ticks}
-
-
-def help_time() -> dict[str, float]:
-    """Measure `gridpeers --help` (s)."""
-    command = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "--help"]
-    began = perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return {"ours.help": perf_counter() - began}
 
 
 def _processor_time(pid: int) -> float:

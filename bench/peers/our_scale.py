@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +13,7 @@ from msgspec.structs import replace
 
 import gridpeers as gp
 from agents.agent_config import AgentConfig
+from bench.peers.failure import GRIDPEERS, checked
 from bench.peers.our_case import STEPS, TICKS, shares
 from plant.plant_config import PlantConfig
 from scenarios.drivers.process_driver import run_processes
@@ -43,23 +42,22 @@ def links(graph: str, agents: int) -> int:
 
 
 @cache
-def grown(agents: int, graph: str, ticks: int) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+def grown(agents: int, graph: str, ticks: int, T_c: float = T_C) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Return the configurations of a run of so many ticks with so many agents, on as many copies as they need.
 
     Inverters beyond the number of agents stay on droop.
     """
     copies = -(-agents // INVERTERS)
     with _folder() as folder:
-        command = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "feeder", "grow"]
-        words = ["microgrid123", "--copies", str(copies), "--joint", "450", "--switch", "13-152", "--T-c", str(T_C)]
+        words = ["microgrid123", "--copies", str(copies), "--joint", "450", "--switch", "13-152", "--T-c", str(T_c)]
         out = folder / f"{agents}-{graph}"
-        subprocess.run([*command, *words, "--out", str(out)], check=True, stdout=subprocess.DEVNULL)
+        checked([*GRIDPEERS, "feeder", "grow", *words, "--out", str(out)])
         scenario = gp.load(out / "islanding.toml")
         (event,) = scenario.tables["event"]
         scenario = scenario.replace(
             {
                 "event": [event | {"t_s": ISLANDING}],
-                "time.end_s": round(ISLANDING + ticks * T_C, 9),
+                "time.end_s": round(ISLANDING + ticks * T_c, 9),
                 "case.ring.graph": graph,
             }
         )

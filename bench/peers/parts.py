@@ -6,23 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from bench.peers import our_scale
+from bench.peers import our_command, our_hosts, our_scale
 from bench.peers.measured import Measure
 from bench.peers.mesh import full_graph, ring_graph, seconds_per_round
-from bench.peers.our_case import OurCase, help_time
+from bench.peers.our_case import OurCase
+from bench.peers.rows import SCALE
 
 PACKAGE = {"zenoh": "", "zeromq": "pyzmq", "helics-zmq": "helics", "helics-tcp": "helics"}
 """Distribution that a transport needs beyond our own dependencies."""
 
 GRAPHS = {"full": full_graph, "ring": ring_graph}
-
-
-class BenchPart(NamedTuple):
-    """One part of the bench, whose measures take turns."""
-
-    measures: Callable[[Extent], Sequence[Measure]]
-    text: str
-    """For the help."""
 
 
 class Extent(NamedTuple):
@@ -31,7 +24,7 @@ class Extent(NamedTuple):
     rounds: int = 5
     end: float | None = None
     """Duration (s) of our case instead of the experiment's 7 s."""
-    mesh_rounds: int = 300
+    mesh_rounds: int = 500
     runs: int = 80
     """Runs of the sweep."""
     sizes: Sequence[int] = (3, 9, 18, 30)
@@ -41,10 +34,45 @@ class Extent(NamedTuple):
     """Numbers of agents in one process, in a ring and in a full graph."""
     ticks: int = 50
     """Ticks of a run of another size than nine."""
+    hosted: tuple[int, int] = (100, 8)
+    """Agents, and the processes that they share."""
+    wall: int = 30
+    """Agents as processes in wall-clock time."""
+    many_ticks: int = 200
+    """Ticks, of 0.1 s, of the runs of these two."""
+    scale: Sequence[tuple[int, int]] = SCALE
+    """Numbers of agents in a new process, and T_c (ms)."""
+
+    def fewer(self, rounds: int) -> int:
+        """Return at most so many rounds, for what takes long."""
+        return min(self.rounds, rounds)
 
 
-SHORT = Extent(rounds=1, end=0.2, mesh_rounds=5, runs=2, sizes=(3,), rings=(9,), full=(), ticks=5)
+SHORT = Extent(
+    rounds=1,
+    end=0.2,
+    mesh_rounds=5,
+    runs=2,
+    sizes=(3,),
+    rings=(9,),
+    full=(),
+    ticks=5,
+    hosted=(4, 2),
+    wall=2,
+    many_ticks=5,
+    scale=((9, 100),),
+)
 """As much as a test needs."""
+
+
+class BenchPart(NamedTuple):
+    """One part of the bench, whose measures take turns."""
+
+    measures: Callable[[Extent], Sequence[Measure]]
+    text: str
+    """For the help."""
+    usual: float
+    """Duration (s) on an idle machine, where no former run tells it."""
 
 
 def plant(extent: Extent) -> list[Measure]:
@@ -52,24 +80,34 @@ def plant(extent: Extent) -> list[Measure]:
     case = OurCase(extent.end)
     case.plant_alone()  # loads the compiled step
     return [
-        Measure("our plant", case.plant_alone),
-        Measure("GridLAB-D", case.gridlabd_alone, "gridlabd", rounds=3),
+        Measure("our plant", case.plant_alone, values=("ours.plant.build", "ours.plant.steps")),
+        Measure("GridLAB-D", case.gridlabd_alone, "gridlabd", extent.fewer(3), ("gridlabd.plant.steps",)),
     ]
 
 
 def case(extent: Extent) -> list[Measure]:
-    """One case in process, its parts, the command's help, and a sweep."""
+    """One case in process, its parts, and a sweep."""
     ours = OurCase(extent.end)
     ours.in_process()
 
     def parts() -> Mapping[str, float]:
         return {f"share.{name}": value for name, value in ours.shares().items()}
 
+    sweep = ("ours.sweep", "ours.sweep.whole")
     return [
-        Measure("our case in process", ours.in_process),
+        Measure("our case in process", ours.in_process, values=("ours.case.inprocess",)),
         Measure("its parts", parts),
-        Measure("gridpeers --help", help_time),
-        Measure("our sweep", partial(ours.sweep, extent.runs), "joblib", rounds=2),
+        Measure("our sweep", partial(ours.sweep, extent.runs), "joblib", extent.fewer(3), sweep),
+    ]
+
+
+def command(extent: Extent) -> list[Measure]:
+    """The command in a process of its own: its help, and its first case with processes."""
+    ours = OurCase(extent.end)
+    times = tuple(f"ours.command.{name}" for name in ("first_row", "last_row", "end"))
+    return [
+        Measure("gridpeers run", partial(our_command.command_times, ours), values=times),
+        Measure("gridpeers --help", our_command.help_time, values=("ours.help",)),
     ]
 
 
@@ -77,6 +115,7 @@ def tick(extent: Extent) -> list[Measure]:
     """A lock-step tick of nine agents beside HELICS, ZeroMQ and bare Zenoh on the same mesh."""
     ours = OurCase(extent.end)
     agents = [agent.name for agent in ours.agents]
+    ours.with_processes()  # starts the servers that plant and agents are forked from
 
     def mesh(transport: str, processes: int) -> Mapping[str, float]:
         seconds = seconds_per_round(
@@ -84,23 +123,26 @@ def tick(extent: Extent) -> list[Measure]:
         )
         return {f"{transport}.tick.{processes or len(agents)}": seconds}
 
+    def rival(name: str, transport: str, processes: int = 0) -> Measure:
+        value = f"{transport}.tick.{processes or len(agents)}"
+        return Measure(name, partial(mesh, transport, processes), PACKAGE.get(transport, ""), values=(value,))
+
+    def own(name: str, shared: int = 0) -> Measure:
+        kind = shared or len(agents)
+        values = tuple(f"ours.{value}.{kind}" for value in ("tick", "first_row", "case"))
+        return Measure(name, partial(ours.with_processes, shared), values=values)
+
     return [
-        Measure("ours, first case of a process", ours.first_with_processes, rounds=3),
-        Measure("ours, a process for each agent", ours.with_processes),
-        Measure("bare Zenoh", partial(mesh, "zenoh", 0)),
-        Measure("bare Zenoh, the hub relays", partial(mesh, "zenoh-star", 0)),
-        Measure("ours, three agents a process", partial(ours.with_processes, 3)),
-        Measure("bare Zenoh, three agents a process", partial(mesh, "zenoh", 3)),
-        Measure("bare Zenoh, three agents a process, the hub relays", partial(mesh, "zenoh-star", 3)),
-        Measure("ZeroMQ ipc", partial(mesh, "zeromq", 0), "pyzmq"),
-        Measure("HELICS zmq", partial(mesh, "helics-zmq", 0), "helics"),
-        Measure("HELICS tcp", partial(mesh, "helics-tcp", 0), "helics"),
+        own("ours, a process for each agent"),
+        rival("bare Zenoh", "zenoh"),
+        rival("bare Zenoh, the hub relays", "zenoh-star"),
+        own("ours, three agents a process", 3),
+        rival("bare Zenoh, three agents a process", "zenoh", 3),
+        rival("bare Zenoh, three agents a process, the hub relays", "zenoh-star", 3),
+        rival("ZeroMQ ipc", "zeromq"),
+        rival("HELICS zmq", "helics-zmq"),
+        rival("HELICS tcp", "helics-tcp"),
     ]
-
-
-def _rounds(agents: int, many: int) -> int:
-    """Return the rounds of a size: one from so many agents on, so that the whole bench takes some minutes."""
-    return 1 if agents >= many else 2
 
 
 def agents(extent: Extent) -> list[Measure]:
@@ -114,19 +156,13 @@ def agents(extent: Extent) -> list[Measure]:
 
     measures = []
     for n in extent.sizes:
+        rounds = extent.fewer(2 if n >= 18 else 3)
         for graph in GRAPHS if n > 3 else ("full",):  # three in a ring are three in a full graph
-            measures.append(
-                Measure(
-                    f"ours, {graph}, {n}",
-                    partial(our_scale.with_processes, n, graph, extent.ticks),
-                    rounds=_rounds(n, 18),
-                )
-            )
+            run = partial(our_scale.with_processes, n, graph, extent.ticks)
+            measures.append(Measure(f"ours, {graph}, {n}", run, rounds=rounds))
             for transport in ("zenoh", "zeromq"):
-                measure = partial(mesh, transport, graph, n)
-                measures.append(
-                    Measure(f"{transport}, {graph}, {n}", measure, PACKAGE[transport], rounds=_rounds(n, 18))
-                )
+                bare = partial(mesh, transport, graph, n)
+                measures.append(Measure(f"{transport}, {graph}, {n}", bare, PACKAGE[transport], rounds))
     return measures
 
 
@@ -136,17 +172,64 @@ def links(extent: Extent) -> list[Measure]:
         Measure(
             f"in process, {graph}, {n}",
             partial(our_scale.in_process, n, graph, extent.ticks),
-            rounds=_rounds(n, 72),
+            rounds=extent.fewer(2 if graph == "full" and n > 36 else 5),
+            values=(f"inprocess.link.{graph}.{n}",),
         )
         for graph, sizes in (("ring", extent.rings), ("full", extent.full))
         for n in sizes
     ]
 
 
+def scale(extent: Extent) -> list[Measure]:
+    """What a simulated second costs in one process, on a ring, up to 999 agents."""
+    return [
+        Measure(
+            f"{n} agents in process, T_c {T_c_ms} ms",
+            partial(our_hosts.simulated_second, n, T_c_ms / 1e3),
+            rounds=extent.fewer(3),
+            values=(f"scale.{T_c_ms}.{n}.by_the_clock",),
+        )
+        for n, T_c_ms in extent.scale
+    ]
+
+
+def hosted(extent: Extent) -> list[Measure]:
+    """Many agents: several a process in lock-step beside bare Zenoh, and a process each in wall-clock time."""
+    sizes = OurCase(extent.end).sizes
+    (n, processes), wall, rounds = extent.hosted, extent.wall, extent.fewer(3)
+
+    def bare() -> Mapping[str, float]:
+        ring = ring_graph([f"inv{i}" for i in range(n)])
+        return {
+            f"zenoh.hosted.{n}": seconds_per_round(
+                "zenoh", ring, rounds=extent.mesh_rounds, sizes=sizes, processes=processes
+            )
+        }
+
+    return [
+        Measure(
+            f"ours, {n} agents in {processes} processes",
+            partial(our_hosts.hosted, n, processes, extent.many_ticks),
+            rounds=rounds,
+            values=tuple(f"ours.hosted.{n}.{name}" for name in ("tick", "per_second")),
+        ),
+        Measure(f"bare Zenoh, {n} agents in {processes} processes", bare, rounds=rounds, values=(f"zenoh.hosted.{n}",)),
+        Measure(
+            f"ours, {wall} agent processes in wall-clock time",
+            partial(our_hosts.in_time, wall, extent.many_ticks),
+            rounds=rounds,
+            values=(f"ours.wall.{wall}.in_time",),
+        ),
+    ]
+
+
 PARTS = {
-    "plant": BenchPart(plant, "the plant beside GridLAB-D"),
-    "case": BenchPart(case, "one case in process and its parts, the command's help, a sweep"),
-    "tick": BenchPart(tick, "a tick with processes beside HELICS, ZeroMQ, bare Zenoh; a case start to end"),
-    "agents": BenchPart(agents, "a tick against the number of agents, as processes"),
-    "links": BenchPart(links, "the cost of a message in one process against the number of links"),
+    "plant": BenchPart(plant, "the plant beside GridLAB-D", 60),
+    "case": BenchPart(case, "one case in process and its parts, a sweep", 60),
+    "command": BenchPart(command, "the command's help, and its first case with processes", 20),
+    "tick": BenchPart(tick, "a tick with processes beside HELICS, ZeroMQ, bare Zenoh; a case start to end", 150),
+    "agents": BenchPart(agents, "a tick against the number of agents, as processes", 120),
+    "links": BenchPart(links, "the cost of a message in one process against the number of links", 90),
+    "scale": BenchPart(scale, "a simulated second in one process, up to 999 agents", 120),
+    "hosted": BenchPart(hosted, "100 agents in 8 processes in lock-step, 30 processes in wall-clock time", 150),
 }

@@ -1,0 +1,89 @@
+"""The page's prose: what is measured and how, and where the limit is. Numbers that age carry their date."""
+
+INTRODUCTION = """# Performance
+
+For everybody who asks what gridpeers costs, beside what, and how far it is from the limit. One command measures all of
+it in one run and writes this page, its figures and [performance.json](performance.json); another one has the long runs:
+
+```sh
+pip install -e '.[bench]'
+python -m bench.peers --write docs       # {minutes}
+python -m bench.long_runs --write docs   # a quarter of an hour: memory, files and time per tick of long runs
+python -m bench.peers --page docs        # measures nothing: writes the page anew from performance.json
+```
+
+It measures the parts that are named, or all: {names}.
+Each part is stored as soon as it is measured, with its date, commit, load and versions; a part that is measured again
+replaces its numbers alone, and `--resume` measures those that are missing. What fails, or whose package is missing, is
+left out and named; exit code 1 says that something failed.
+
+Rivals take turns, round by round, each round in another order. A number is the median of the rounds, and a ratio the
+median of the rounds' ratios; beside it stand the least and the largest round, and how many there were. Ratios hold from
+machine to machine better than seconds do. Times in one process are processor time unless a row says otherwise; with
+processes they are by the clock, so that other programs count: the load is stated, before and at most during a part, and
+what other programs than the bench took of the processors.
+
+The case: the islanding experiment, case IV, nine inverters with agents on the 123-node feeder, full graph, 7 s
+simulated, T_c 20 ms, h 2 ms. A tick is one control period of the lock-step: 9 measurements, 72 states to neighbours, 9
+to the plant. All meshes have the processes and the messages of ours, in number and size, and compute nothing; those of
+HELICS ask for time once a tick, so that its federates see values one tick late, which is generous to HELICS. The
+session of our plant relays all messages ([protocol.md](protocol.md#one-link-each)). So does the hub of bare Zenoh where
+a row says so; elsewhere bare Zenoh has a link for each pair of processes.
+"""
+
+ALONE = """## One case, and the command
+
+The first case of a command is `gridpeers run` in a process of its own, from its start; a further one finds plant and
+agents to be forked from servers that the first has started. Rows are least and largest of the rounds.
+"""
+
+CRITERIA = """## What was asked for
+
+The numbers of the issue that asked for speed. *Of the limit* is the measured number in proportion to the limit. Two of
+its lines are no measurements: every driver and every number of processes gives the same bytes (`tests/golden`), and the
+command above runs on a clean clone (`tests/peers` runs it shortly).
+"""
+
+LINKS = """A message is a state to a neighbour, or one from or to the plant; its cost is processor time of all but the
+plant's steps. "Dearest size / cheapest" above is the largest of these medians in proportion to the least, on a ring of
+9, 30, 99 and 300 agents: 1 is a cost that does not depend on their number.
+"""
+
+LIMITS = """## Where the limit is
+
+- **Plant.** The steps are one compiled loop; the limit is the solution with sparse factors, one iteration each, and the
+  controllers; the build is limited by one sparse factorisation. GridLAB-D solves the whole network by Newton's method
+  in every step.
+- **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link. A
+  relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save the
+  rest. ZeroMQ over Unix sockets shows what a transport without discovery, routing and TCP costs.
+- **One process.** There is no transport: each message costs its way through the same nodes that processes have
+  (decode, checks, the law's sum), so that the cost grows with links, not with pairs of agents.
+- **Start.** Python's imports, then discovery: each process opens a session and meets those it hears.
+"""
+
+SCALE = """## From nine agents to 999 in one process
+
+Joined copies of the feeder, islanded as one, ring, T_c 0.1 s, h 2 ms; processor seconds a simulated second, each number
+of agents in a process of its own so that memory is its own (`python -m bench.scale` has other graphs, too). By the
+clock, less than 1 is faster than real time. A message is a state to a neighbour, or one from or to the plant.
+"""
+
+SCALE_NOTES = """What bounded 999 agents on 2026-11-22, of a network solution of 0.5 to 0.65 ms (1000 a second): solving
+with the factors 0.19 to 0.25 ms (57 000 entries, one iteration a solution), controllers 0.13, branch currents and
+voltages 0.06, first guess and its history 0.03; the rest waited for the memory. The agents, whose objects do not fit
+the cache, needed 63 us each a tick, in Python. Where the copies are islands of their own (`python -m bench.scale
+--apart 1`) the plant steps them on both cores: 1.30 s by the clock instead of 1.53 s of processor time that day.
+"""
+
+LONG_RUNS = """## Long runs
+
+`python -m bench.long_runs` watches the anonymous memory of every process, the size of the files and the time per tick
+of the islanding with nine agents; `links` has a delay on every link, and so a row in links.csv for each message. Growth
+is from a fifth of the run to its end, at most of all processes; memory is the largest agent's. Processor time per tick
+of the last quarter is in proportion to the first's, and other programs disturb it.
+"""
+
+LONG_NOTES = """`gridpeers check` and `gridpeers run` tell the size of a long run's files before it starts
+([results.md](results.md)).
+"""
