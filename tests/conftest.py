@@ -9,7 +9,10 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 
+from tests.pinned_kernels import choose
 from tests.side_by_side import RealTimeApart, compile_once, give_way
+
+choose()
 
 # A shell that runs its tests in the background, or nohup, has Ctrl-C ignored, and every process that a test starts
 # would inherit that; but what Ctrl-C does is what some of them are about.

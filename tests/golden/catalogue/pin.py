@@ -5,7 +5,11 @@ from __future__ import annotations
 import sys
 from datetime import UTC, datetime
 
-from tests.golden.catalogue.pins import FILE, QUANTITIES, Pin, cases, environment, read, run_case
+from tests.pinned_kernels import choose
+
+choose()  # before numpy is imported
+
+from tests.golden.catalogue.pins import FILE, QUANTITIES, Pin, cases, environment, read, run_case  # noqa: E402
 
 HEADER = (
     "# SHA-256 of history.csv of every case of the catalogue, and the last row of its first inverter:\n"
