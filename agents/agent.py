@@ -62,6 +62,9 @@ class Agent:
         The agent's nameplate and the run's rule.
     law : Law, optional
         Law that decides the set-points; by default the paper's, with the configuration's gains.
+    board : dict[str, State], optional
+        Last state of each agent that neighbours may use, where all agents of a run share it (`agents.agent_group`); by
+        default the agent keeps those that it hears.
 
     Examples
     --------
@@ -76,7 +79,7 @@ class Agent:
     300000.0
     """
 
-    def __init__(self, config: AgentConfig, law: Law | None = None) -> None:
+    def __init__(self, config: AgentConfig, law: Law | None = None, board: dict[str, State] | None = None) -> None:
         self.config = config
         self.fault = ""
         """Error of the law; empty if none. After an error the agent is idle, and the inverter is on primary droop."""
@@ -93,7 +96,7 @@ class Agent:
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._neighbours: tuple[Iterable[str], tuple[str, ...]] = (), ()
         """The last roster, and the in-neighbours on it; forgotten when the known agents change."""
-        self._heard: dict[str, State] = {}
+        self._heard: dict[str, State] = {} if board is None else board
         self._leader = config.kind == "GFM"
         self._takes_part = config.control.acts(config.name, config.kind)
         options = config.control.degraded_communication
@@ -116,6 +119,11 @@ class Agent:
     def knows(self, name: str) -> bool:
         """Whether the nameplate of an agent is known."""
         return name in self._known
+
+    @property
+    def notes_arrivals(self) -> bool:
+        """Whether it matters when a state arrives: else a state on the board is as good as one that was heard."""
+        return self._weights.ages_count
 
     def meet(self, nameplate: Nameplate) -> None:
         """Note an agent's nameplate, and forget the states of its other epochs."""

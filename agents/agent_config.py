@@ -201,3 +201,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     Empty: none."""
     max_age: float = MAX_AGE
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""
+
+    def by_own_clock(self) -> AgentConfig:
+        """Return the configuration in simulated time, where a clock that is off makes the period seem longer."""
+        return self if self.clock_rate == 1.0 else msgspec.structs.replace(self, T_c=self.T_c * self.clock_rate)

@@ -74,7 +74,7 @@ class LockstepAgent(AgentNode):
         self._known.add(self._agent.nameplate)
         self.members = self._known.members
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
-            self._agent = Agent(replace(config, T_c=config.T_c * config.clock_rate), law)
+            self._agent = Agent(config.by_own_clock(), law)
         self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
         self._last_heard = self._barrier.last_heard

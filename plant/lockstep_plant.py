@@ -16,6 +16,7 @@ ends the run, because it would be another run. `agents.lockstep_agent` explains 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 from plant.plant_config import PlantConfig
@@ -24,7 +25,7 @@ from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.telemetry_reporter import measurement_of
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import PLANT, AnyMessage, LinkReport, Nameplate, Prepare, Ready, State
+from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, Nameplate, Prepare, Ready, State
 from wire.node import Route
 from wire.timing.tick_barrier import Awaited, TickBarrier
 
@@ -291,15 +292,19 @@ class LockstepPlant(PlantNode):
 
     def _grant(self, now: float) -> None:
         """Send every agent its measurement, and with it the grant of this tick."""
-        t, tick, roster, epoch = self.t, self.tick, self._roster, self.config.epoch
         self.phase = "ticking"
-        self._barrier.wait_for(dict.fromkeys(roster, f"State({tick})"), now)
-        readings = self._plant.measure()
-        for name in roster:
-            measurement = measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t)
-            self._publish(self._measurement_keys[name], encode(measurement))
-        if tick == 0:
+        self._barrier.wait_for(dict.fromkeys(self._roster, f"State({self.tick})"), now)
+        for measurement in self._measurements():
+            self._publish(self._measurement_keys[measurement.to], encode(measurement))
+        if self.tick == 0:
             self._report(final=False)
+
+    def _measurements(self) -> Iterator[Measurement]:
+        """Yield the measurement of this tick of each agent on the roster."""
+        t, tick, epoch = self.t, self.tick, self.config.epoch
+        readings = self._plant.measure()
+        for name in self._roster:
+            yield measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t)
 
     def _finish_tick(self, now: float) -> None:
         """Hold the set-points and advance."""

@@ -141,7 +141,7 @@ class OurCase:
         with ExitStack() as stack:
             for owner in (LockstepPlant, LockstepAgent):
                 stack.enter_context(patch.object(owner, "take_actions", noted(owner.take_actions)))
-            _check(run_inprocess(self.plant, self.agents, lambda telemetry: None).broke)
+            _check(run_inprocess(self.plant, self.agents, lambda telemetry: None, messages=True).broke)
         measurement, state = (sorted(found)[len(found) // 2] for found in sizes.values())
         return measurement, state
 

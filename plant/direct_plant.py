@@ -1,0 +1,44 @@
+"""The plant under simulated time in one process with its agents: ticks without messages, telemetry as ever. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from plant.lockstep_plant import LockstepPlant
+from plant.plant_config import PlantConfig
+from plant.plant_interface import PlantLike
+from wire.messages import Measurement, State
+
+
+class DirectPlant(LockstepPlant):
+    """A plant whose agents all take part from t = 0 to the end, and which gets their states as they are.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        Names the agents, the control period and the end; without schedule and emulated links.
+    plant : PlantLike
+        The plant at t = 0.
+    """
+
+    def __init__(self, config: PlantConfig, plant: PlantLike) -> None:
+        assert not config.schedule
+        assert not config.links
+        super().__init__(config, plant)
+        self._roster, self.phase = config.agents, "ticking"
+        self._reporter.collect()
+
+    def begin_tick(self) -> list[Measurement]:
+        """Return the measurements of this tick, one for each agent."""
+        measurements = list(self._measurements())
+        if self.tick == 0:
+            self._report(final=False)
+        return measurements
+
+    def end_tick(self, states: Iterable[State]) -> None:
+        """Hold the set-points of these states and advance; at the end of the run, or if the plant breaks, be over."""
+        for state in states:
+            self._note_state(state)
+            if not state.idle:
+                self._states[state.sender] = state
+        self._finish_tick(0.0)
