@@ -23,10 +23,17 @@ class Feeder(Tables, frozen=True, kw_only=True):
     Examples
     --------
     >>> feeder = Feeder.read("microgrid123")
+    >>> feeder
+    <Feeder microgrid123: buses 134, switches 10, loads 88, inverters 9>
     >>> feeder = feeder.add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
     >>> len(feeder.inverters), round(float(feeder.solve()["V_pu"].min()), 3)
     (10, 0.898)
     """
+
+    def __repr__(self) -> str:
+        loads = len({part.name for part in self.load_parts}) + len(self.loads)
+        counts = f"buses {len(self.buses)}, switches {len(self.switches)}, loads {loads}, inverters {len(self.inverters)}"
+        return f"<Feeder {self.name}: {counts}>"
 
     @classmethod
     def read(cls, name: str | Path, load_set: str = "main") -> Feeder:
