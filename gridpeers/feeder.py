@@ -24,7 +24,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
     --------
     >>> feeder = Feeder.read("microgrid123")
     >>> feeder
-    <Feeder microgrid123: buses 134, switches 10, loads 88, inverters 9>
+    <Feeder microgrid123: buses 134, switches 10, inverters 9, loads 88>
     >>> feeder = feeder.add_inverter("inv11", bus="87", kind="GFL", P_rated=2e5)
     >>> len(feeder.inverters), round(float(feeder.solve()["V_pu"].min()), 3)
     (10, 0.898)
@@ -32,8 +32,9 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
     def __repr__(self) -> str:
         loads = len({part.name for part in self.load_parts}) + len(self.loads)
-        counts = f"buses {len(self.buses)}, switches {len(self.switches)}, loads {loads}, inverters {len(self.inverters)}"
-        return f"<Feeder {self.name}: {counts}>"
+        counted = {"buses": self.buses, "switches": self.switches, "inverters": self.inverters}
+        counts = ", ".join(f"{what} {len(rows)}" for what, rows in counted.items())
+        return f"<Feeder {self.name}: {counts}, loads {loads}>"
 
     @classmethod
     def read(cls, name: str | Path, load_set: str = "main") -> Feeder:
