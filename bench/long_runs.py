@@ -128,6 +128,7 @@ def command_of(kind: str, folder: Path, given: argparse.Namespace) -> list[str]:
 def watch(kind: str, given: argparse.Namespace) -> dict[str, float]:
     """Run, watch, print a table, and return what was found."""
     samples: list[Sample] = []
+    busy: dict[str, float] = {}
     with tempfile.TemporaryDirectory(prefix="gridpeers-long-") as name:
         folder, peak = Path(name), 0.0
         command = command_of(kind, folder, given)
@@ -143,7 +144,9 @@ def watch(kind: str, given: argparse.Namespace) -> dict[str, float]:
                 ):
                     pids = processes(run.pid)
                     sizes = {process: size(pid) for process, pid in pids.items()}
-                    samples.append(Sample(at, so_far, sizes, sum(map(processor_time, pids.values()))))
+                    for process, pid in pids.items():  # one that has ended keeps what it took
+                        busy[process] = max(busy.get(process, 0.0), processor_time(pid))
+                    samples.append(Sample(at, so_far, sizes, sum(busy.values())))
                     sleep(given.every)
                 if kind == "live":
                     run.send_signal(signal.SIGTERM)  # the background ignores SIGINT
@@ -157,7 +160,7 @@ def watch(kind: str, given: argparse.Namespace) -> dict[str, float]:
         files = {path.name: path.stat().st_size for path in sorted((folder / "here").rglob("*.csv"))}
     if len(samples) < FEWEST:
         last = text.strip().splitlines()[-1:] or ["it printed nothing"]
-        raise RuntimeError(f"{kind}: {len(samples)} looks, at least {FEWEST} are needed; the run ended with: {last[0]}")
+        raise RuntimeError(f"{len(samples)} looks, at least {FEWEST} are needed; the run ended with: {last[0]}")
     found = report(kind, samples, files, peak, given)
     print(next((line for line in text.splitlines() if line.startswith("ended at")), ""))
     return {f"{kind}.{name}": value for name, value in found.items()}
@@ -213,7 +216,7 @@ def main() -> int:
     parser.add_argument(
         "--skip", type=float, default=20.0, help="percent of the run that count as warm-up (default 20)"
     )
-    parser.add_argument("--every", type=float, default=1.0, help="seconds between two looks (default 1)")
+    parser.add_argument("--every", type=float, default=0.5, help="seconds between two looks (default 0.5)")
     parser.add_argument(
         "--write",
         type=Path,

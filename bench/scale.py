@@ -122,7 +122,7 @@ def measure(
         plant, agent_configs = configs(scenario, feeder, graphs[0])
         built = build_plant(plant)
         if agents <= MOST_FULL:  # the first run of a process is slower, which shows in few agents
-            _run(plant, agent_configs, built, folder / "first")
+            timed_run(plant, agent_configs, built, folder / "first")
         best: dict[str, dict[str, float]] = {}
         for number in range(rounds):
             for graph in scenario.cases:
@@ -130,7 +130,7 @@ def measure(
                 began = process_time()
                 built = build_plant(plant)
                 build_s = process_time() - began
-                row = _run(plant, agent_configs, built, folder / f"{graph}{number}") | {"build_s": build_s}
+                row = timed_run(plant, agent_configs, built, folder / f"{graph}{number}") | {"build_s": build_s}
                 best[graph] = {name: min(value, best.get(graph, row)[name]) for name, value in row.items()}
         for graph, row in best.items():
             _, agent_configs = configs(scenario, feeder, graph)
@@ -158,8 +158,15 @@ def measure(
             }
 
 
-def _run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> dict[str, float]:
-    """Return processor times of one recorded case, and the time by the clock (s)."""
+def timed_run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> dict[str, float]:
+    """Run one case in this process and record it; return its times (s).
+
+    Returns
+    -------
+    dict
+        Processor time until the first row (`meet`), and from there on: of the plant at its interface (`plant_s`), of
+        all else (`agents_s`), and the time by the clock (`clock_s`).
+    """
     assert plant.end is not None
     clock = PlantClock()
     first: list[tuple[float, float, float]] = []

@@ -62,9 +62,10 @@ def _measure(
 ) -> list[str]:
     """Measure parts, store each once it is whole, and return a line for each measure that failed."""
     console = Console(stderr=True)
-    console.print(usual_text(usual, {name: PARTS[name].text for name in names}), markup=False, highlight=False)
+    times = {name: usual_seconds(usual, name, extent.rounds) for name in names}
+    console.print(usual_text(times), markup=False, highlight=False, soft_wrap=True)
     failures = []
-    with progress(console, {name: usual_seconds(usual, name) for name in names}, usual) as shown:
+    with progress(console, times, usual) as shown:
         for name in names:
             run = measure_in_turns(partial(PARTS[name].measures, extent), extent.rounds, partial(shown.tell, name))
             shown.done(name)

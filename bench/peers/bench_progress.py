@@ -9,7 +9,7 @@ from typing import Protocol
 from rich.console import Console
 
 from bench.peers.measured import Measure
-from bench.peers.parts import PARTS
+from bench.peers.parts import PARTS, Extent
 from bench.peers.stored import Parts
 from gridpeers.cli.remaining import Tell, remaining
 from scenarios.duration import duration
@@ -25,18 +25,18 @@ class Progress(Protocol):
         """Tell that a part is done."""
 
 
-def usual_seconds(parts: Parts, name: str) -> float:
-    """Return how long a part usually takes (s): what it took when it was last measured, or on an idle machine."""
-    return parts[name].seconds if name in parts and parts[name].seconds else PARTS[name].usual
+def usual_seconds(parts: Parts, name: str, rounds: int) -> float:
+    """Return how long so many rounds of a part usually take (s): as when last measured, or on an idle machine."""
+    if name in parts and parts[name].seconds and (before := len(parts[name].loads) - 1):
+        return parts[name].seconds * rounds / before
+    return PARTS[name].usual * rounds / Extent().rounds
 
 
-def usual_text(parts: Parts, names: Mapping[str, str]) -> str:
-    """Return what is to come, for the start: each part with its usual duration, and the sum."""
-    times = {name: usual_seconds(parts, name) for name in names}
-    lines = [f"  {name:9}{text:84}{duration(round(times[name])):>8}" for name, text in names.items()]
-    return "\n".join(
-        [f"{len(names)} part{'' if len(names) == 1 else 's'}, usually {duration(round(sum(times.values())))}:", *lines]
-    )
+def usual_text(usual: Mapping[str, float]) -> str:
+    """Return what is to come, for the start: each part with its usual duration (s), and the sum."""
+    lines = [f"  {name:9}{PARTS[name].text:84}{duration(round(seconds)):>8}" for name, seconds in usual.items()]
+    parts = f"{len(usual)} part{'' if len(usual) == 1 else 's'}"
+    return "\n".join([f"{parts}, usually {duration(round(sum(usual.values())))}:", *lines])
 
 
 @contextmanager
@@ -66,8 +66,9 @@ class _Shown:
         """Tell what begins; a part whose measures take longer than usual stays below its end."""
         seconds = self._took[part].took.get(measure.name) if part in self._took else None
         number = list(self._usual).index(part) + 1
-        words = f"{part} ({number} of {len(self._usual)}), {text}"
-        self._tell(words + (f", usually {duration(round(seconds + 0.5))}" if seconds else ""), self._done)
+        usually = f", usually {duration(round(seconds + 0.5))}" if seconds else ""
+        # off a terminal a line is printed for each new text before the comma: for each round, not for each measure
+        self._tell(f"{part} ({number} of {len(self._usual)}) {text}, {measure.name}{usually}", self._done)
         self._spent[part] = min(self._usual[part], self._spent[part] + (seconds or 0.0))
 
     def done(self, part: str) -> None:

@@ -82,7 +82,7 @@ def _links(part: PartRun) -> Figure:
         left.plot(n, [1e6 * each for each in seconds], **style)
         n, seconds = _sizes(part, f"inprocess.tick.{graph}.")
         right.plot([links(graph, k) for k in n], [1e3 * each for each in seconds], **style)
-    left.set(title="a message, without the plant's steps", xlabel="agents in one process", xscale="log")
+    left.set(title="a message, without the plant", xlabel="agents in one process", xscale="log")
     left.set(ylabel="processor time (µs)", ylim=(0, None))
     right.set(title="a tick, with the plant", xlabel="messages in a tick", xscale="log")
     right.set(ylabel="processor time (ms)", yscale="log")

@@ -79,7 +79,7 @@ class PartRun(msgspec.Struct, kw_only=True):
 
 
 Tell = Callable[[str, Measure], None]
-"""Takes what is measured now, in words, and the measure."""
+"""Takes the round, in words, and the measure that begins."""
 
 
 def measure_in_turns(
@@ -121,7 +121,7 @@ def measure_in_turns(
         for measure in (*found[k:], *found[:k]):
             if measure.name in part.left_out or i >= measure.rounds_of(rounds):
                 continue
-            tell(f"round {i + 1} of {rounds}: {measure.name}", measure)
+            tell(f"round {i + 1} of {rounds}", measure)
             began = monotonic()
             try:
                 for name, value in measure.run().items():

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from time import process_time
 
 from msgspec.structs import replace
 
 import gridpeers as gp
 from agents.agent_config import AgentConfig
 from bench.peers.failure import GRIDPEERS, checked
-from bench.peers.our_case import STEPS, TICKS, shares
+from bench.scale import timed_run
+from plant.build import build_plant
 from plant.plant_config import PlantConfig
 from scenarios.drivers.process_driver import run_processes
 from scenarios.results.record import Recorder
@@ -81,16 +81,16 @@ def with_processes(agents: int, graph: str, ticks: int) -> dict[str, float]:
 
 
 def in_process(agents: int, graph: str, ticks: int) -> dict[str, float]:
-    """Measure a tick in one process, processor time (s): the whole, and per message without the steps of the plant."""
+    """Measure a tick in one process, processor time (s): the whole, and per message without the plant."""
     plant, configured = grown(agents, graph, ticks)
     assert plant.end is not None
-    began = process_time()
-    parts = shares(plant, configured)
+    built = build_plant(plant)
+    with tempfile.TemporaryDirectory(prefix="gp-links-") as name:
+        times = timed_run(plant, configured, built, Path(name) / "case")
     count = round(plant.end / plant.T_c)
     return {
-        f"inprocess.tick.{graph}.{agents}": parts[TICKS] / count,
-        f"inprocess.link.{graph}.{agents}": (parts[TICKS] - parts[STEPS]) / count / links(graph, agents),
-        f"inprocess.whole.{graph}.{agents}": process_time() - began,
+        f"inprocess.tick.{graph}.{agents}": (times["plant_s"] + times["agents_s"]) / count,
+        f"inprocess.link.{graph}.{agents}": times["agents_s"] / count / links(graph, agents),
     }
 
 

@@ -81,7 +81,7 @@ def plant(extent: Extent) -> list[Measure]:
     case.plant_alone()  # loads the compiled step
     return [
         Measure("our plant", case.plant_alone, values=("ours.plant.build", "ours.plant.steps")),
-        Measure("GridLAB-D", case.gridlabd_alone, "gridlabd", extent.fewer(3), ("gridlabd.plant.steps",)),
+        Measure("GridLAB-D", case.gridlabd_alone, "gridlabd", values=("gridlabd.plant.steps",)),
     ]
 
 
@@ -97,7 +97,7 @@ def case(extent: Extent) -> list[Measure]:
     return [
         Measure("our case in process", ours.in_process, values=("ours.case.inprocess",)),
         Measure("its parts", parts),
-        Measure("our sweep", partial(ours.sweep, extent.runs), "joblib", extent.fewer(3), sweep),
+        Measure("our sweep", partial(ours.sweep, extent.runs), "joblib", values=sweep),
     ]
 
 
@@ -156,7 +156,7 @@ def agents(extent: Extent) -> list[Measure]:
 
     measures = []
     for n in extent.sizes:
-        rounds = extent.fewer(2 if n >= 18 else 3)
+        rounds = extent.fewer(3)
         for graph in GRAPHS if n > 3 else ("full",):  # three in a ring are three in a full graph
             run = partial(our_scale.with_processes, n, graph, extent.ticks)
             measures.append(Measure(f"ours, {graph}, {n}", run, rounds=rounds))
@@ -171,8 +171,10 @@ def links(extent: Extent) -> list[Measure]:
     return [
         Measure(
             f"in process, {graph}, {n}",
-            partial(our_scale.in_process, n, graph, extent.ticks),
-            rounds=extent.fewer(2 if graph == "full" and n > 36 else 5),
+            partial(
+                our_scale.in_process, n, graph, extent.ticks * max(4, 90 // n)
+            ),  # the start is a part of a short run
+            rounds=extent.fewer(3 if graph == "full" else 5),
             values=(f"inprocess.link.{graph}.{n}",),
         )
         for graph, sizes in (("ring", extent.rings), ("full", extent.full))
@@ -186,7 +188,6 @@ def scale(extent: Extent) -> list[Measure]:
         Measure(
             f"{n} agents in process, T_c {T_c_ms} ms",
             partial(our_hosts.simulated_second, n, T_c_ms / 1e3),
-            rounds=extent.fewer(3),
             values=(f"scale.{T_c_ms}.{n}.by_the_clock",),
         )
         for n, T_c_ms in extent.scale
@@ -196,7 +197,7 @@ def scale(extent: Extent) -> list[Measure]:
 def hosted(extent: Extent) -> list[Measure]:
     """Many agents: several a process in lock-step beside bare Zenoh, and a process each in wall-clock time."""
     sizes = OurCase(extent.end).sizes
-    (n, processes), wall, rounds = extent.hosted, extent.wall, extent.fewer(3)
+    (n, processes), wall = extent.hosted, extent.wall
 
     def bare() -> Mapping[str, float]:
         ring = ring_graph([f"inv{i}" for i in range(n)])
@@ -210,26 +211,24 @@ def hosted(extent: Extent) -> list[Measure]:
         Measure(
             f"ours, {n} agents in {processes} processes",
             partial(our_hosts.hosted, n, processes, extent.many_ticks),
-            rounds=rounds,
             values=tuple(f"ours.hosted.{n}.{name}" for name in ("tick", "per_second")),
         ),
-        Measure(f"bare Zenoh, {n} agents in {processes} processes", bare, rounds=rounds, values=(f"zenoh.hosted.{n}",)),
+        Measure(f"bare Zenoh, {n} agents in {processes} processes", bare, values=(f"zenoh.hosted.{n}",)),
         Measure(
             f"ours, {wall} agent processes in wall-clock time",
             partial(our_hosts.in_time, wall, extent.many_ticks),
-            rounds=rounds,
             values=(f"ours.wall.{wall}.in_time",),
         ),
     ]
 
 
 PARTS = {
-    "plant": BenchPart(plant, "the plant beside GridLAB-D", 60),
-    "case": BenchPart(case, "one case in process and its parts, a sweep", 60),
-    "command": BenchPart(command, "the command's help, and its first case with processes", 20),
-    "tick": BenchPart(tick, "a tick with processes beside HELICS, ZeroMQ, bare Zenoh; a case start to end", 150),
-    "agents": BenchPart(agents, "a tick against the number of agents, as processes", 120),
+    "plant": BenchPart(plant, "the plant beside GridLAB-D", 110),
+    "case": BenchPart(case, "one case in process and its parts, a sweep", 70),
+    "command": BenchPart(command, "the command's help, and its first case with processes", 25),
+    "tick": BenchPart(tick, "a tick with processes beside HELICS, ZeroMQ, bare Zenoh; a case start to end", 100),
+    "agents": BenchPart(agents, "a tick against the number of agents, as processes", 110),
     "links": BenchPart(links, "the cost of a message in one process against the number of links", 90),
-    "scale": BenchPart(scale, "a simulated second in one process, up to 999 agents", 120),
+    "scale": BenchPart(scale, "a simulated second in one process, up to 999 agents", 160),
     "hosted": BenchPart(hosted, "100 agents in 8 processes in lock-step, 30 processes in wall-clock time", 150),
 }

@@ -45,7 +45,7 @@ command above runs on a clean clone (`tests/peers` runs it shortly).
 """
 
 LINKS = """A message is a state to a neighbour, or one from or to the plant; its cost is processor time of all but the
-plant's steps. "Dearest size / cheapest" above is the largest of these medians in proportion to the least, on a ring of
+plant. "Dearest size / cheapest" above is the largest of these medians in proportion to the least, on a ring of
 9, 30, 99 and 300 agents: 1 is a cost that does not depend on their number.
 """
 
@@ -80,8 +80,9 @@ LONG_RUNS = """## Long runs
 
 `python -m bench.long_runs` watches the anonymous memory of every process, the size of the files and the time per tick
 of the islanding with nine agents; `links` has a delay on every link, and so a row in links.csv for each message. Growth
-is from a fifth of the run to its end, at most of all processes; memory is the largest agent's. Processor time per tick
-of the last quarter is in proportion to the first's, and other programs disturb it.
+is from a fifth of the run to its end, at most of all processes; memory is the largest agent's, and a server is a
+process that plant or agents are forked from. Processor time per tick of the last quarter is in proportion to the
+first's, and other programs disturb it.
 """
 
 LONG_NOTES = """`gridpeers check` and `gridpeers run` tell the size of a long run's files before it starts

@@ -76,17 +76,17 @@ def missing(parts: Parts, part: str, names: Sequence[str]) -> str:
     return f"not measured: {known or run.left_out.get('all of it') or f'not part of the run of {run.began}'}"
 
 
-def spread(rounds: Sequence[float]) -> str:
+def spread(rounds: Sequence[float], unit: str = "") -> str:
     """Return the least and the largest of several rounds, and their number.
 
     Examples
     --------
-    >>> spread([1.5, 1.25, 2.0]), spread([3.0])
-    ('1.25 to 2 (3)', '(1)')
+    >>> spread([1.5, 1.25, 2.0]), spread([1.5, 2.0], " s"), spread([3.0])
+    ('1.25 to 2 (3)', '1.5 to 2 s (2)', '(1)')
     """
     if len(rounds) < 2:
         return f"({len(rounds)})"
-    return f"{min(rounds):.3g} to {max(rounds):.3g} ({len(rounds)})"
+    return f"{min(rounds):.3g} to {max(rounds):.3g}{unit} ({len(rounds)})"
 
 
 def seconds_in_words(seconds: float) -> str:

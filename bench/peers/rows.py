@@ -88,7 +88,7 @@ def comparison(parts: Parts) -> Iterator[tuple[str, ...]]:
 def alone(parts: Parts) -> Iterator[tuple[str, str, str]]:
     """Yield the rows that no rival has: the median, and its rounds or why it is not there."""
     for text, quantity in ALONE:
-        yield text, _time(quantity, parts), quantity.missing(parts) or f"{spread(quantity.rounds(parts))} s"
+        yield text, _time(quantity, parts), quantity.missing(parts) or spread(quantity.rounds(parts), " s")
     for text, name in (
         ("a sweep on all cores, once its workers run", "ours.sweep"),
         ("- with their start, 80 runs", "ours.sweep.whole"),
@@ -97,7 +97,7 @@ def alone(parts: Parts) -> Iterator[tuple[str, str, str]]:
         if why := rate.missing(parts):
             yield text, "", why
         else:
-            yield text, f"{rate.value(parts):.3g} runs/s", f"{spread(rate.rounds(parts))} runs/s"
+            yield text, f"{rate.value(parts):.3g} runs/s", spread(rate.rounds(parts))
 
 
 def shares(parts: Parts) -> Iterator[tuple[str, str, str]]:
