@@ -34,7 +34,7 @@ def reason(error: Exception) -> str:
 
     Examples
     --------
-    >>> reason(subprocess.CalledProcessError(3, ["ls", "x y"], stderr="a\nno such file\\n"))
+    >>> reason(subprocess.CalledProcessError(3, ["ls", "x y"], stderr="a\nno such file\n"))
     "`ls 'x y'` ended with 3: no such file"
     >>> reason(RuntimeError("inv1 died\nits log\nOSError: no room"))
     'inv1 died ... OSError: no room'

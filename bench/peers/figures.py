@@ -23,10 +23,12 @@ MARKER: dict[str, Any] = {"marker": "o", "markersize": 3}
 
 def draw_figures(parts: Parts, folder: Path) -> None:
     """Write the figures of the parts that are measured into a folder."""
-    for name, (_, draw) in FIGURES.items():
+    for name, (title, draw) in FIGURES.items():
         if drawn(parts, name):
             with mpl.rc_context(PAGE):
-                save(draw(parts[name]), folder / FOLDER, name, formats=("svg",))
+                figure = draw(parts[name])
+                figure.suptitle(title, fontsize=10)
+                save(figure, folder / FOLDER, name, formats=("svg",))
 
 
 def drawn(parts: Parts, name: str) -> bool:
@@ -52,9 +54,15 @@ def _sizes(part: PartRun, prefix: str, suffix: str = "") -> tuple[list[int], lis
 
 
 def _axes() -> tuple[Figure, Any, Any]:
-    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
+    figure = Figure(figsize=(8.4, 3.9), layout="constrained")
     left, right = figure.subplots(1, 2)
     return figure, left, right
+
+
+def _sized(axes: Any, *sizes: int) -> None:
+    """Mark the numbers of agents that were measured on the axis."""
+    axes.set_xticks(sizes, [f"{size}" for size in sizes])
+    axes.set_xticks([], minor=True)
 
 
 def _agents(part: PartRun) -> Figure:
@@ -67,9 +75,10 @@ def _agents(part: PartRun) -> Figure:
             style = {"color": COLOURS[who], "linestyle": dash, "label": f"{name}, {graph}", **MARKER}
             left.plot(n, [1e3 * each for each in seconds], **style)
             right.plot([links(graph, k) for k in n], [1e3 * each for each in seconds], **style)
-    left.set(title="against agents", xlabel="agents, a process each", ylabel="time of a tick (ms)", yscale="log")
-    right.set(title="against messages", xlabel="messages in a tick", ylabel="time of a tick (ms)")
+    left.set(title="Against agents", xlabel="agents, a process each", ylabel="time of a tick (ms)", yscale="log")
+    right.set(title="Against messages", xlabel="messages in a tick", ylabel="time of a tick (ms)")
     right.set(xscale="log", yscale="log")
+    _sized(left, *(_sizes(part, "ours.full.")[0]))
     left.legend(fontsize=7)
     return figure
 
@@ -82,9 +91,10 @@ def _links(part: PartRun) -> Figure:
         left.plot(n, [1e6 * each for each in seconds], **style)
         n, seconds = _sizes(part, f"inprocess.tick.{graph}.")
         right.plot([links(graph, k) for k in n], [1e3 * each for each in seconds], **style)
-    left.set(title="a message, without the plant", xlabel="agents in one process", xscale="log")
+    left.set(title="A message, without the plant", xlabel="agents in one process", xscale="log")
     left.set(ylabel="processor time (µs)", ylim=(0, None))
-    right.set(title="a tick, with the plant", xlabel="messages in a tick", xscale="log")
+    _sized(left, *(_sizes(part, "inprocess.link.ring.")[0]))
+    right.set(title="A tick, with the plant", xlabel="messages in a tick", xscale="log")
     right.set(ylabel="processor time (ms)", yscale="log")
     left.legend(fontsize=8)
     return figure
@@ -103,10 +113,12 @@ def _scale(part: PartRun) -> Figure:
     right.plot(n, us, color=COLOURS["ring"], **MARKER)
     left.axhline(1.0, color="#7a7a7a", lw=0.8)
     left.annotate("real time", (9, 1.0), va="bottom", fontsize=7)
-    left.set(title="a simulated second, ring, T_c 100 ms", xlabel="agents in one process", xscale="log", yscale="log")
+    left.set(title="A simulated second", xlabel="agents in one process", xscale="log", yscale="log")
     left.set(ylabel="time (s)")
-    right.set(title="a message, without the plant", xlabel="agents in one process", xscale="log")
+    right.set(title="A message, without the plant", xlabel="agents in one process", xscale="log")
     right.set(ylabel="processor time (µs)", ylim=(0, None))
+    for axes in (left, right):
+        _sized(axes, *n)
     left.legend(fontsize=7)
     return figure
 
@@ -114,6 +126,6 @@ def _scale(part: PartRun) -> Figure:
 FIGURES = {
     "agents": ("Cost of a tick against the number of agents and of messages, a process each, T_c 20 ms", _agents),
     "links": ("Cost of a message, and of a tick, in one process, T_c 20 ms", _links),
-    "scale": ("Cost of a simulated second, and of a message, against the number of agents", _scale),
+    "scale": ("Cost of a simulated second, and of a message, against the number of agents, ring, T_c 100 ms", _scale),
 }
 """Title, and function that draws, by part."""
