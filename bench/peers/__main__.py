@@ -47,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         failures = _measure(names, extent, known | measured, measured, files)
     except KeyboardInterrupt:
-        kept = f"; whole parts are in {files[0]}, --resume measures the others" if files else ""
+        stored = files and files[0].exists()
+        kept = f"; whole parts are in {files[0]}, --resume measures the others" if stored else ""
         print(f"interrupted{kept}", file=sys.stderr)
         return 130
     print(tables_text(in_order(measured)))

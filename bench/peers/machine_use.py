@@ -19,7 +19,7 @@ class MachineUse:
     """The use of the machine from now on."""
 
     def __init__(self) -> None:
-        self._began, self._busy, self._own = time.monotonic(), _machine_time(), _own_time()
+        self._began, self._busy, self._own = time.monotonic(), _machine_time(), own_time()
 
     @property
     def seconds(self) -> float:
@@ -30,7 +30,7 @@ class MachineUse:
     def others(self) -> float:
         """Part of the machine's processor time that other programs took; 0 where /proc is not."""
         whole = self.seconds * (os.cpu_count() or 1)
-        taken = (_machine_time() - self._busy) - (_own_time() - self._own)
+        taken = (_machine_time() - self._busy) - (own_time() - self._own)
         return min(1.0, max(0.0, taken) / whole) if whole else 0.0
 
 
@@ -76,7 +76,7 @@ def _machine_time() -> float:
     return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
 
 
-def _own_time() -> float:
+def own_time() -> float:
     """Return the processor time (s) of this process, its ended children, and its living descendants so far."""
     uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     living = sum(map(_time_with_children, _descendants(os.getpid())))
