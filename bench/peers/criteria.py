@@ -27,6 +27,12 @@ class Criterion(NamedTuple):
         value = self.number.value(parts)
         return "met" if (value >= self.limit if self.at_least else value <= self.limit) else "missed"
 
+    def away(self, parts: Parts) -> float:
+        """Return the factor by which a number that is missed is away from its limit; infinite from 0."""
+        value = self.number.value(parts)
+        above, below = (self.limit, value) if self.at_least else (value, self.limit)
+        return above / below if below > 0.0 else float("inf")
+
     def row(self, parts: Parts) -> tuple[str, ...]:
         """Return what, the limit, the number, its proportion to the limit, its rounds, the verdict, the load."""
         limit = f"{'at least' if self.at_least else 'at most'} {self.limit:g}{self.unit}"

@@ -48,6 +48,7 @@ def page_text(parts: Parts, names: Sequence[str]) -> str:
         prose.ALONE,
         _table(("what", "ours", "rounds, least to largest"), rows.alone(parts)),
         prose.CRITERIA,
+        how_far(parts),
         _table(HEAD, (criterion.row(parts) for criterion in CRITERIA)),
         "## Cost against the number of agents and of links",
         *(link(name) for name in ("agents", "links") if drawn(parts, name)),
@@ -69,6 +70,19 @@ def page_text(parts: Parts, names: Sequence[str]) -> str:
     return "\n\n".join(section.rstrip("\n") for section in sections) + "\n"
 
 
+def how_far(parts: Parts) -> str:
+    """Return how many of the numbers that are asked for are met, and how far the others are."""
+    verdicts = [criterion.verdict(parts) for criterion in CRITERIA]
+    met, missed = verdicts.count("met"), verdicts.count("missed")
+    away = ""
+    if missed:
+        missing = [criterion for criterion, verdict in zip(CRITERIA, verdicts, strict=True) if verdict == "missed"]
+        factors = [criterion.away(parts) for criterion in missing]
+        away = f", by a factor of {min(factors):.2f} to {max(factors):.2f}"
+    absent = len(CRITERIA) - met - missed
+    return f"Of {len(CRITERIA)} numbers {met} are met, {missed} are missed{away}, and {absent} are not measured."
+
+
 def tables_text(parts: Parts) -> str:
     """Return the tables for a terminal."""
     lines = [f"{'':68}{'theirs':>11}{'ours':>11}{'ratio':>8}  rounds"]
@@ -77,7 +91,7 @@ def tables_text(parts: Parts) -> str:
     for criterion in CRITERIA:
         text, limit, measured, _, found, verdict, _ = criterion.row(parts)
         lines.append(f"{text:79}{measured:>11}  {limit:18}  {verdict}{f', {found}' if measured else ''}")
-    return "\n".join([*lines, "", *rows.machines(parts)])
+    return "\n".join([*lines, how_far(parts), "", *rows.machines(parts)])
 
 
 def _warning(parts: Parts) -> Iterator[str]:

@@ -36,6 +36,8 @@ class Extent(NamedTuple):
     """Ticks of a run of another size than nine."""
     hosted: tuple[int, int] = (100, 8)
     """Agents, and the processes that they share."""
+    crowd: int = 300
+    """More agents in as many processes; 0: none."""
     wall: int = 30
     """Agents as processes in wall-clock time."""
     many_ticks: int = 200
@@ -58,6 +60,7 @@ SHORT = Extent(
     full=(),
     ticks=5,
     hosted=(4, 2),
+    crowd=0,
     wall=2,
     many_ticks=5,
     scale=((9, 100),),
@@ -198,23 +201,22 @@ def scale(extent: Extent) -> list[Measure]:
 def hosted(extent: Extent) -> list[Measure]:
     """Many agents: several a process in lock-step beside bare Zenoh, and a process each in wall-clock time."""
     sizes = OurCase(extent.end).sizes
-    (n, processes), wall = extent.hosted, extent.wall
+    (few, processes), wall = extent.hosted, extent.wall
 
     def bare() -> Mapping[str, float]:
-        ring = ring_graph([f"inv{i}" for i in range(n)])
-        return {
-            f"zenoh.hosted.{n}": seconds_per_round(
-                "zenoh", ring, rounds=extent.mesh_rounds, sizes=sizes, processes=processes
-            )
-        }
+        ring = ring_graph([f"inv{i}" for i in range(few)])
+        seconds = seconds_per_round("zenoh", ring, rounds=extent.mesh_rounds, sizes=sizes, processes=processes)
+        return {f"zenoh.hosted.{few}": seconds}
+
+    def own(n: int, rounds: int) -> Measure:
+        values = tuple(f"ours.hosted.{n}.{name}" for name in ("tick", "per_second", "start"))
+        run = partial(our_hosts.hosted, n, processes, extent.many_ticks)
+        return Measure(f"ours, {n} agents in {processes} processes", run, rounds=rounds, values=values)
 
     return [
-        Measure(
-            f"ours, {n} agents in {processes} processes",
-            partial(our_hosts.hosted, n, processes, extent.many_ticks),
-            values=tuple(f"ours.hosted.{n}.{name}" for name in ("tick", "per_second")),
-        ),
-        Measure(f"bare Zenoh, {n} agents in {processes} processes", bare, values=(f"zenoh.hosted.{n}",)),
+        own(few, extent.rounds),
+        Measure(f"bare Zenoh, {few} agents in {processes} processes", bare, values=(f"zenoh.hosted.{few}",)),
+        *([own(extent.crowd, extent.fewer(3))] if extent.crowd else ()),
         Measure(
             f"ours, {wall} agent processes in wall-clock time",
             partial(our_hosts.in_time, wall, extent.many_ticks),
@@ -231,5 +233,5 @@ PARTS = {
     "agents": BenchPart(agents, "a tick against the number of agents, as processes", 110),
     "links": BenchPart(links, "the cost of a message in one process against the number of links", 90),
     "scale": BenchPart(scale, "a simulated second in one process, up to 999 agents", 160),
-    "hosted": BenchPart(hosted, "100 agents in 8 processes in lock-step, 30 processes in wall-clock time", 150),
+    "hosted": BenchPart(hosted, "100 and 300 agents in 8 processes in lock-step, 30 processes in wall-clock time", 180),
 }

@@ -31,10 +31,10 @@ session of our plant relays all messages ([protocol.md](protocol.md#one-link-eac
 a row says so; elsewhere bare Zenoh has a link for each pair of processes.
 """
 
-ALONE = """## One case, and the command
+ALONE = """## What no rival has
 
-The first case of a command is `gridpeers run` in a process of its own, from its start; a further one finds plant and
-agents to be forked from servers that the first has started. Rows are least and largest of the rounds.
+The first case of a command is `gridpeers run` in a process of its own, from its start. Plant and agents of a further
+case are forked from servers that the first has started.
 """
 
 CRITERIA = """## What was asked for
@@ -46,7 +46,8 @@ command above runs on a clean clone (`tests/peers` runs it shortly).
 
 LINKS = """A message is a state to a neighbour, or one from or to the plant; its cost is processor time of all but the
 plant. "Dearest size / cheapest" above is the largest of these medians in proportion to the least, on a ring of
-9, 30, 99 and 300 agents: 1 is a cost that does not depend on their number.
+9, 30, 99 and 300 agents: 1 is a cost that does not depend on their number. Its rounds have the noise of one measurement
+a size each, so that they may all be larger.
 """
 
 LIMITS = """## Where the limit is

@@ -23,7 +23,7 @@ SCALE_HEAD = (
 
 LONG_HEAD = ("run", "memory at the end", "growth, at most", "time per tick, last quarter : first", "files")
 
-COMPARISON_HEAD = ("what", "the rival's", "ours", "ratio", "rounds, least to largest")
+COMPARISON_HEAD = ("what", "the rival's", "ours", "rival's / ours", "rounds, least to largest")
 
 
 class _Beside(NamedTuple):
@@ -64,6 +64,12 @@ ALONE = (
     ("- of it until the first row", Quantity("tick", ("ours.first_row.9",))),
     ("each further case, three agents a process, start to end", Quantity("tick", ("ours.case.3",))),
     ("`gridpeers --help`", Quantity("command", ("ours.help",))),
+    (
+        "a simulated second of 100 agents in 8 processes, ring, T_c 100 ms, lock-step",
+        Quantity("hosted", ("ours.hosted.100.per_second",)),
+    ),
+    ("- of 300 agents in 8 processes", Quantity("hosted", ("ours.hosted.300.per_second",))),
+    ("- the start of 300 agents, until the first row", Quantity("hosted", ("ours.hosted.300.start",))),
 )
 """Times (s) that no rival has."""
 

@@ -47,6 +47,17 @@ def test_a_criterion_shows_its_limit_number_rounds_and_load() -> None:
     )
 
 
+def test_the_page_says_how_many_numbers_are_met_and_how_far_the_others_are() -> None:
+    """A reader sees how far we are before the rows; a number that must be large is away from below."""
+    parts = {"tick": part_of(ours__tick__9=[0.002], zenoh__tick__9=[0.001])}
+    parts["tick"].values |= {"helics-zmq.tick.9": [0.005], "ours.tick.3": [0.001]}
+
+    assert page.how_far(parts) == (
+        f"Of {len(CRITERIA)} numbers 1 are met, 2 are missed, by a factor of 1.20 to 1.25, "
+        f"and {len(CRITERIA) - 3} are not measured."
+    )
+
+
 def test_a_ratio_is_the_median_of_the_rounds() -> None:
     """A machine that becomes slower slows both rivals of a round, so that ratios are of one round."""
     parts = {"tick": part_of(a=[1.0, 20.0, 3.0], b=[1.0, 10.0, 1.0])}
