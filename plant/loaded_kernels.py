@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import numba
-
 from plant.build import build_plant
+from plant.dynamics.kernel.compiled import FOLDER
+from plant.dynamics.kernel.machine_code import SUFFIX
 from plant.plant_config import PlantConfig, PlantSettings
 
 
@@ -15,8 +13,7 @@ def load_kernels() -> None:
 
     The first compilation takes up to a minute; it is for the plant's own process, which says that it compiles.
     """
-    folder = Path(numba.config.CACHE_DIR)  # type: ignore[attr-defined]  # numba.config fills itself at import
-    if next(folder.rglob("*.nbi"), None) is None:
+    if next(FOLDER.glob(f"*{SUFFIX}"), None) is None:
         return
     settings = PlantSettings()
     config = PlantConfig(

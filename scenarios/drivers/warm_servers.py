@@ -19,9 +19,9 @@ _OF_AGENTS = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.
 
 _OF_PLANTS = (
     *("wire.driver.session:load_zenoh", "plant.plant_process"),
-    *("numba", "plant.build", "plant.loaded_kernels:load_kernels"),
+    *("plant.build", "plant.loaded_kernels:load_kernels"),
 )
-"""The same for plants. Agents have another server, because they load neither numpy nor numba."""
+"""The same for plants. Agents have another server, because they do not load numpy."""
 
 _ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """A server may have no other threads, and the plant uses one anyway."""

@@ -87,16 +87,5 @@ def run_steps(
     return total
 
 
-@unlocked
-def run_steps_unlocked(
-    begin: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    net: Any,
-    units: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> int:
-    """Call `run_steps` without Python's lock: to hand it back and forth costs small networks time."""
-    return run_steps(begin, steps, h, tolerance, net, units, x, out)
+run_steps_unlocked = unlocked(run_steps)
+"""The same without Python's lock, for networks so large that it is worth handing it back and forth."""

@@ -1,11 +1,59 @@
 import shutil
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from plant.dynamics.kernel import compiled
+from plant.dynamics.kernel.compiled import Kernel
+from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode
+from tests.side_by_side import compile_once
 
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
+
+
+class Inner(NamedTuple):
+    """A tuple in a tuple."""
+
+    values: Any
+    scale: float
+
+
+class Outer(NamedTuple):
+    """What a compiled function takes."""
+
+    inner: Inner
+    at: Any
+
+
+def gather(outer: Any, sign: float, count: int) -> tuple[int, float, bool, complex]:
+    """Sum picked values over a table of its own; everything that a compiled function of ours does and returns."""
+    own = np.empty((count, 2))
+    for i in range(count):
+        for k in range(2):
+            own[i, k] = sign * outer.inner.scale * outer.inner.values[outer.at[i], k]
+    return count, own.sum(), own[0, 0] > 0.0, complex(own[0, 0], own[count - 1, 1])
+
+
+def fill(into: NDArray[np.float64], value: float) -> None:
+    """Return nothing."""
+    into[:] = value
+
+
+def spread(into: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Fail where the sizes differ."""
+    into[:] = values
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for machine code, which has none yet."""
+    monkeypatch.setattr(compiled, "FOLDER", tmp_path / "kernels")
+    return tmp_path / "kernels"
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
@@ -21,3 +69,80 @@ def test_an_edit_of_compiled_code_renames_its_cache(
         file.write("\n")
 
     assert compiled.cache_folder() != before
+
+
+def test_machine_code_gives_what_the_function_gives(folder: Path) -> None:
+    """Arrays in any order of memory, tuples in tuples, numbers; memory of its own; a result of several types."""
+    values, at = np.arange(24.0).reshape(3, 8)[:, ::3].T, np.array([2, 0])
+    for table in (values, np.ascontiguousarray(values)):
+        outer = Outer(Inner(table, 2.0), at)
+        expected = gather(outer, -1.0, 2)
+        kernel = Kernel(gather)
+
+        assert kernel(outer, -1.0, 2) == expected
+        assert kernel(outer, -1.0, 2) == kernel.dispatcher(outer, -1.0, 2)
+    assert len(list(folder.glob(f"*{SUFFIX}"))) == 2  # a type of array each
+
+
+def test_what_is_written_into_an_array_stands_there(folder: Path) -> None:
+    """A function that returns nothing still has its effect; one without room for what it writes fails."""
+    table = np.zeros((3, 4))
+
+    assert Kernel(fill)(table[1], 5.0) is None
+    assert table.sum() == 20.0 == table[1].sum()
+    with pytest.raises(RuntimeError, match="spread: the compiled function failed"):
+        Kernel(spread)(table[0], np.zeros(3))
+
+
+def test_another_process_reads_machine_code_without_numba() -> None:
+    """A plant that has run on this machine starts without the compiler, whose import takes longer than a run."""
+    compile_once()
+    code = (
+        "import sys; from plant.loaded_kernels import load_kernels; load_kernels()\n"
+        "print(sorted({'numba', 'llvmlite'} & set(sys.modules)))"
+    )
+
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+
+    assert done.stdout == "['llvmlite']\n"
+
+
+def test_a_damaged_file_is_compiled_anew(folder: Path) -> None:
+    """Half a file, as of a full disk, is no machine code: linked, it would end the process."""
+    Kernel(fill)(np.zeros(2), 1.0)
+    (file,) = folder.glob(f"*{SUFFIX}")
+    whole = file.read_bytes()
+    assert MachineCode.read(file) is not None
+    file.write_bytes(whole[: len(whole) // 2])
+    assert MachineCode.read(file) is None
+
+    into = np.zeros(2)
+    Kernel(fill)(into, 3.0)
+
+    assert into.tolist() == [3.0, 3.0]
+    assert MachineCode.read(file) is not None
+
+
+def test_a_folder_that_cannot_be_written_costs_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The function runs, and is compiled again by the next process."""
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setattr(compiled, "FOLDER", tmp_path / "file" / "kernels")
+    into = np.zeros(2)
+
+    Kernel(fill)(into, 3.0)
+
+    assert into.tolist() == [3.0, 3.0]
+
+
+def test_a_record_by_itself_goes_to_numba(folder: Path) -> None:
+    """What has no words here is called as before."""
+    record = np.zeros(1, [("a", "f8"), ("b", "f8")])[0]
+    record["a"] = 2.0
+
+    assert Kernel(take_a)(record, 3.0) == 6.0
+    assert not folder.exists() or not list(folder.glob(f"*{SUFFIX}"))
+
+
+def take_a(record: Any, factor: float) -> float:
+    """Read a field."""
+    return float(record.a * factor)
