@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import PlantError
+from plant.dynamics.hybrid_root import Root, hybrid_root
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
 from plant.dynamics.phasors import PHASES, aligned_sum
@@ -250,12 +250,15 @@ def _by_droop(
         measured = np.where(units.positive_sequence, units.measured(V, I_out)[0].imag, trial)
         return np.asarray((by_droop - measured)[free] * units.m_q[free])
 
-    solution = None
+    solution: Root | None = None
     if free.size > MOST_BY_DIFFERENCES:
+        from scipy.optimize import root  # its import takes longer than the start of a small plant
+
         with one_thread():
-            solution = root(deviation, Q[free], method="krylov", options=KRYLOV)
+            found = root(deviation, Q[free], method="krylov", options=KRYLOV)
+        solution = Root(found.x, found.fun, bool(found.success))
     if solution is None or not solution.success:
-        solution = root(deviation, Q[free], method="hybr", options={"xtol": 1e-13})
+        solution = hybrid_root(deviation, Q[free], 1e-13)
     if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:
         raise PlantError(
             "no initial operating point: V_set0 cannot be met by droop, "

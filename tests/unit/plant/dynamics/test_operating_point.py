@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from plant.dynamics import initial
 from plant.feeder import Plant
@@ -34,8 +35,8 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
         methods.append(named["method"])
         return root(*arguments, **named)
 
-    root = initial.root
-    monkeypatch.setattr(initial, "root", noted)
+    root = optimize.root
+    monkeypatch.setattr(optimize, "root", noted)
     monkeypatch.setattr(initial, "MOST_BY_DIFFERENCES", 0)
     many = start()
 
