@@ -35,8 +35,8 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Prepare what all workers use, before there are any."""
-    if session.config.getoption("numprocesses", None):
+    """Compile before any worker or test, whose deadlines are those of a machine on which a plant has run before."""
+    if not (session.config.option.collectonly or hasattr(session.config, "workerinput")):
         compile_once()
 
 

@@ -25,24 +25,31 @@ def stat_of(pid: int) -> list[str]:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
-def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path) -> None:
+def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It has this process as its parent, a session, a name in `ps`, a log, an exit status, and outlives the server."""
+    speaker = "import sys\nprint('there', flush=True)\nprint(sys.stdin.read(), file=sys.stderr)\nsys.exit(7)\n"
+    (tmp_path / "speaker.py").write_text(speaker)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with (tmp_path / "log").open("wb") as log:
         with ForkServer(("agents.__main__",)) as server:
-            good, killed = (server.fork(["agents", "--leash", name], log, speaks=False) for name in ("inv1", "inv2"))
+            good, killed = (server.fork(["speaker", "--leash", name], log, speaks=True) for name in ("inv1", "inv2"))
+        assert good.stdin is not None
+        assert good.stdout is not None
+        assert good.stdout.readline() == b"there\n"  # it has become what it is: before, it looks like its server
         parent, group, session = stat_of(good.pid)[1:4]
         command = Path(f"/proc/{good.pid}/cmdline").read_text()
-        assert good.stdin is not None
-        good.stdin.write(b'{"run": 1}\n')
+        good.stdin.write(b"heard")
         good.stdin.close()
         killed.send_signal(signal.SIGKILL)
 
-        assert (good.wait(), killed.wait()) == (2, -signal.SIGKILL)
+        assert (good.wait(), killed.wait()) == (7, -signal.SIGKILL)
         assert int(parent) == os.getpid()
         assert int(group) == int(session) == good.pid != killed.pid
-    assert command == f"{sys.executable} -P -m agents --leash inv1\0"
-    assert "Expected `str`, got `int` - at `$.run`" in (tmp_path / "log").read_text()
-    killed.stdin.close()
+    assert command == f"{sys.executable} -P -m speaker --leash inv1\0"
+    assert (tmp_path / "log").read_text() == "heard\n"
+    for pipe in (good.stdout, killed.stdout, killed.stdin):
+        assert pipe is not None
+        pipe.close()
 
 
 def test_a_forked_agent_behind_emulated_links_warns_of_nothing(tmp_path: Path) -> None:
