@@ -15,14 +15,11 @@ from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.realtime.realtime_plant import RealtimePlant
+from plant.start_words import COMPILING, LISTENING, READY
 from wire.driver.drive import StoppedError, drive, perform, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
 from wire.driver.session import Session
 from wire.messages import PLANT
-
-LISTENING, COMPILING, READY = "listening", "compiling", "ready"
-"""Words on standard output, one a line: the session is open; the step compiles, which takes up to a minute
-at the very first start; the plant waits for agents."""
 
 
 def build(config: PlantConfig) -> LivePlant:

@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import msgspec
 
@@ -21,21 +21,19 @@ from plant.realtime.pacer import sentence
 from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live.numbers.departures import Departures, compare
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.evaluation.claims import judge, judged
-from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
-from scenarios.results.findings import find
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
-from scenarios.results.plots.drawing import drawing_of
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.report import RunReport, plain
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.plugin_keys import claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, Telemetry
+
+if TYPE_CHECKING:
+    from scenarios.live.numbers.departures import Departures
+    from scenarios.results.report import RunReport
 
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""
@@ -122,6 +120,9 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = _run_case(request, case, progress)
+        # these bring numpy, which a start does not wait for
+        from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
+
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:
             pacing[case] = outcome.pacing
@@ -135,6 +136,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
+    from scenarios.results.evaluation.claims import judge, judged
+    from scenarios.results.findings import find
+    from scenarios.results.report import RunReport, plain
+
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
     findings = find(scenario, request.feeder, cases)
     compared = _compared(request, recorded)
@@ -150,6 +155,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     if request.lasting:
+        from scenarios.results.plots.drawing import drawing_of
         from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
         last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
@@ -184,6 +190,8 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
     if request.clock == "simulated":
         return {}
+    from scenarios.live.numbers.departures import compare
+
     scenario = request.scenario
     return {
         case: compare(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typer.testing import CliRunner
 
-from gridpeers.cli import app as cli
+from gridpeers.cli import root as cli
 
 
 def invoke(*words: str) -> tuple[int, str]:

@@ -1,1 +1,1 @@
-"""The command `gridpeers`: `app` is all of it, `commands` holds its commands, the rest is what they have in common."""
+"""The command `gridpeers`: `app` is its entry, `commands` holds its commands, the rest is what they have in common."""

@@ -1,4 +1,4 @@
-"""The command `gridpeers`. A command is imported when it is called, so that help comes at once.
+"""The entry of the command `gridpeers`: start ahead what a run needs, then read the command line.
 
 Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage, a bad file, or output that cannot be written,
 3 the run broke, 130 interrupted by Ctrl-C, 141 nobody reads the output any more, 143 by SIGTERM.
@@ -7,23 +7,11 @@ Exit codes: 0 all is well, 1 a claim of the paper failed, 2 bad usage, a bad fil
 from __future__ import annotations
 
 import os
-from typing import Annotated
+import sys
+from collections.abc import Sequence
 
-import typer
-
-from gridpeers.cli.lazy_commands import LazyCommands
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
 from wire.driver.leftover import leave
 from wire.driver.output import speaking
-
-app = typer.Typer(
-    cls=LazyCommands,
-    add_completion=False,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
 
 
 def main() -> None:
@@ -36,14 +24,21 @@ def main() -> None:
 
 
 def _tell(line: str) -> None:
-    typer.echo(f"gridpeers: {line}", err=True)
+    print(f"gridpeers: {line}", file=sys.stderr)
 
 
 def _main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if runs_processes(sys.argv[1:]):  # what they import takes longer than all that comes before them here
+        from scenarios.drivers.warm_servers import prepare
+
+        prepare()
     with speaking("gridpeers"):
+        from gridpeers.cli.root import app
+        from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
+
         try:
             app()
         except KeyboardInterrupt:
@@ -54,21 +49,18 @@ def _main() -> None:
             fail([str(error)], BROKEN)
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
+def runs_processes(words: Sequence[str]) -> bool:
+    """Return whether a command line looks like a run with processes; if it is none, what was started ends with it.
 
-        typer.echo(f"gridpeers {version('gridpeers')}")
-        raise typer.Exit
-
-
-@app.callback()
-def gridpeers(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version, and end.")
-    ] = False,
-) -> None:
-    """Peer-to-peer consensus control of microgrid inverters: a plant process and one process per inverter, over Zenoh.
-
-    Example:  gridpeers run islanding
+    Examples
+    --------
+    >>> runs_processes(["run", "islanding"]), runs_processes(["run", "islanding", "--driver=inprocess"])
+    (True, False)
+    >>> runs_processes(["run", "--help"]), runs_processes(["check", "islanding"])
+    (False, False)
     """
+    return words[:1] == ["run"] and len(words) > 1 and not any(word.endswith(_NO_PROCESSES) for word in words)
+
+
+_NO_PROCESSES = "inprocess", "-h", "--help"
+"""Ends of words by which `gridpeers run` starts no processes."""

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
-from plant.plant_process import READY
+from plant.start_words import READY
 from scenarios.drivers.children import Child, Children
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome

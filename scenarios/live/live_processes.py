@@ -17,8 +17,9 @@ from msgspec.structs import replace
 from agents.agent_config import AgentConfig
 from agents.agent_process import run_agents
 from plant.plant_config import PlantConfig
-from plant.plant_process import COMPILING, READY, run_plant
+from plant.plant_process import run_plant
 from plant.realtime.pacer import sentence
+from plant.start_words import COMPILING, READY
 from scenarios.drivers.children import Child
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.drivers.telemetry_client import RECORDER

@@ -8,16 +8,18 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
 from plant.equipment import Feeder
 from scenarios.results.evaluation.quantities import UNITS, Measure
-from scenarios.results.findings import SHARED, Findings
 from scenarios.results.record import Recorded
 from scenarios.schema import ScenarioModel
 from wire.messages import Pacing
+
+if TYPE_CHECKING:
+    from scenarios.results.findings import Findings
 
 Clock = Literal["simulated", "wall"]
 """Lock-step of plant and agents, or real time."""
@@ -66,6 +68,8 @@ def metrics_json(
     live : Mapping[str, Any], optional
         The table on a live run; see docs/results.md.
     """
+    from scenarios.results.findings import SHARED  # numpy, which a run starts without
+
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in findings.results.items():
         cases[case] = {label: _numbers(asdict(values)) for label, values in steady.items()}

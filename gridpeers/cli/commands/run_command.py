@@ -124,7 +124,6 @@ def carry_out(
     from gridpeers.cli.progress import COMPILING, RESTING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.file_sizes import file_sizes, require_room
-    from scenarios.results.report import show
     from scenarios.results.run_files import RUNS, FolderError, new_folder, shown
     from scenarios.run import BrokenRunError, Request
     from scenarios.run import run as run_scenario
@@ -156,5 +155,7 @@ def carry_out(
         fail([f"the run broke: {error}", *kept], BROKEN)
     except KeyboardInterrupt as error:
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+    from scenarios.results.report import show
+
     show(report, console)
     raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import typer
 
-from gridpeers.cli.app import app
+from gridpeers.cli.root import app
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.schema import load_scenario
 from tests.command_line import invoke

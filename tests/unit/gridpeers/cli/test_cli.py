@@ -47,7 +47,7 @@ def test_help_and_list_do_not_wait_for_heavy_modules() -> None:
     import subprocess
 
     heavy = {"numba", "numpy", "scipy", "pandas", "matplotlib", "zenoh", "msgspec"}
-    code = "import sys\nfrom gridpeers.cli.app import app\napp(['list'], standalone_mode=False)\n"
+    code = "import sys\nfrom gridpeers.cli.root import app\napp(['list'], standalone_mode=False)\n"
     code += f"print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
