@@ -1,8 +1,9 @@
 """Islands of a large network in parts that the inner loop advances one by one: in the cache, and on all cores.
 
 No island acts on another between two switchings. So a part of them takes all steps of a control period before the next
-part begins, with factors and inverters that fit the cache, and iterates no longer than its own islands need. Which
-islands make a part depends on the network alone, so the bytes do not depend on the number of cores.
+part begins, with factors and inverters that fit the cache, and iterates no longer than its own islands need. An island
+without inverters is in no part: its voltages stay those of the last switching. Which islands make a part depends on the
+network alone, so the bytes do not depend on the number of cores.
 """
 
 from __future__ import annotations
@@ -29,6 +30,11 @@ Integers = NDArray[np.int64]
 _OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
 _OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
 _OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")
+_ADVANCED = ("gfm_state", "gfl_state", "J", "V", "I", "limiting")
+"""Arrays of the inverters that the steps advance; of the others they only read, or need the room."""
+
+Which = Integers | slice
+"""Some of the inverters: a slice where they are neighbours, which needs no copy."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +46,22 @@ class Part:
     """Its live branches."""
     nodes: int
     """Number of its nodes."""
-    inverters: Integers
-    gfm: Integers
+    size: int
+    """Number of its inverters."""
+    inverters: Which
+    gfm: Which
     """Its grid-forming inverters, among all of them."""
     gfm_at: Integers
     """The inverter of the part that each is."""
-    gfl: Integers
+    gfl: Which
     gfl_at: Integers
 
     def take(self, units: Units) -> Units:
-        """Return its inverters: copies, which the steps write into."""
+        """Return its inverters, with copies of what the steps advance."""
         own: dict[str, Any] = {"gfm_at": self.gfm_at, "gfl_at": self.gfl_at}
         for which, names in ((self.gfm, _OF_GFM), (self.gfl, _OF_GFL), (self.inverters, _OF_INVERTERS)):
             own |= {name: getattr(units, name)[which] for name in names}
-        return units._replace(**own)
+        return units._replace(**own | {name: own[name].copy() for name in _ADVANCED})
 
     def put(self, own: Units, units: Units) -> None:
         """Write its inverters back after the steps."""
@@ -91,7 +99,7 @@ class IslandParts:
 
         def step(part: Part) -> tuple[int, Units, Real, Real]:
             own, at = part.take(units), part.branches
-            own_x, own_out = np.concatenate([x[at], x[m + at]]), np.zeros((steps, part.inverters.size, READING))
+            own_x, own_out = np.concatenate([x[at], x[m + at]]), np.zeros((steps, part.size, READING))
             return run_steps_unlocked(0, steps, h, tolerance, part.net, own, own_x, own_out), own, own_x, own_out
 
         done = each_on_a_core(step, self.parts)
@@ -111,23 +119,27 @@ def is_large(net: Reduced) -> bool:
 
 
 def _parts(net: Reduced, node_island: Integers, units: Units) -> Iterator[Part]:
-    """Yield the parts, if there are several: islands in order of their numbers, each of `PART` nodes or more."""
-    live = np.unique(np.concatenate([node_island, net.branch_island]))
+    """Yield the parts: islands with inverters in order of their numbers, each part of `PART` nodes or more.
+
+    There are none if one part would have all islands, or all but little ones.
+    """
     size = np.bincount(node_island, minlength=net.leader.size)
-    part_of = np.zeros(net.leader.size, np.int64)
+    islands = np.unique(net.inverter_island)
+    part_of = np.full(net.leader.size, -1, np.int64)
     number, nodes = 0, 0
-    left = int(size.sum())
-    for island in live.tolist():
+    left = stepped = int(size[islands].sum())
+    worth = stepped > 0 and node_island.size - stepped >= PART
+    for island in islands.tolist():
         part_of[island] = number
         nodes, left = nodes + int(size[island]), left - int(size[island])
         if nodes >= PART and left >= PART:  # the last part takes what is left, less than twice as much
             number, nodes = number + 1, 0
-    for k in range(number + 1) if number else ():
-        yield _part(net, np.intersect1d(live, np.flatnonzero(part_of == k)), part_of == k, node_island, units)
+    for k in range(number + 1) if number or worth else ():
+        yield _part(net, islands[part_of[islands] == k], part_of == k, node_island, units)
 
 
 def _part(net: Reduced, islands: Integers, of_part: NDArray[np.bool_], node_island: Integers, units: Units) -> Part:
-    """Return one part. Inverters of dead islands are in the first, in whichever of its islands: they are off."""
+    """Return one part. Inverters of dead islands belong to it as those of live ones: they are off."""
     maps, f = net.sparse, net.sparse.factored
     nodes = np.flatnonzero(of_part[node_island])
     branches, inverters = np.flatnonzero(of_part[net.branch_island]), np.flatnonzero(of_part[net.inverter_island])
@@ -178,8 +190,23 @@ def _part(net: Reduced, islands: Integers, of_part: NDArray[np.bool_], node_isla
         sparse=sparse,
     )
     return Part(
-        own, branches, nodes.size, inverters, gfm, inverter_at[units.gfm_at[gfm]], gfl, inverter_at[units.gfl_at[gfl]]
+        net=own,
+        branches=branches,
+        nodes=nodes.size,
+        size=inverters.size,
+        inverters=_which(inverters),
+        gfm=_which(gfm),
+        gfm_at=inverter_at[units.gfm_at[gfm]],
+        gfl=_which(gfl),
+        gfl_at=inverter_at[units.gfl_at[gfl]],
     )
+
+
+def _which(at: Integers) -> Which:
+    """Return ascending numbers as a slice if none is missing between them."""
+    if at.size and at[-1] - at[0] + 1 > at.size:
+        return at
+    return slice(int(at[0]), int(at[-1]) + 1) if at.size else slice(0, 0)
 
 
 def _places(which: Integers, size: int) -> Integers:
